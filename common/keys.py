@@ -149,13 +149,6 @@ SET_SWITCHES = Call(
 )
 SET_LED = Call("srv/bridge/led", m.LedRequest, m.Done, "bridge", "set one lamp channel")
 RESET = Call("srv/safety/reset", m.ResetRequest, m.ResetDone, "safety", "clear the named causes")
-RELEASE = Call(
-    "srv/safety/release",
-    m.ReleaseRequest,
-    m.Done,
-    "safety",
-    "creep off a pressed bumper while held",
-)
 SET_POSE = Call("srv/odom/reset", m.PoseRequest, m.Done, "odom", "start odometry at a pose")
 
 TOPICS: tuple[Topic[m.Message], ...] = (
@@ -163,7 +156,7 @@ TOPICS: tuple[Topic[m.Message], ...] = (
     ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, ESTOP_KEEPALIVE, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
-    SET_SWITCHES, SET_LED, RESET, RELEASE, SET_POSE,
+    SET_SWITCHES, SET_LED, RESET, SET_POSE,
 )  # type: ignore[assignment]  # fmt: skip
 
 

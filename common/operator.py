@@ -3,21 +3,22 @@
 **Drive requests.** On every tick, 20 times a second, at most one request is sent:
 
 ========== =================== =========================================
-phase      tick with a twist   tick without a twist
+phase      tick with a request tick without a request
 ========== =================== =========================================
 SILENT     zero; DRIVING       nothing
-DRIVING    the twist           zero; RELEASING, two zeros remain
+DRIVING    the request         zero; RELEASING, two zeros remain
 RELEASING  zero; DRIVING       zero; SILENT after the last one
 ========== =================== =========================================
 
-The zero before a drive is the neutral request that arms safety and the bridge. ``stop`` leads to
-RELEASING with three zeros from any phase.
+A request is a twist, or a release off a pressed bumper. The zero before it is the neutral request
+that arms safety and the bridge; it is sent again when a release begins, ends or changes its
+direction. ``stop`` leads to RELEASING with three zeros from any phase.
 
 **Emergency stop.** It is repeated on every tick until safety reports ``estop`` as latched. After
 ``ESTOP_TICKS`` it counts as not confirmed.
 
 **Overruled.** An operator is overruled after ``OVERRULED_TICKS`` of requests while another source
-drives. A release is no other source.
+drives.
 
 **Reset.** Any program on the bus may answer the call. Only safety's own state shows the effect:
 
@@ -29,10 +30,6 @@ sent     answer                           wait for a state, at most ``CONFIRM_S`
 answered a state that confirms            confirmed
 answered ``CONFIRM_S`` without such state not confirmed
 ======== ================================ =====================================
-
-**Release off a pressed bumper.** The call is repeated while a direction is held, one at a time. It
-ends when the direction is released or changes. Safety refuses a hold whose echo is not newer than
-the end, so the next hold waits for a newer state.
 """
 
 from enum import Enum
@@ -41,9 +38,8 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
-from common.messages import Direction, ReleaseRequest, ResetDone, ResetRequest, SafetyState
+from common.messages import ReleaseRequest, ResetDone, ResetRequest, SafetyState
 from common.motion import STILL, Twist
-from common.verdict import RELEASE_SOURCE
 
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
 MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
@@ -51,8 +47,6 @@ AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one receiv
 ZEROS = 3  # requests after a drive: one may be lost
 OVERRULED_TICKS = 10  # 0.5 s: the operator's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
-BUMPER_FREE = "The bumper is free. Next: reset."  # the answer to a hold once it has succeeded
-NO_ECHO = (0, -1)  # boot and heartbeat before any
 
 
 class Phase(Enum):
@@ -63,18 +57,29 @@ class Phase(Enum):
     RELEASING = "releasing"
 
 
+class Request(Struct, frozen=True):
+    """What an operator's controls request: a twist, or a release off a pressed bumper."""
+
+    twist: Twist = STILL
+    release: ReleaseRequest = "none"
+
+
+NEUTRAL = Request()
+
+
 class DriveRequests(Struct):
     """The sequence of drive requests, one tick at a time."""
 
     phase: Phase = Phase.SILENT
     zeros: int = 0  # left to send while RELEASING
+    release: ReleaseRequest = "none"  # requested in the last tick of DRIVING
 
-    def tick(self, requested: Twist | None) -> Twist | None:
+    def tick(self, requested: Request | None) -> Request | None:
         """Return the request to send now, or None; ``requested`` is None without a held control."""
         if requested is not None:
-            first = self.phase is not Phase.DRIVING
-            self.phase = Phase.DRIVING
-            return STILL if first else requested
+            begins = self.phase is not Phase.DRIVING or requested.release != self.release
+            self.phase, self.release = Phase.DRIVING, requested.release
+            return NEUTRAL if begins else requested
         if self.phase is Phase.DRIVING:
             self.stop()
         if self.phase is Phase.SILENT:
@@ -82,7 +87,7 @@ class DriveRequests(Struct):
         self.zeros -= 1
         if self.zeros == 0:
             self.phase = Phase.SILENT
-        return STILL
+        return NEUTRAL
 
     def stop(self) -> None:
         """Send the final zeros in the next ticks, from any phase."""
@@ -137,7 +142,7 @@ class Contest(Struct):
     def tick(self, state: SafetyState | None, *, requests: bool) -> None:
         """Count a tick; ``requests``: whether the operator requests motion in it."""
         driving = state.source if state else None
-        self.other = None if driving in (None, RELEASE_SOURCE, self.source) else driving
+        self.other = None if driving == self.source else driving
         self.ticks = self.ticks + 1 if self.other and requests else 0
 
 
@@ -167,50 +172,6 @@ class ResetCheck:
         if self._until_ns is None:
             self._until_ns = now_ns + round(CONFIRM_S * NS_PER_S)
         return False if now_ns > self._until_ns else None
-
-
-class ReleaseCalls(Struct):
-    """The calls of a release that an operator holds, one tick at a time."""
-
-    direction: Direction | None = None  # held in the last tick
-    is_pending: bool = False  # a hold waits for its answer
-    ended: tuple[int, int] = NO_ECHO  # boot and heartbeat that the last end echoed
-    reported: str = ""  # the last result of this release
-
-    def tick(
-        self, direction: Direction | None, seen: SafetyState | None, newest: SafetyState | None
-    ) -> list[ReleaseRequest]:
-        """Return the calls to make now: the end of a release, a hold, or both.
-
-        ``seen`` is the state that the operator saw, which a hold echoes; an end echoes ``newest``.
-        """
-        calls = []
-        if self.direction is not None and direction != self.direction:
-            self.ended = (newest.boot, newest.heartbeat) if newest else NO_ECHO
-            self.reported = ""
-            calls.append(release_request(newest, None, held=False))
-        self.direction = direction
-        if direction is not None and seen is not None and self._may_hold(seen):
-            self.is_pending = True
-            calls.append(release_request(seen, direction, held=True))
-        return calls
-
-    def answered(self) -> None:
-        """Note that the pending hold was answered or has timed out; the next one may follow."""
-        self.is_pending = False
-
-    def is_new(self, result: str) -> bool:
-        """Return whether to report this result: once per release, and only while it is held."""
-        is_new = self.direction is not None and result != self.reported
-        if is_new:
-            self.reported = result
-        return is_new
-
-    def _may_hold(self, seen: SafetyState) -> bool:
-        if self.is_pending:
-            return False
-        boot, heartbeat = self.ended
-        return seen.boot != boot or seen.heartbeat > heartbeat
 
 
 class Echoes(Struct, frozen=True):
@@ -253,14 +214,6 @@ def reset_request(seen: SafetyState) -> ResetRequest:
     """Return the request to clear exactly the latched causes of this state."""
     latched = tuple(cause.id for cause in seen.causes if cause.name in seen.latched)
     return ResetRequest(echo=seen.heartbeat, causes=latched)
-
-
-def release_request(
-    seen: SafetyState | None, direction: Direction | None, *, held: bool
-) -> ReleaseRequest:
-    """Return the request to move off the bumper in a direction, or to end the release."""
-    echo = seen.heartbeat if seen else None
-    return ReleaseRequest(held=held, direction=direction, echo=echo)
 
 
 def confirms(seen: SafetyState, done: ResetDone, state: SafetyState) -> bool:

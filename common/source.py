@@ -10,20 +10,17 @@ from common.bus.bus import Arrival, Bus
 from common.keys import Topic
 from common.messages import (
     MAX_REASON,
-    Direction,
     Drive,
     EstopKeepalive,
     Limit,
+    ReleaseRequest,
     SafetyState,
     SourceMessage,
 )
-from common.operator import BUMPER_FREE, ReleaseCalls
 
 M = TypeVar("M", bound=SourceMessage)
 
 DENIED_AFTER = 10  # states of safety; a router needs a moment to announce its subscribers
-RELEASE_TIMEOUT_S = 0.3
-HELD = "held"  # the first answer of a release, with any distance left
 
 
 class Source(Generic[M]):
@@ -65,11 +62,11 @@ class DriveSource(Source[Drive]):
     def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
         super().__init__(bus, keys.DRIVE, source, on_denied)
 
-    def request(self, linear: float, angular: float) -> Drive:
+    def request(self, linear: float, angular: float, release: ReleaseRequest = "none") -> Drive:
         """Request a motion (m/s, rad/s, in ``base_link``) until the source's lease expires."""
         if not codec.finite(linear, angular):
             raise ValueError(f"non-finite request: {linear} m/s, {angular} rad/s")
-        return self._put(Drive(linear=linear, angular=angular, echo=0))
+        return self._put(Drive(linear=linear, angular=angular, release=release, echo=0))
 
 
 class LimitPublisher(Source[Limit]):
@@ -101,33 +98,3 @@ class KeepalivePublisher(Source[EstopKeepalive]):
     def beat(self, echo: int | None = None) -> EstopKeepalive:
         """Send one, with the heartbeat that an operator's screen showed; the newest by default."""
         return self._put(EstopKeepalive(echo=0), echo)
-
-
-def call_release(
-    bus: Bus,
-    calls: ReleaseCalls,
-    direction: Direction | None,
-    seen: SafetyState | None,
-    newest: SafetyState | None,
-    *,
-    report: Callable[[bool, str], None],
-) -> None:
-    """Make the calls of one tick of a release, see ``ReleaseCalls.tick``.
-
-    ``report`` receives whether safety accepts the hold, and the text: when the motion begins, when
-    the bumper is free, and for each new refusal.
-    """
-
-    def answered(is_held: bool, text: str) -> None:
-        calls.answered()
-        if calls.is_new(HELD if is_held and text != BUMPER_FREE else text):
-            report(is_held, text)
-
-    for request in calls.tick(direction, seen, newest):
-        bus.call(
-            keys.RELEASE,
-            request,
-            (lambda done: answered(True, done.text)) if request.held else lambda _: None,
-            (lambda reason: answered(False, reason)) if request.held else lambda _: None,
-            timeout_s=RELEASE_TIMEOUT_S,
-        )

@@ -46,7 +46,7 @@ class SimulatedStack(Stack):
         super().__init__(config, plan, step_ns=TICK_MS * MS)
         self.each_beat: list[Callable[[], object]] = []
         self.poses: list[m.Odometry] = []
-        self.answers: list[tuple[str, bool]] = []
+        self.answers: list[bool] = []  # to resets
         self.hand.subscribe(keys.ODOMETRY, lambda arrival: self.poses.append(arrival.message))
 
     def advance(self) -> None:
@@ -136,11 +136,9 @@ class SimulatedSession:
         return SimpleNamespace(put=put, matching_status=matching, undeclare=lambda: None)
 
     def get(self, key: str, payload: bytes, **_: object) -> list[SimpleNamespace]:
-        """Call safety."""
-        call = keys.RESET if key.endswith("reset") else keys.RELEASE
-        request = msgspec.msgpack.decode(payload, type=call.request)
-        caller = self._stack.call(call, request)
-        self._stack.answers.append((call.path.rpartition("/")[2], bool(caller.done)))
+        """Reset."""
+        caller = self._stack.call_reset(msgspec.msgpack.decode(payload, type=m.ResetRequest))
+        self._stack.answers.append(bool(caller.done))
         if not caller.done:
             return [SimpleNamespace(ok=None, err=raw(caller.text.encode()))]
         return [SimpleNamespace(ok=raw(ENCODE(caller.answer)), err=None)]

@@ -46,7 +46,6 @@ CLASSES: Mapping[str, str] = {
     "emergency stop of all": keys.estop_key("*"),
     "signs of life of another emergency stop": keys.ESTOP_KEEPALIVE.on(MINE, source="pendant"),
     "reset": keys.RESET.on(MINE),
-    "release off a pressed bumper": keys.RELEASE.on(MINE),
     "the board's emergency brakes": keys.SET_SWITCHES.on(MINE),
     "reset of another robot": keys.RESET.on(OTHER),
     "state and settings that a service returns to a query": keys.info_key(MINE, "safety", "config"),

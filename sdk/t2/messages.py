@@ -16,6 +16,7 @@ from t2.parts import KeepaliveState as KeepaliveState
 from t2.parts import Limits as Limits
 from t2.parts import LimitState as LimitState
 from t2.parts import Release as Release
+from t2.parts import ReleaseRequest as ReleaseRequest
 
 Command = Literal["run", "stop", "brake"]
 
@@ -155,6 +156,7 @@ class SafetyState(Message, frozen=True, kw_only=True):
     heartbeat: int  # echoed by sources, see ``Drive.echo``
     text: Text  # one sentence: why the vehicle may or may not move
     release: Release | None = None  # None while there is no contact
+    release_refusal: Text = ""  # why the release that ``source`` requests does not move the vehicle
     limit_sources: Annotated[tuple[LimitState, ...], Few] = ()  # those in the settings
     estop_keepalives: Annotated[tuple[KeepaliveState, ...], Few] = ()  # likewise
 
@@ -173,6 +175,7 @@ class Drive(SourceMessage, frozen=True, kw_only=True):
 
     linear: float  # m/s
     angular: float  # rad/s
+    release: ReleaseRequest = "none"  # move slowly off a pressed bumper instead, as an operator
 
 
 class Limit(SourceMessage, frozen=True, kw_only=True):
@@ -265,14 +268,6 @@ class ResetRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
     causes: Annotated[tuple[int, ...], Few] = ()  # ``Cause.id`` of each
-
-
-class ReleaseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Move slowly off a pressed bumper while the operator holds; repeat within the lease."""
-
-    held: bool = True  # False ends it
-    direction: Direction | None = None  # chosen by the operator; required while held
-    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 
 class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

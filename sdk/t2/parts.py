@@ -6,6 +6,7 @@ from msgspec import Meta, Struct
 
 Action = Literal["slow", "stop", "brake"]
 Direction = Literal["forward", "backward"]
+ReleaseRequest = Literal["none", "forward", "backward"]  # off a pressed bumper
 LimitEffect = Literal["none", "slow", "stop"]
 
 # A longer text or list makes a message undecodable. Members that may only read publish events, too:
@@ -25,9 +26,6 @@ class Cause(Struct, frozen=True, kw_only=True):
     age: float  # s since it became active
     text: Text  # text for the operator
     id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one for each occurrence
-
-
-RELEASE_SOURCE = "release"  # in place of a source's name while a release moves the vehicle
 
 
 class Limits(Struct, frozen=True, kw_only=True):

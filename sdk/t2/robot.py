@@ -1,18 +1,18 @@
 """One robot: its streams, its calls, and what may be sent to it."""
 
 import time
-from contextlib import suppress
 from typing import Any, TypeVar
 
 import msgspec
 import zenoh
 
 from t2 import messages as m
-from t2.drive import Drive
-from t2.errors import NoData, NotConfirmed, Refused, T2Error
+from t2.drive import NEUTRAL, PERIOD_S, ZEROS, Drive
+from t2.errors import NoData, NotAllowed, NotConfirmed, Refused
 from t2.keys import CALLS, ROOT, TOPICS
 from t2.limit import SpeedLimit
 from t2.motion import finite
+from t2.publisher import SourcePublisher
 from t2.stream import Stream, check_process
 
 A = TypeVar("A", bound=msgspec.Struct)
@@ -20,7 +20,6 @@ A = TypeVar("A", bound=msgspec.Struct)
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
-RELEASE_PERIOD_S = 0.1  # a held release expires after 0.3 s
 STANDSTILL_S = 1.0  # a release is refused until the vehicle stands
 ESTOP_S = 3.0
 ESTOP_PERIOD_S = 0.05
@@ -178,31 +177,45 @@ class Robot:
             time.sleep(ESTOP_PERIOD_S)
         raise NotConfirmed("safety answered the reset, and its state does not show the effect")
 
-    def release(self, direction: m.Direction, timeout: float = 5.0) -> None:
-        """Creep off a pressed bumper, "forward" or "backward"; return once the bumper is free.
+    def release(self, direction: m.Direction, source: str, timeout: float = 5.0) -> None:
+        """Move off a pressed bumper, "forward" or "backward"; return once the bumper is free.
 
-        As a release that an operator holds: at most 0.1 m/s and 0.15 m, and ``contact`` stays
-        latched until ``reset``. Know which direction is free: the bumper has none. Raises
-        ``Refused`` with the reason, ``NotConfirmed`` after ``timeout`` s, and ``NoData``.
+        As an operator who holds a release as this source, which needs ``operator`` in
+        ``safety.sources``: at most 0.1 m/s and 0.15 m, and ``contact`` stays latched until
+        ``reset``. Know which direction is free: the bumper has none. Raises ``Refused`` with the
+        reason, ``NotAllowed``, ``NotConfirmed`` after ``timeout`` s, and ``NoData``.
 
-        >>> robot.release("backward")  # the bumper is free
+        >>> robot.release("backward", "teleop")  # the bumper is free
         """
-        begin_s, refusal = time.monotonic(), None
+        key = self._key("drive", source=source)
+        publisher: SourcePublisher[m.Drive] = SourcePublisher(
+            self._session, key, "Drive", self.safety
+        )
+
+        def put(release: m.ReleaseRequest) -> None:
+            publisher.put(m.Drive(linear=0.0, angular=0.0, release=release, echo=0))
+            time.sleep(PERIOD_S)
+
+        self.safety.latest()
         try:
+            for _ in range(NEUTRAL):
+                put("none")
+            begin_s = time.monotonic()
             while (passed_s := time.monotonic() - begin_s) < timeout:
+                state = self.safety.latest()
                 if not self.bumper.latest().pressed:
                     return
-                if refusal and passed_s > STANDSTILL_S:
-                    raise refusal
-                try:
-                    self._call_release(direction, held=True)
-                    refusal = None
-                except Refused as error:
-                    refusal = error
-                time.sleep(RELEASE_PERIOD_S)
+                if publisher.denied:
+                    raise NotAllowed(
+                        f"the router drops the requests of {source!r}; see `t2 keys list`"
+                    )
+                if state.source == source and state.release_refusal and passed_s > STANDSTILL_S:
+                    raise Refused(state.release_refusal)
+                put(direction)
         finally:
-            with suppress(T2Error):  # else it ends by its lease
-                self._call_release(None, held=False)
+            for _ in range(ZEROS):
+                put("none")
+            publisher.close()
         raise NotConfirmed(f"the bumper is still pressed after {timeout:g} s of release")
 
     # --- calls --------------------------------------------------------------------------------
@@ -241,11 +254,6 @@ class Robot:
             f"no answer from {key} within {CALL_S:g} s: its service is not running, or this "
             "certificate may not call it; see `t2 doctor`"
         )
-
-    def _call_release(self, direction: "m.Direction | None", *, held: bool) -> None:
-        echo = self.safety.latest().heartbeat
-        request = m.ReleaseRequest(held=held, direction=direction, echo=echo)
-        self._call("safety/release", request, m.Done)
 
     def _stream(self, name: str, depth: int = 1, **names: str) -> Stream[Any]:
         kind = TOPICS[name][1]

@@ -278,7 +278,7 @@ class Fleet:
             node = self._node
             bus = Bus(node.config.bus, name, node.loop.post)
             broadcast = partial(self._broadcast, name)
-            self._robots[name] = Robot(bus, self._settings, broadcast, self._notify)
+            self._robots[name] = Robot(bus, self._settings, broadcast)
             bus.open()
         self._robots[name].used_ns = clock.now_ns()
         return self._robots[name]

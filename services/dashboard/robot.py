@@ -16,19 +16,18 @@ from common.keys import Call, Topic
 from common.log import Logger
 from common.motion import Twist
 from common.operator import (
-    BUMPER_FREE,
     Contest,
     DriveRequests,
     EstopRepetition,
     EstopStep,
     Phase,
-    ReleaseCalls,
+    Request,
     ResetCheck,
     reset_request,
 )
-from common.source import DriveSource, KeepalivePublisher, call_release
+from common.source import DriveSource, KeepalivePublisher
 from services.dashboard.config import Dashboard
-from services.dashboard.driver_lock import DriverLock, HoldState
+from services.dashboard.driver_lock import DriverLock, HoldState, Push
 from services.dashboard.keepalive import PageKeepalive
 from services.dashboard.sectors import Protection
 from services.dashboard.snapshot import DriverState
@@ -49,13 +48,7 @@ PROTECTION = {name: f"safety.{name}" for name in Protection.__struct_fields__}
 class Robot:
     """The state of a robot and the requests to it; ``tick`` runs 20 times a second."""
 
-    def __init__(
-        self,
-        bus: Bus,
-        settings: Dashboard,
-        broadcast: Notify,
-        notify: Callable[[str, m.Level, str, str], None],
-    ) -> None:
+    def __init__(self, bus: Bus, settings: Dashboard, broadcast: Notify) -> None:
         self.bus = bus
         self.telemetry = TelemetryCache()
         self.trail = Trail()
@@ -65,7 +58,6 @@ class Robot:
         self.trail_sent = False  # whether the viewers have the current trail
         self._settings = settings
         self._broadcast = broadcast  # to all viewers of this robot
-        self._notify = notify  # to one viewer
         self._requests = DriveRequests()
         self._source = DriveSource(bus, settings.source, self._on_denied)
         self._contest = Contest(settings.source)
@@ -76,7 +68,6 @@ class Robot:
         if settings.estop_keepalive:
             self._keepalives = KeepalivePublisher(bus, settings.estop_keepalive)
         self._requests_path = path_of(keys.DRIVE.on(bus.robot, source=settings.source))
-        self._release = ReleaseCalls()
         self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
         self._is_queried = False
         self._log = Logger(robot=bus.robot)
@@ -101,11 +92,11 @@ class Robot:
         self._repeat_estop(safety)
         self._yield(safety)
         push = self.driver_lock.held(now_ns)
-        request = self._requests.tick(None if push is None or push.release else self._twist())
+        request = self._requests.tick(self._requested(push) if push else None)
         if request is not None:
-            sent = self._source.request(request.linear, request.angular)
+            twist = request.twist
+            sent = self._source.request(twist.linear, twist.angular, request.release)
             self.telemetry.update(self._requests_path, sent, now_ns)
-        self._call_release(push.release if push else None, safety, now_ns)
         self._check_resets(safety, now_ns)
         self._update_trail(now_ns)
 
@@ -133,7 +124,7 @@ class Robot:
     @property
     def silent(self) -> bool:
         """Whether no request is being sent."""
-        return self._requests.phase is Phase.SILENT and self._release.direction is None
+        return self._requests.phase is Phase.SILENT
 
     def release_driver(self) -> None:
         """End the driver's hold, with zeros, and free the driver lock."""
@@ -196,16 +187,18 @@ class Robot:
     def _yield(self, safety: m.SafetyState | None) -> None:
         """End a hold while another source drives: its end must not resume our motion."""
         lock, contest = self.driver_lock, self._contest
-        contest.tick(safety, requests=lock.state is HoldState.HELD and lock.push.release is None)
+        contest.tick(safety, requests=lock.state is HoldState.HELD)
         if contest.is_lost:
             self._overruled = True
             lock.lapse()
         self._overruled = self._overruled and bool(contest.other and lock.driver)
 
-    def _twist(self) -> Twist:
-        push, gear = self.driver_lock.push, self.driver_lock.gear - 1
+    def _requested(self, push: Push) -> Request:
+        if push.release:
+            return Request(release=push.release)
+        gear = self.driver_lock.gear - 1
         linear, angular = self._settings.gears_linear[gear], self._settings.gears_angular[gear]
-        return Twist(push.linear * linear, push.angular * angular)
+        return Request(Twist(push.linear * linear, push.angular * angular))
 
     def _repeat_estop(self, safety: m.SafetyState | None) -> None:
         step = self._estop.tick(safety)
@@ -228,25 +221,6 @@ class Robot:
                     notify("info", text, "reset_done")
             else:
                 notify("error", "reset_unconfirmed", "")
-
-    def _call_release(
-        self, direction: m.Direction | None, newest: m.SafetyState | None, now_ns: int
-    ) -> None:
-        """Make the calls of a release that is held in a direction, or has ended."""
-        limit_s = self._settings.round_trip
-        seen = self.driver_lock.seen(self.driver_lock.answered, now_ns, limit_s)
-        call_release(self.bus, self._release, direction, seen, newest, report=self._on_release)
-
-    def _on_release(self, is_held: bool, text: str) -> None:
-        """Report a release to its driver; the page shows the distance that is left."""
-        if (driver := self.driver_lock.driver) is None:
-            return
-        if text == BUMPER_FREE:
-            self._notify(driver, "info", text, "release_freed")
-        elif is_held:
-            self._notify(driver, "info", text, "release_held")
-        else:
-            self._notify(driver, "warning", text, "release_refused")
 
     # --- telemetry ----------------------------------------------------------------------------
 

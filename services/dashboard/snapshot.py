@@ -28,6 +28,7 @@ class State(Struct, frozen=True):
     causes: tuple[Cause, ...]
     limits: Limits
     release: Release | None
+    release_refusal: str
     limit_sources: tuple[LimitState, ...]
 
 

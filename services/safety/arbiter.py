@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from msgspec import Struct
 from msgspec.structs import replace
 
+from common.messages import Drive, ReleaseRequest
 from common.motion import STILL, Twist
 from services.safety.channel import Admission, Channel
 from services.safety.config import Source
@@ -25,8 +26,15 @@ class DriveChannel(Channel, frozen=True, kw_only=True):
     """State of one source, with its newest request."""
 
     requested: Twist = STILL
+    release: ReleaseRequest = "none"  # instead of ``requested``, which is zero then
     neutral: bool = False
+    neutral_ns: int | None = None  # reception of its newest neutral request
     overruled_by: str = ""  # the source that was in control since this one was neutral
+
+    @property
+    def requests_motion(self) -> bool:
+        """Whether it requests any motion; a request without is neutral."""
+        return self.release != "none" or not self.requested.is_zero
 
 
 class Arbiter(Struct, frozen=True):
@@ -45,10 +53,10 @@ class Arbiter(Struct, frozen=True):
         before, lease_s = self.channels.get(name, DriveChannel()), self.sources[name].lease
         channel, refused = before.accept(drive, request.received_ns, lease_s, admission.max_age_ns)
         if not refused:
-            channel = replace(channel, requested=Twist(drive.linear, drive.angular))
             # A program that was suspended must not drive on by itself.
             if not before.is_fresh(request.received_ns, lease_s + LAPSE_S):
-                channel = replace(channel, neutral=False)
+                channel = replace(channel, neutral=False, neutral_ns=None)
+            channel = _requesting(channel, drive, request.received_ns)
         return replace(self, channels={**self.channels, name: channel}), refused
 
     def in_control(self, now_ns: int) -> str | None:
@@ -58,7 +66,7 @@ class Arbiter(Struct, frozen=True):
 
     def requests_motion(self, now_ns: int) -> bool:
         """Return whether any source requests motion."""
-        return any(not self.channels[name].requested.is_zero for name in self._fresh(now_ns))
+        return any(self.channels[name].requests_motion for name in self._fresh(now_ns))
 
     def conflict(self, now_ns: int) -> list[str]:
         """Return the source in control if it has two publishers; others are stopped anyway."""
@@ -72,7 +80,7 @@ class Arbiter(Struct, frozen=True):
 
     def requesting_zero(self, now_ns: int) -> set[str]:
         """Return the sources that request zero now."""
-        return {name for name in self._fresh(now_ns) if self.channels[name].requested.is_zero}
+        return {name for name in self._fresh(now_ns) if not self.channels[name].requests_motion}
 
     def armed(self, now_ns: int) -> "Arbiter":
         """Return the arbiter with the sources armed that request zero now."""
@@ -90,7 +98,7 @@ class Arbiter(Struct, frozen=True):
             return self
         priority = self.sources[leader].priority
         below = {
-            name: replace(one, neutral=False, overruled_by=leader)
+            name: replace(one, neutral=False, neutral_ns=None, overruled_by=leader)
             for name, one in self.channels.items()
             if self.sources[name].priority < priority
         }
@@ -102,3 +110,10 @@ class Arbiter(Struct, frozen=True):
             for name, one in self.channels.items()
             if one.is_fresh(now_ns, self.sources[name].lease)
         ]
+
+
+def _requesting(channel: DriveChannel, drive: Drive, received_ns: int) -> DriveChannel:
+    """Return the channel with a new request."""
+    twist = Twist(drive.linear, drive.angular) if drive.release == "none" else STILL
+    channel = replace(channel, requested=twist, release=drive.release)
+    return channel if channel.requests_motion else replace(channel, neutral_ns=received_ns)

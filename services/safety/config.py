@@ -75,7 +75,6 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
         "runaway_time": (0.0, 1.0),
         "release_speed": (0.0, 0.15),
         "release_distance": (0.0, 0.3),
-        "release_lease": (0.0, 0.5),
         "hysteresis": (0.02, 10.0),
         "stuck_travel": (0.0, 1.0),
         "creep_speed": (0.0, 0.25),
@@ -113,7 +112,7 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
     driver_age: Seconds = 2.0  # s
     estop_path_age: Seconds = 0.2  # s, of the own state, received back through the router
     settle: Seconds = 0.5  # s of good inputs until a cause clears
-    max_echo_age: Seconds = 0.4  # s, of a request to move and of a held release
+    max_echo_age: Seconds = 0.4  # s, of a request to move
     max_call_age: Seconds = 1.0  # s, of a reset
     require_switches: bool = True  # requires the board's own emergency brakes
 
@@ -123,7 +122,6 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
 
     release_speed: Positive = 0.1  # m/s
     release_distance: Positive = 0.15  # m in total until a reset
-    release_lease: Seconds = 0.3
 
     @property
     def operators(self) -> frozenset[str]:

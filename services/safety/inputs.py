@@ -6,7 +6,6 @@ from common import codec
 from common.freshness import Latest, fresh
 from common.messages import (
     Bumper,
-    Direction,
     Drive,
     Driver,
     EstopKeepalive,
@@ -57,15 +56,7 @@ class Reset(Struct, frozen=True):
     causes: tuple[int, ...] = ()
 
 
-class Hold(Struct, frozen=True):
-    """An operator's call to hold or end the release."""
-
-    held: bool
-    direction: Direction | None = None
-    echo: int | None = None
-
-
-Event = DriveRequest | LimitRequest | KeepaliveRequest | Estop | Reset | Hold
+Event = DriveRequest | LimitRequest | KeepaliveRequest | Estop | Reset
 
 
 class Inputs(Struct, frozen=True):

@@ -8,7 +8,6 @@ from msgspec import Struct
 from common.messages import SONAR_NAMES
 from common.motion import RUN, STILL, Twist, clamp
 from common.settings import Vehicle
-from common.verdict import RELEASE_SOURCE
 from services.safety.causes import wants_neutral
 from services.safety.config import Safety
 from services.safety.latches import Latches, Observation
@@ -23,6 +22,7 @@ class RequestedTwist(Struct, frozen=True):
     source: str
     twist: Twist
     limited_by: str | None = None  # the limit source that slows it
+    is_release: bool = False  # whether it moves off a pressed bumper
 
 
 class Plan(Struct, frozen=True):
@@ -44,17 +44,17 @@ class Planner:
         self._up = Twist(settings.linear_acceleration, settings.angular_acceleration)
         self._down = Twist(settings.deceleration, settings.angular_deceleration)
 
-    def requested(self, state: State, creeping: bool, now_ns: int) -> RequestedTwist | None:
-        """Return the requested motion; a held release has priority over all sources."""
-        settings = self._settings
-        source = RELEASE_SOURCE if creeping else state.arbiter.in_control(now_ns)
+    def requested(self, state: State, now_ns: int) -> RequestedTwist | None:
+        """Return the motion that the source in control requests."""
+        source = state.arbiter.in_control(now_ns)
         if source is None:
             return None
-        if creeping:
-            twist = state.release.away(settings.release_speed)
+        is_release = state.release.direction is not None
+        if is_release:
+            twist = state.release.away(self._settings.release_speed)
         else:
             twist = self.limited(state.arbiter.channels[source].requested, state.latches)
-        return RequestedTwist(source, *state.speed_limits.limited(twist, now_ns))
+        return RequestedTwist(source, *state.speed_limits.limited(twist, now_ns), is_release)
 
     def limited(self, asked: Twist, held: Latches) -> Twist:
         """Return the twist within the limits; at creep speed while bumper polls are lost."""
@@ -77,7 +77,8 @@ class Planner:
 
     def plan(self, state: State, measured: Twist, requested: RequestedTwist, step_s: float) -> Plan:
         """Return the twist for the next step; zero when the way is blocked."""
-        distances = self.with_overrides(state.sonar_array.cautious, state, requested.source)
+        source = None if requested.is_release else requested.source  # it overrides no sonar
+        distances = self.with_overrides(state.sonar_array.cautious, state, source)
         limit = self.zones.limit(requested.twist, distances)
         target = requested.twist.scaled(limit.factor)
         sent = state.verdict
@@ -87,7 +88,7 @@ class Planner:
         for tightest in (limit, here):
             if tightest.factor == 0:
                 return Plan(blocked_by=tightest.sonar)
-        shown = self.with_overrides(state.sonar_array.distances, state, requested.source)
+        shown = self.with_overrides(state.sonar_array.distances, state, source)
         blocked_by = self.zones.too_fast(measured, shown)
         if blocked_by is not None:
             return Plan(blocked_by=blocked_by)
@@ -132,7 +133,7 @@ def observations(
     """Yield the causes that depend on a request, present or not."""
     tick = (0, now_ns)
     faults = state.sonar_array.faults
-    creeping = requested is not None and requested.source == RELEASE_SOURCE
+    creeping = requested is not None and requested.is_release
     overruled = _overruled_text(state, requested)
     yield Observation("no_request", requested is None, tick)
     yield Observation("neutral", _neutral_is_due(state, requested), tick, overruled)
@@ -149,7 +150,7 @@ def observations(
 
 def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:
     """Return whether a neutral request is due; other causes must clear first."""
-    if requested is None or requested.source == RELEASE_SOURCE:
+    if requested is None or requested.is_release:
         return False
     if any(wants_neutral(name) for name in state.latches):
         return False

@@ -1,7 +1,7 @@
-"""Operator requests: carries out resets and held releases, or returns the reason of a refusal.
+"""Operator requests: carries out resets and releases, or returns the reason of a refusal.
 
-Both calls echo safety's heartbeat, so a delayed call is refused. A reset clears all causes that it
-names, or none. A pressed bumper is the exception: its ``contact`` stays latched, and the other
+A reset echoes safety's heartbeat, so a delayed one is refused. It clears all causes that it names,
+or none. A pressed bumper is the exception: its ``contact`` stays latched, and the other
 named causes are cleared. Otherwise reset and release would deadlock: the reset needs a free bumper,
 and the release that frees it needs the reset. Causes that the reset does not name stay latched.
 """
@@ -10,10 +10,9 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Direction
-from common.operator import BUMPER_FREE
 from services.safety.causes import bars_motion
 from services.safety.config import Safety
-from services.safety.inputs import Hold, Inputs, Reset
+from services.safety.inputs import Inputs, Reset
 from services.safety.latches import (
     FaultBudget,
     begun,
@@ -28,31 +27,18 @@ from services.safety.state import Reply, State
 from services.safety.trajectory import OPPOSITE
 
 BY_HAND = "Push the vehicle off by hand, then reset."
+BUMPER_FREE = "The bumper is free. Next: reset."
+LET_GO = "A release begins with a new hold: let go first."
+NO_OPERATOR = "only a source that an operator holds may."
 
 
 def handle(
     state: State, inputs: Inputs, settings: Safety, now_ns: int
 ) -> tuple[State, Reply | None]:
-    """Carry out the call in the inputs, if there is one."""
-    match inputs.event:
-        case Reset() as call:
-            return _reset(state, inputs, call, settings, now_ns)
-        case Hold(held=True) as call:
-            return _hold(state, inputs, call, settings, now_ns)
-        case Hold() as call:
-            return _end_release(state, call.echo), Reply(True, "Release ended.")
-        case _:
-            return state, None
-
-
-def is_creeping(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> bool:
-    """Return whether a held release may move the vehicle now."""
-    release = state.release
-    if not release.is_held(now_ns, settings.release_lease):
-        return False
-    return not _no_release(state, inputs, settings) and not _direction_refusal(
-        state, release.direction
-    )
+    """Carry out the reset in the inputs, if there is one."""
+    if isinstance(inputs.event, Reset):
+        return _reset(state, inputs, inputs.event, settings, now_ns)
+    return state, None
 
 
 def room(state: State, settings: Safety) -> float:
@@ -78,7 +64,7 @@ def _reset(
     held = reset(state.latches, call.causes)
     cleared = tuple(one.id for name, one in state.latches.items() if name not in held)
     budget = state.fault_budget if "flapping" in held else FaultBudget()
-    after = replace(_end_release(state, None), latches=held, fault_budget=budget)
+    after = replace(state, latches=held, fault_budget=budget)
     text = _remaining(after, inputs, settings)
     # ``disarmed`` has already disarmed every source while the cause was held.
     text = text or "Reset: a neutral request is due before the vehicle moves."
@@ -142,47 +128,33 @@ def _way_off(release: Release) -> str:
     return f"{advice} The vehicle drove {only} into the contact: check that direction first."
 
 
-def _hold(
-    state: State, inputs: Inputs, call: Hold, settings: Safety, now_ns: int
-) -> tuple[State, Reply]:
-    late = state.heartbeat.refusal(call.echo, now_ns, round(settings.max_echo_age * NS_PER_S))
-    if not late and call.echo is not None and call.echo <= state.release.ended_echo:
-        late = "The release was ended after this call was made: hold it again."
-    if late:
-        return state, Reply(False, late)
-    if "contact" in state.latches and not _is_pressed(inputs):
-        # The operator still holds the key that has freed the bumper: that is no refusal.
-        return replace(state, release=replace(state.release, held_ns=None)), Reply(
-            True, BUMPER_FREE
-        )
-    reason = _no_release(state, inputs, settings) or _direction_refusal(state, call.direction)
-    reason = reason or _no_start(state, inputs, call, settings, now_ns)
-    direction = call.direction
-    if not reason and state.release.is_interrupted(now_ns, settings.release_lease):
-        state = replace(state, release=state.release.interrupted(now_ns))
-        reason = "A limit source has stopped the release: release the key first."
-    if reason or direction is None:
-        return replace(state, release=replace(state.release, held_ns=None)), Reply(False, reason)
-    state = replace(state, release=state.release.hold(direction, now_ns))
-    way = room(state, settings)
-    return state, Reply(True, f"Moving {direction} off the bumper, {way:.2f} m left.")
+def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Release:
+    """Return the release with the answer to what the source in control requests.
+
+    A refusal ends it until the next neutral request. Only a vehicle that does not stand yet is
+    waited for.
+    """
+    release, source = state.release, state.arbiter.in_control(now_ns)
+    asked = state.arbiter.channels[source].release if source else "none"
+    if source is None or asked == "none":
+        return replace(release, direction=None, refusal="")
+    reason = (
+        ("" if source in settings.operators else f"{source} may not release: {NO_OPERATOR}")
+        or _no_release(state, inputs, settings)
+        or _direction_refusal(release, asked)
+        or _not_let_go(release, asked, state.arbiter.channels[source].neutral_ns)
+    )
+    if reason:
+        return replace(release, direction=None, refusal=reason, barred_ns=now_ns)
+    moves = "" if release.direction else _not_standing(inputs, settings, now_ns)
+    return replace(release, direction=None if moves else asked, refusal=moves)
 
 
-def _no_start(state: State, inputs: Inputs, call: Hold, settings: Safety, now_ns: int) -> str:
-    """Return why no release may begin; empty when it may or already continues."""
-    if not state.release.is_held(now_ns, settings.release_lease):
-        return _not_standing(inputs, settings, now_ns)
-    if state.release.direction == call.direction:
-        return ""
-    # The ramp would first continue in the old direction.
-    return "The release is held in the other direction: release the key first."
-
-
-def _end_release(state: State, echo: int | None) -> State:
-    """Return the state with the release ended; an unknown echo counts as the newest."""
-    newest = state.heartbeat.number
-    echo = newest if echo is None else min(echo, newest)
-    return replace(state, release=state.release.end(echo))
+def _not_let_go(release: Release, asked: Direction, neutral_ns: int | None) -> str:
+    """Return that a neutral request is due: before each release, also in the other direction."""
+    if release.direction is not None:
+        return "" if release.direction == asked else LET_GO
+    return "" if neutral_ns is not None and neutral_ns > release.barred_ns else LET_GO
 
 
 def _no_release(state: State, inputs: Inputs, settings: Safety) -> str:
@@ -208,11 +180,9 @@ def spent(state: State, settings: Safety) -> str:
     return "The distance for moving off is used up." if room(state, settings) <= 0 else ""
 
 
-def _direction_refusal(state: State, direction: Direction | None) -> str:
+def _direction_refusal(release: Release, direction: Direction) -> str:
     """Return why a release in this direction is forbidden; empty when it is not."""
-    if direction is None:
-        return "Choose the direction of the release: forward or backward."
-    if direction in state.release.forbidden:
+    if direction in release.forbidden:
         return f"Release {direction} is forbidden until a reset: the bumper was pressed that way."
     return ""
 

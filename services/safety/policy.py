@@ -7,8 +7,9 @@ arrives with it:
              ``keepalive.py``)
 2. sense     update sonars, runaway, standstill, trajectory and the travel of a release
 3. observe   observe every cause that does not depend on a request (``conditions.py``)
-4. handle    carry out a reset or a held release (``operator_requests.py``)
-5. arm       arm the sources that are neutral, disarm those that are overruled
+4. handle    carry out a reset (``operator_requests.py``)
+5. arm       arm the sources that are neutral, disarm those that are overruled; begin, continue or
+             end a release
 6. conclude  plan the requested motion (``motion.py``), then apply the worst action (``causes.py``)
 
 RUN has one origin: the end of ``_conclude``, when no held cause demands STOP or BRAKE and a fresh
@@ -25,7 +26,6 @@ from common.messages import Motion
 from common.messages import Verdict as VerdictName
 from common.motion import BRAKE, RUN, STILL, STOP, Command, Twist
 from common.settings import Vehicle
-from common.verdict import RELEASE_SOURCE
 from services.safety.arbiter import Arbiter
 from services.safety.causes import BARRING, BY_NAME, Clears, bars_motion, clears, wants_neutral
 from services.safety.channel import Admission
@@ -42,7 +42,7 @@ from services.safety.keepalive import Keepalives
 from services.safety.latches import Latches, Observation, latched, observe, ordered
 from services.safety.limits import SpeedLimits
 from services.safety.motion import Plan, Planner, observations
-from services.safety.operator_requests import handle, is_creeping
+from services.safety.operator_requests import answered, handle
 from services.safety.sonar import Rules
 from services.safety.sonar_array import SonarFilter
 from services.safety.state import State, Verdict
@@ -87,6 +87,7 @@ class Policy:
         state = self._observe(state, inputs, now_ns)
         state, reply = handle(state, inputs, self.settings, now_ns)
         state = self._arm(state, now_ns)
+        state = replace(state, release=answered(state, inputs, self.settings, now_ns))
         state, verdict = self._conclude(state, inputs, step_s, now_ns)
         verdict = replace(verdict, refused=refused, reply=reply)
         state = replace(
@@ -127,7 +128,7 @@ class Policy:
             trajectory = trajectory.follow(counter, inputs.mileage.received_ns)
         release = state.release
         if "contact" in state.latches:
-            moved = sent.twist if sent.source == RELEASE_SOURCE and sent.command is RUN else None
+            moved = sent.twist if sent.command is RUN else None  # only a release runs then
             reach = self.planner.reach
             release = release.moving(moved, known, counter, reach=reach, dt_s=step_s, now_ns=now_ns)
         return replace(
@@ -193,16 +194,13 @@ class Policy:
             state = replace(state, overrides=overrides)
         disarm = any(wants_neutral(name) for name in state.latches)
         arbiter = arbiter.disarmed() if disarm else arbiter.armed(now_ns)
-        if any(clears(name) is Clears.NEUTRAL for name in state.latches):
-            state = replace(state, release=state.release.interrupted(now_ns))
         return replace(state, arbiter=arbiter.overruled(now_ns))
 
     def _conclude(
         self, state: State, inputs: Inputs, step_s: float, now_ns: int
     ) -> tuple[State, Verdict]:
-        creeping = is_creeping(state, inputs, self.settings, now_ns)
-        suspended = {"contact"} if creeping else set()
-        requested = self.planner.requested(state, creeping, now_ns)
+        suspended = {"contact"} if state.release.direction else set()
+        requested = self.planner.requested(state, now_ns)
         barred = _worst(_barring(state.latches) - suspended) != "run"
         plan = Plan()
         if requested and not barred:

@@ -1,4 +1,4 @@
-"""Release: motion off a pressed bumper while an operator holds it, in the operator's direction.
+"""Release: motion off a pressed bumper while an operator requests it, in the operator's direction.
 
 The single bumper bit has no direction, so safety does not choose one. This state lasts as long as
 ``contact`` is latched, over every press: the total travel, and the directions in which the bumper
@@ -9,6 +9,9 @@ no release: it may be an old one.
 
 "Again" means the first pressed sample after a clear one. The bridge reports a clear bumper only
 after three clear answers of the board, so a short gap within one press is not a second press.
+
+A release begins as every drive does: with a neutral request, after the press and after the last
+refusal. So a key that was held before moves nothing.
 """
 
 from msgspec import Struct
@@ -33,49 +36,27 @@ class Release(Struct, frozen=True):
     integrated: float = 0.0  # m, by the larger of commanded and measured speed
     counted: float = 0.0  # m, by the board's counter
     counter: Counter | None = None  # the newest reading while a release moves the vehicle
-    direction: Direction | None = None  # of the newest release
+    direction: Direction | None = None  # in which the vehicle may move now
     moved: Direction | None = None  # in which a release last moved the vehicle
     moved_ns: int | None = None  # when
     forbidden: frozenset[Direction] = frozenset()
     unknown: bool = False  # whether releases before a restart of safety may have moved the vehicle
-    held_ns: int | None = None  # newest call of the operator; None when ended
-    interrupted_ns: int | None = None  # when a limit source stopped it; the key was held since
-    ended_echo: int = 0  # heartbeat that a later hold must exceed
+    barred_ns: int = 0  # a release begins only with a newer neutral request
+    refusal: str = ""  # why a requested release does not move the vehicle
 
     @property
     def travelled(self) -> float:
         """Travel of all releases of this contact, in metres."""
         return max(self.integrated, self.counted)
 
-    def interrupted(self, now_ns: int) -> "Release":
-        """Return the release that a third party stops: the operator must let go first."""
-        return replace(self, held_ns=None, interrupted_ns=now_ns)
-
-    def is_interrupted(self, now_ns: int, lease_s: float) -> bool:
-        """Return whether the key was held without a pause since an interruption."""
-        since_ns = self.interrupted_ns
-        return since_ns is not None and now_ns - since_ns <= lease_s * NS_PER_S
-
-    def is_held(self, now_ns: int, lease_s: float) -> bool:
-        """Return whether the operator's lease still lives."""
-        return self.held_ns is not None and now_ns - self.held_ns <= lease_s * NS_PER_S
-
     def left(self, distance: float) -> float:
         """Return the remaining travel in metres, of ``distance`` for each contact."""
         return 0.0 if self.unknown else max(0.0, distance - self.travelled)
 
     def away(self, speed: float) -> Twist:
-        """Return the straight motion in the chosen direction."""
+        """Return the straight motion in the granted direction."""
         # 1 equivalent mutant: the sign is 1 or -1: to divide by it is to multiply.
         return STILL if self.direction is None else Twist(speed * SIGN[self.direction])
-
-    def hold(self, direction: Direction, now_ns: int) -> "Release":
-        """Return the release held in this direction."""
-        return replace(self, direction=direction, held_ns=now_ns)
-
-    def end(self, echo: int) -> "Release":
-        """Return the release ended; a new hold needs a newer echo than this."""
-        return replace(self, held_ns=None, ended_echo=max(self.ended_echo, echo))
 
     def moving(
         self, sent: Twist | None, known: Twist | None, counter: Counter | None,
@@ -104,16 +85,14 @@ class Release(Struct, frozen=True):
     ) -> "Release":
         """Return the release after a bumper sample: ``contact`` as held now, ``old`` before."""
         if old is None:
-            return Release(before=trajectory, ended_echo=self.ended_echo)
-        if contact.good:
-            return replace(self, held_ns=None)  # ends when the bumper is clear
-        if not old.good:
-            return self  # the same press
+            return Release(before=trajectory, barred_ns=now_ns)
+        if contact.good or not old.good:
+            return self  # a clear bumper, or the same press
         before = self.before if contact.id == old.id else trajectory
         forbidden = self.forbidden
         if self.moved is not None and self._is_coasting(now_ns):
             forbidden = forbidden | {self.moved}
-        return replace(self, before=before, forbidden=forbidden, held_ns=None)
+        return replace(self, before=before, forbidden=forbidden, direction=None, barred_ns=now_ns)
 
     def _is_coasting(self, now_ns: int) -> bool:
         return self.moved_ns is not None and now_ns - self.moved_ns <= COAST_NS

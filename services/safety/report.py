@@ -9,9 +9,9 @@ from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
 from common.motion import RUN, Twist
 from services.safety.causes import BARRING, BY_NAME
 from services.safety.inputs import Event as Trigger
-from services.safety.inputs import Hold, Inputs, Reset
+from services.safety.inputs import Inputs, Reset
 from services.safety.latches import GOOD_SAMPLES, latched, ordered
-from services.safety.operator_requests import BY_HAND, room, spent
+from services.safety.operator_requests import BUMPER_FREE, BY_HAND, room, spent
 from services.safety.policy import Policy
 from services.safety.state import State
 from services.safety.trajectory import OPPOSITE
@@ -26,7 +26,6 @@ STILL_PRESENT = {
 }
 MOVE_OFF = "It is still pressed: move off first, then reset."
 RESET_OTHERS = "It is still pressed: reset first, then move off."
-REPEATED_NS = NS_PER_S  # a refusal that comes again within this time is no new event
 
 
 class Transition(Struct, frozen=True):
@@ -75,6 +74,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         heartbeat=state.heartbeat.number,
         text=sentence(state, by_hand=bool(spent(state, policy.settings))),
         release=_release(policy, state, now_ns) if "contact" in state.latches else None,
+        release_refusal=state.release.refusal,
         estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
     )
@@ -112,21 +112,8 @@ def _way_off(state: State, *, by_hand: bool) -> str:
 def signature(state: State) -> tuple[object, ...]:
     """Return the part of the state whose change is published at once."""
     ids = tuple(state.latches[name].id for name in latched(state.latches))
-    forbidden = state.release.forbidden
-    return state.verdict.name, ordered(state.latches), ids, state.verdict.source, forbidden
-
-
-class Repetition(Struct):
-    """Recognises a text that is repeated, as of a call that a held key repeats."""
-
-    text: str = ""
-    at_ns: int = 0
-
-    def continues(self, text: str, now_ns: int) -> bool:
-        """Return whether the same text came less than ``REPEATED_NS`` ago; note this one."""
-        continues = text == self.text and now_ns - self.at_ns < REPEATED_NS
-        self.text, self.at_ns = text, now_ns
-        return continues
+    release = state.release.forbidden, bool(state.release.refusal)
+    return state.verdict.name, ordered(state.latches), ids, state.verdict.source, *release
 
 
 def transitions(before: State, after: State, trigger: Trigger | None) -> Iterator[Transition]:
@@ -151,7 +138,12 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         began = "release" in after.latches
         text = "Creeping off the bumper." if began else "No longer creeping off the bumper."
         yield Transition("release" if began else "release_end", "warning", text, {})
-    yield from _reply_events(after, trigger)
+    yield from _release_events(before.release.refusal, after.release.refusal)
+    if isinstance(trigger, Reset) and (reply := new.reply) is not None:
+        if reply.done:
+            yield Transition("reset", "info", reply.text, {})
+        else:
+            yield Transition("reset_refused", "warning", reply.text, {})
 
 
 def _is_new(before: State, after: State, name: str) -> bool:
@@ -163,19 +155,12 @@ def _is_new(before: State, after: State, name: str) -> bool:
     return known is None or (known.id != after.latches[name].id and name != "estop")
 
 
-def _reply_events(after: State, trigger: Trigger | None) -> Iterator[Transition]:
-    reply = after.verdict.reply
-    if reply is None:
-        return
-    if isinstance(trigger, Reset):
-        yield Transition(
-            "reset" if reply.done else "reset_refused",
-            "info" if reply.done else "warning",
-            reply.text,
-            {},
-        )
-    elif isinstance(trigger, Hold) and not reply.done:
-        yield Transition("release_refused", "warning", reply.text, {})
+def _release_events(before: str, after: str) -> Iterator[Transition]:
+    """Yield the first refusal of a request; its text may change while the key is held."""
+    if after == BUMPER_FREE != before:
+        yield Transition("release_free", "info", after, {})
+    elif after and not before:
+        yield Transition("release_refused", "warning", after, {})
 
 
 def _source_text(source: str | None) -> str:

@@ -17,12 +17,10 @@ from common.heartbeat import Heartbeat
 from common.keys import Topic
 from common.messages import (
     Bumper,
-    Done,
     Drive,
     EstopKeepalive,
     Limit,
     Message,
-    ReleaseRequest,
     ResetDone,
     ResetRequest,
     SafetyState,
@@ -34,7 +32,6 @@ from services.safety.inputs import (
     DriveRequest,
     Estop,
     Event,
-    Hold,
     Inputs,
     KeepaliveRequest,
     LimitRequest,
@@ -42,7 +39,6 @@ from services.safety.inputs import (
 )
 from services.safety.policy import Policy, brake_for_contact
 from services.safety.report import (
-    Repetition,
     motion_message,
     signature,
     state_message,
@@ -75,7 +71,6 @@ class SafetyService:
         self._state_publisher = node.bus.publisher(keys.SAFETY)
         self._subscribe()
         node.is_stopped = self._is_stopped
-        self._refusal = Repetition()  # of a release
         self._decision_timer = node.loop.every(DECISION_PERIOD_S, lambda _: self._decide())
         node.loop.every(STATE_PERIOD_S, self._publish_state)
 
@@ -111,7 +106,6 @@ class SafetyService:
         )
         self._announce(keys.ESTOP_KEEPALIVE, keepalives)
         bus.serve(keys.RESET, self._on_reset)
-        bus.serve(keys.RELEASE, self._on_release)
         self._estop_bus.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
         self._estop_bus.subscribe(keys.SAFETY, self._on_estop_path)
 
@@ -200,15 +194,6 @@ class SafetyService:
 
         self._decide(Reset(request.echo, request.causes), answer)
 
-    def _on_release(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
-        def answer(reply: Reply) -> None:
-            if reply.done:
-                caller.reply(Done(text=reply.text, boot=self._node.bus.boot))
-            else:
-                caller.refuse(reply.text)
-
-        self._decide(Hold(request.held, request.direction, request.echo), answer)
-
     def _decide(
         self, event: Event | None = None, answer: Callable[[Reply], None] | None = None
     ) -> None:
@@ -226,9 +211,6 @@ class SafetyService:
         if signature(before) != signature(self._state):
             self._publish_state(now_ns)
         for transition in transitions(before, self._state, event):
-            text = transition.text
-            if transition.name == "release_refused" and self._refusal.continues(text, now_ns):
-                continue
             self._node.event(transition.name, transition.level, transition.text, **transition.about)
 
     def _publish_state(self, now_ns: int) -> None:

@@ -16,7 +16,7 @@ from services.safety.trajectory import Trajectory
 
 
 class Reply(Struct, frozen=True):
-    """Answer to a reset or a release call."""
+    """Answer to a reset."""
 
     done: bool
     text: str
@@ -32,7 +32,7 @@ class Verdict(Struct, frozen=True):
     source: str | None = None  # the source in control, also while safety stops it
     control: str | None = None  # the source, unless a cause forbids every motion
     acked: Token = (0, 0)  # boot and seq of the newest bumper sample taken into account
-    reply: Reply | None = None  # to a reset or a hold
+    reply: Reply | None = None  # to a reset
     refused: str = ""  # reason of a refused message, by the names in ``channel.py``
     limited_by: str | None = None  # the limit source that slows the requested twist
 

@@ -8,8 +8,7 @@ from common import clock, keys
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
 from common.messages import Event, SafetyState
-from common.motion import Twist
-from common.operator import Contest, EstopRepetition, EstopStep
+from common.operator import Contest, EstopRepetition, EstopStep, Request
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
@@ -40,7 +39,7 @@ class Controller:
         self._controls = Controls(self._settings)
         self._gamepad: Gamepad = NoGamepad("searching")
         self._drawn_ns = 0  # the last redraw of the screen
-        self._requested: Twist | None = None
+        self._requested: Request | None = None
         self._leaving = False
         self.terminal = RoundTrip(self._settings.round_trip)
         self._slow = False  # the warning about the slow terminal was shown
@@ -123,15 +122,14 @@ class Controller:
         self._repeat_estop(now_ns)
         self._drive(now_ns)
         self._yield(now_ns)
-        self._calls.release(self._controls.released(now_ns), self._safety.at(now_ns))
         self._calls.check_reset(self._safety.at(now_ns), now_ns)
         self.view = self._make_view(now_ns)
 
     def _drive(self, now_ns: int) -> None:
         had_expired = self._controls.gamepad_expired
         self._requested = self._controls.tick(self._read_stick(now_ns), now_ns)
-        if self._requested is not None:
-            self._source.request(self._requested.linear, self._requested.angular)
+        if (request := self._requested) is not None:
+            self._source.request(request.twist.linear, request.twist.angular, request.release)
         if self._controls.gamepad_expired and not had_expired:
             text = (
                 f"gamepad released: deflected, and no event for {self._settings.gamepad_silence:g} "
@@ -256,7 +254,7 @@ class Controller:
             gear=controls.gear,
             turbo=controls.turbo,
             top=twist(Deflection(1, 1), controls.gear, controls.turbo, self._settings),
-            requested=self._requested,
+            requested=self._requested.twist if self._requested else None,
             release=controls.released(now_ns),
             keys_refused=self.terminal.refusal(now_ns),
             gamepad=self._gamepad.status,

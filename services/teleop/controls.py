@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from common import codec
 from common.messages import Direction
 from common.motion import Twist, clamp
-from common.operator import DriveRequests, Phase
+from common.operator import DriveRequests, Phase, Request
 from services.teleop.config import Teleop
 from services.teleop.core.hold import Deadman, GamepadWatchdog, Keys
 
@@ -128,10 +128,14 @@ class Controls:
         """Return whether the operator must move the stick to keep driving."""
         return self._by_gamepad and self._watchdog.is_due(now_ns)
 
-    def tick(self, stick: Stick | None, now_ns: int) -> Twist | None:
+    def tick(self, stick: Stick | None, now_ns: int) -> Request | None:
         """Return the request to send now, or None; ``stick`` is None without a gamepad."""
         was_driving = self._requests.phase is Phase.DRIVING
-        request = self._requests.tick(self._held(stick, now_ns))
+        twist, release = self._held(stick, now_ns), self.released(now_ns)
+        held = (
+            Request(release=release) if release else Request(twist) if twist is not None else None
+        )
+        request = self._requests.tick(held)
         if was_driving and self._requests.phase is not Phase.DRIVING:
             self.turbo = False
         return request

@@ -1,14 +1,13 @@
-"""Calls of the operator to safety: reset, and release off a pressed bumper; in the node's loop."""
+"""The operator's reset, from the call to the state that confirms it; in the node's loop."""
 
 from collections.abc import Callable
 
 from msgspec.structs import replace
 
 from common import keys
-from common.messages import Direction, Level, ResetDone, SafetyState
-from common.operator import ReleaseCalls, ResetCheck, no_answer, not_allowed, reset_request
+from common.messages import Level, ResetDone, SafetyState
+from common.operator import ResetCheck, no_answer, not_allowed, reset_request
 from common.service import Node
-from common.source import call_release
 from services.teleop.config import TeleopConfig
 from services.teleop.view import EventLog
 
@@ -21,7 +20,7 @@ NOT_CONFIRMED = (
 
 
 class OperatorCalls:
-    """Makes at most one call of each kind at a time and adds its result to the event log."""
+    """Makes at most one call at a time and adds its result to the event log."""
 
     def __init__(
         self, node: Node[TeleopConfig], event_log: EventLog, denied: Callable[[], bool]
@@ -32,9 +31,6 @@ class OperatorCalls:
         self._event_log = event_log
         self._denied = denied
         self._reset: ResetCheck | None = None
-        self._release = ReleaseCalls()
-
-    # --- reset --------------------------------------------------------------------------------
 
     def reset(self, shown: SafetyState | None, newest: SafetyState | None) -> None:
         """Clear the causes that the screen showed, while the state of safety is fresh."""
@@ -71,21 +67,6 @@ class OperatorCalls:
         if self._reset is check:
             self._reset = None
         self._add("warning", f"reset refused: {self._explained(reason)}")
-
-    # --- release ------------------------------------------------------------------------------
-
-    def release(self, direction: Direction | None, newest: SafetyState | None) -> None:
-        """Make the calls of a release that is held in a direction, or has ended."""
-        call_release(self._bus, self._release, direction, newest, newest, report=self._on_release)
-        if newest is None and self._release.is_new(NO_STATE):
-            self._add("warning", f"release not sent: {NO_STATE}")
-
-    def _on_release(self, is_held: bool, text: str) -> None:
-        """Log the result of a release; the screen shows the distance that is left."""
-        if is_held:
-            self._add("info", f"release: {text}")
-        else:
-            self._add("warning", f"release refused: {self._explained(text)}")
 
     def _explained(self, reason: str) -> str:
         """Return the reason; for a call that the router drops, that it is not allowed."""

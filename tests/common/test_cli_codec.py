@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from common import codec
 from common.cli_codec import decode, encode
-from common.messages import Bumper, Drive, ReleaseRequest
+from common.messages import Bumper, Drive, PoseRequest
 
 KEY = "t2/v1/001/@cmd/drive/web"
 
@@ -74,8 +74,8 @@ def test_a_typed_header_stands() -> None:
 
 
 def test_a_request_has_no_header() -> None:
-    payload = encode("t2/v1/001/srv/safety/release", '{"held": false}')
-    assert codec.decode(payload, ReleaseRequest) == ReleaseRequest(held=False)
+    payload = encode("t2/v1/001/srv/odom/reset", '{"x": 1}')
+    assert codec.decode(payload, PoseRequest) == PoseRequest(x=1.0)
 
 
 @pytest.mark.parametrize("text", ["", "0.1", "[1]", '"x"', "null", "{", "{'a': 1}"])

@@ -16,7 +16,7 @@ from common.messages import (
     Event,
     Limits,
     Motion,
-    ReleaseRequest,
+    PoseRequest,
     SafetyState,
     Ultrasonic,
 )
@@ -63,7 +63,7 @@ def test_every_motion_comes_back(motion: Motion) -> None:
 
 
 def test_an_empty_map_is_a_request_of_defaults() -> None:
-    assert decode(EMPTY, ReleaseRequest) == ReleaseRequest(held=True)
+    assert decode(EMPTY, PoseRequest) == PoseRequest()
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_word_that_the_contract_does_not_know_is_refused() -> None:
 
 def test_a_request_refuses_what_it_does_not_know() -> None:
     with pytest.raises(MessageError, match="unknown field `hold`"):
-        decode(msgpack.packb({"hold": True}), ReleaseRequest)
+        decode(msgpack.packb({"hold": True}), PoseRequest)
 
 
 HOSTILE = {

@@ -22,7 +22,7 @@ def test_an_operator_is_overruled_after_half_a_second_of_requests() -> None:
     assert (contest.other, contest.ticks) == ("teleop", 0)
 
 
-@pytest.mark.parametrize("source", [None, "web", "release"])
+@pytest.mark.parametrize("source", [None, "web"])
 def test_no_other_source_overrules(source: str | None) -> None:
     contest = Contest("web")
     contest.tick(driven_by("nav"), requests=True)

@@ -1,4 +1,4 @@
-"""Requests and calls of an operator: drive requests, E-STOP repetition, reset, release, echoes."""
+"""Requests and calls of an operator: drive requests, E-STOP repetition, reset, echoes."""
 
 import pytest
 from hypothesis import given
@@ -6,23 +6,23 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from common.freshness import NS_PER_S
-from common.messages import Cause, Direction, Limits, ReleaseRequest, ResetDone, SafetyState
-from common.motion import STILL, Twist
+from common.messages import Cause, Limits, ResetDone, SafetyState
+from common.motion import Twist
 from common.operator import (
     AHEAD,
     CONFIRM_S,
     ESTOP_TICKS,
     MAX_CALL_AGE_NS,
+    NEUTRAL,
     ZEROS,
     DriveRequests,
     Echoes,
     EstopRepetition,
     EstopStep,
     Phase,
-    ReleaseCalls,
+    Request,
     ResetCheck,
     confirms,
-    release_request,
     reset_request,
 )
 
@@ -36,22 +36,31 @@ SEEN = SafetyState(
 DONE = ResetDone(text="", boot=3, heartbeat=9, cleared=(41, 42))
 AFTER = structs.replace(SEEN, heartbeat=9, latched=(), causes=(IDLE,))
 
-GO = Twist(0.2, 0.1)
+GO = Request(Twist(0.2, 0.1))
+BACK, FORTH = Request(release="backward"), Request(release="forward")
+
+SILENT, DRIVING = DriveRequests(Phase.SILENT), DriveRequests(Phase.DRIVING)
+OFF = DriveRequests(Phase.DRIVING, release="backward")
 
 DRIVE_TABLE = [  # before, requested, request, after
-    (DriveRequests(Phase.SILENT), None, None, DriveRequests(Phase.SILENT)),
-    (DriveRequests(Phase.SILENT), GO, STILL, DriveRequests(Phase.DRIVING)),
-    (DriveRequests(Phase.DRIVING), GO, GO, DriveRequests(Phase.DRIVING)),
-    (DriveRequests(Phase.DRIVING), None, STILL, DriveRequests(Phase.RELEASING, 2)),
-    (DriveRequests(Phase.RELEASING, 2), None, STILL, DriveRequests(Phase.RELEASING, 1)),
-    (DriveRequests(Phase.RELEASING, 1), None, STILL, DriveRequests(Phase.SILENT)),
-    (DriveRequests(Phase.RELEASING, 2), GO, STILL, DriveRequests(Phase.DRIVING, 2)),
+    (SILENT, None, None, SILENT),
+    (SILENT, GO, NEUTRAL, DRIVING),
+    (DRIVING, GO, GO, DRIVING),
+    (DRIVING, None, NEUTRAL, DriveRequests(Phase.RELEASING, 2)),
+    (DriveRequests(Phase.RELEASING, 2), None, NEUTRAL, DriveRequests(Phase.RELEASING, 1)),
+    (DriveRequests(Phase.RELEASING, 1), None, NEUTRAL, SILENT),
+    (DriveRequests(Phase.RELEASING, 2), GO, NEUTRAL, DriveRequests(Phase.DRIVING, 2)),
+    (SILENT, BACK, NEUTRAL, OFF),
+    (OFF, BACK, BACK, OFF),
+    (DRIVING, BACK, NEUTRAL, OFF),
+    (OFF, GO, NEUTRAL, DRIVING),
+    (OFF, FORTH, NEUTRAL, DriveRequests(Phase.DRIVING, release="forward")),
 ]
 
 
 @pytest.mark.parametrize(("before", "requested", "request_", "after"), DRIVE_TABLE)
 def test_the_table_of_drive_requests(
-    before: DriveRequests, requested: Twist | None, request_: Twist | None, after: DriveRequests
+    before: DriveRequests, requested: Request | None, request_: Request | None, after: DriveRequests
 ) -> None:
     requests = structs.replace(before)  # the table's own must not change
     assert requests.tick(requested) == request_
@@ -59,8 +68,7 @@ def test_the_table_of_drive_requests(
 
 
 def test_a_twist_is_zero_by_default() -> None:
-    assert (STILL.linear, STILL.angular) == (0.0, 0.0)
-    assert Twist() == STILL
+    assert Request(Twist(0.0, 0.0), "none") == NEUTRAL
     assert [phase.value for phase in Phase] == ["silent", "driving", "releasing"]
 
 
@@ -68,7 +76,7 @@ def test_a_twist_is_zero_by_default() -> None:
 def test_stop_sends_three_zeros_from_any_phase(phase: Phase) -> None:
     requests = DriveRequests(phase, 1)
     requests.stop()
-    assert [requests.tick(None) for _ in range(5)] == [STILL] * 3 + [None] * 2
+    assert [requests.tick(None) for _ in range(5)] == [NEUTRAL] * 3 + [None] * 2
 
 
 @given(st.lists(st.sampled_from(["go", "idle", "stop"])))
@@ -83,7 +91,7 @@ def test_a_drive_begins_with_a_zero_and_ends_with_three(steps: list[str]) -> Non
     assert sent[-1] is None
     for i, request in enumerate(sent):
         if request == GO:
-            assert sent[i - 1] in (GO, STILL)
+            assert sent[i - 1] in (GO, NEUTRAL)
             assert i > 0
             assert sent[i + 1] is not None  # a zero or another twist, never silence
 
@@ -158,95 +166,9 @@ def test_the_time_for_a_confirmation_starts_at_the_first_look() -> None:
     assert check.outcome(None, round((100.0 + CONFIRM_S) * NS_PER_S) + 1) is False
 
 
-def state_at(heartbeat: int, boot: int = 3) -> SafetyState:
-    return structs.replace(SEEN, heartbeat=heartbeat, boot=boot)
-
-
-def held(direction: Direction, echo: int) -> ReleaseRequest:
-    return ReleaseRequest(direction=direction, echo=echo)
-
-
-def ended(echo: int | None) -> ReleaseRequest:
-    return ReleaseRequest(held=False, echo=echo)
-
-
-def test_a_release_is_called_one_at_a_time_and_ended_once() -> None:
-    calls = ReleaseCalls()
-    assert calls.tick(None, SEEN, SEEN) == []
-    assert calls.tick("forward", state_at(7), state_at(8)) == [held("forward", 7)]
-    held_now: Direction | None = calls.direction
-    assert held_now == "forward"
-    assert calls.tick("forward", state_at(8), state_at(8)) == []  # without an answer yet
-    calls.answered()
-    assert calls.is_pending is False
-    assert calls.tick("forward", state_at(9), state_at(10)) == [held("forward", 9)]
-    assert calls.tick(None, None, state_at(11)) == [ended(11)]
-    released: Direction | None = calls.direction
-    assert released is None
-    assert calls.tick(None, None, state_at(12)) == []
-
-
-def test_the_end_of_a_release_is_sent_without_any_state() -> None:
-    calls = ReleaseCalls()
-    assert calls.tick("backward", None, None) == []
-    assert calls.tick(None, None, None) == [ended(None)]
-    assert calls.tick("backward", state_at(1), None) == [held("backward", 1)]
-
-
-def test_a_change_of_direction_ends_the_release_and_waits_for_a_newer_state() -> None:
-    calls = ReleaseCalls()
-    calls.tick("forward", state_at(7), state_at(7))
-    calls.answered()
-    assert calls.tick("backward", state_at(7), state_at(7)) == [ended(7)]
-    for seen in (state_at(6), state_at(7)):
-        assert calls.tick("backward", seen, state_at(8)) == []
-    assert calls.tick("backward", state_at(8), state_at(8)) == [held("backward", 8)]
-
-
-def test_a_newer_state_allows_the_end_and_the_next_hold_in_one_tick() -> None:
-    calls = ReleaseCalls()
-    calls.tick("forward", state_at(7), state_at(7))
-    calls.answered()
-    assert calls.tick("backward", state_at(8), state_at(7)) == [ended(7), held("backward", 8)]
-
-
-def test_after_a_restart_of_safety_any_heartbeat_is_newer() -> None:
-    calls = ReleaseCalls()
-    calls.tick("forward", state_at(7), state_at(7))
-    calls.answered()
-    calls.tick(None, None, state_at(7))
-    restarted = state_at(1, boot=4)
-    assert calls.tick("forward", restarted, restarted) == [held("forward", 1)]
-
-
-def test_the_first_heartbeat_counts_without_an_earlier_end() -> None:
-    state = state_at(0, boot=0)
-    assert ReleaseCalls().tick("forward", state, state) == [held("forward", 0)]
-
-
-def test_a_result_is_reported_once_per_release() -> None:
-    calls = ReleaseCalls()
-    assert not calls.is_new("refused")  # nothing is held
-    calls.tick("forward", SEEN, SEEN)
-    assert calls.is_new("refused")
-    assert not calls.is_new("refused")
-    assert calls.is_new("held")
-    calls.tick(None, None, SEEN)
-    assert calls.reported == ""
-    assert not calls.is_new("refused")
-    calls.tick("forward", None, SEEN)
-    assert calls.is_new("held")
-
-
 def test_a_reset_names_the_latched_causes_that_were_seen() -> None:
     request = reset_request(SEEN)
     assert (request.echo, request.causes) == (7, (41, 42))
-
-
-def test_a_release_carries_the_direction_and_the_echo() -> None:
-    request = release_request(SEEN, "backward", held=True)
-    assert (request.held, request.direction, request.echo) == (True, "backward", 7)
-    assert release_request(None, None, held=False).echo is None
 
 
 def test_a_reset_is_confirmed_by_the_state_alone() -> None:
@@ -277,7 +199,9 @@ def test_echoes_have_the_time_when_their_state_was_received() -> None:
 
 
 def test_another_start_of_safety_makes_old_echoes_unknown() -> None:
-    echoes = Echoes().received(SEEN, 100).received(state_at(900, boot=4), 200)
+    echoes = (
+        Echoes().received(SEEN, 100).received(structs.replace(SEEN, heartbeat=900, boot=4), 200)
+    )
     assert "unknown" in echoes.refusal(7, 200)
     assert echoes.refusal(900, 200) == ""
 

@@ -13,7 +13,7 @@ import pytest
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.calls import Caller
-from common.messages import Bumper, Done, Drive, ReleaseRequest
+from common.messages import Bumper, Done, Drive, PoseRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.waiting import PATIENCE_S, wait_until
 
@@ -96,18 +96,18 @@ def test_it_puts_a_message_that_we_understand(buses: BusFixture) -> None:
 
 
 def test_it_makes_a_call(buses: BusFixture) -> None:
-    asked: list[ReleaseRequest] = []
+    asked: list[PoseRequest] = []
 
-    def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
+    def pose(request: PoseRequest, caller: Caller[Done]) -> None:
         asked.append(request)
-        caller.reply(Done(text="creeping"))
+        caller.reply(Done(text="moved"))
 
     def declare(bus: Bus) -> None:
-        bus.serve(keys.RELEASE, release)
+        bus.serve(keys.SET_POSE, pose)
 
     buses.bus(declare)
-    key = keys.RELEASE.on(buses.robot)
-    words = ("--encoder", "t2", "--decoder", "t2", "-v", '{"held": false}')
+    key = keys.SET_POSE.on(buses.robot)
+    words = ("--encoder", "t2", "--decoder", "t2", "-v", '{"x": 1}')
     done = zenoh(buses, "get", "-s", key, *words)
-    assert '"text": "creeping"' in done.stdout, done.stderr
-    assert asked == [ReleaseRequest(held=False)]
+    assert '"text": "moved"' in done.stdout, done.stderr
+    assert asked == [PoseRequest(x=1.0)]

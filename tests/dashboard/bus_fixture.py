@@ -26,6 +26,7 @@ class Peer:
         self.latched: tuple[str, ...] = ()
         self.causes: tuple[Cause, ...] = ()
         self.release: Release | None = None
+        self.release_refusal = ""
         self.boot = 0  # of safety
         self._loop = loop
 
@@ -53,6 +54,7 @@ class Peer:
                         latched=self.latched,
                         causes=self.causes,
                         release=self.release,
+                        release_refusal=self.release_refusal,
                     )
                 )
 

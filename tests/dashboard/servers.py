@@ -10,9 +10,8 @@ from common.bus.calls import Caller
 from common.loop import Loop
 from common.messages import (
     Cause,
-    Done,
+    Direction,
     Release,
-    ReleaseRequest,
     ResetDone,
     ResetRequest,
     Switches,
@@ -32,15 +31,17 @@ class CallServers:
 
     peer: Peer
     resets: list[ResetRequest] = field(default_factory=list)
-    releases: list[ReleaseRequest] = field(default_factory=list)
     switches: list[SwitchesRequest] = field(default_factory=list)
     boot: int = 0
     is_effective: bool = True
 
     def declare(self, bus: Bus) -> None:
         bus.serve(keys.RESET, self.reset)
-        bus.serve(keys.RELEASE, self.release)
         bus.serve(keys.SET_SWITCHES, self.switch)
+
+    def releases(self) -> set[Direction]:
+        """Return the releases that the dashboard has requested."""
+        return {drive.release for drive in self.peer.requests if drive.release != "none"}
 
     def reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         self.resets.append(request)
@@ -50,10 +51,6 @@ class CallServers:
             text="Reset.", boot=self.boot, heartbeat=clock.now_ns(), cleared=request.causes
         )
         caller.reply(done)
-
-    def release(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
-        self.releases.append(request)
-        caller.reply(Done(text="Moving off."))
 
     def switch(self, request: SwitchesRequest, caller: Caller[Switches]) -> None:
         self.switches.append(request)
@@ -66,6 +63,7 @@ def serving(endpoint: str, peer: Peer) -> Iterator[CallServers]:
     it = CallServers(peer, boot=peer.boot)
     peer.safe = True
     peer.latched, peer.causes, peer.release = ("contact",), (CONTACT,), FREE
+    peer.requests.clear()
     with running(Loop()) as loop, bus_on(endpoint, loop, it.declare):
         yield it
-    peer.latched, peer.causes, peer.release = (), (), None
+    peer.latched, peer.causes, peer.release, peer.release_refusal = (), (), None, ""

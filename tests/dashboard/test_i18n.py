@@ -86,9 +86,6 @@ def test_every_result_of_a_call_has_its_text() -> None:
         "reset_refused",
         "reset_done",
         "reset_partial",
-        "release_held",
-        "release_freed",
-        "release_refused",
         "call_refused",
     } == {name for name in found if name}
     assert {f"event.{name}" for name in found} <= set(TEXTS)

@@ -41,8 +41,8 @@ def page(browser: Browser, patient: Server, calls: CallServers) -> Iterator[Page
     assert problems == []
 
 
-def directions(calls: CallServers) -> set[str | None]:
-    return {one.direction for one in calls.releases if one.held}
+def has_ended(calls: CallServers) -> bool:
+    return calls.peer.requests[-1].release == "none"
 
 
 def test_the_operator_chooses_the_direction(page: Page, calls: CallServers) -> None:
@@ -54,22 +54,31 @@ def test_the_operator_chooses_the_direction(page: Page, calls: CallServers) -> N
     x, y, _ = center_of(page, "#release-backward")
     page.mouse.move(x, y)
     page.mouse.down()
-    wait_until(lambda: directions(calls) == {"backward"}, "calls backward")
+    wait_until(lambda: calls.releases() == {"backward"}, "requests backward")
     page.mouse.up()
-    wait_until(lambda: not calls.releases[-1].held, "the end of them")
-    calls.releases.clear()
+    wait_until(lambda: has_ended(calls), "the end of them")
+    calls.peer.requests.clear()
     page.keyboard.down("f")
-    wait_until(lambda: directions(calls) == {"forward"}, "calls forward")
+    wait_until(lambda: calls.releases() == {"forward"}, "requests forward")
     page.keyboard.up("f")
-    wait_until(lambda: not calls.releases[-1].held, "the end of them")
+    wait_until(lambda: has_ended(calls), "the end of them")
+
+
+def test_the_page_shows_why_safety_refuses(page: Page, calls: CallServers) -> None:
+    take_control(page)
+    calls.peer.release_refusal = "The vehicle still moves."
+    page.keyboard.down("b")
+    wait_for_text(page, "#release-forbidden", "The vehicle still moves.")
+    page.keyboard.up("b")
+    page.wait_for_selector("#release-forbidden:empty", state="attached")
 
 
 def test_a_forbidden_direction_is_released_and_disabled(page: Page, calls: CallServers) -> None:
     take_control(page)
     page.keyboard.down("b")
-    wait_until(lambda: directions(calls) == {"backward"}, "calls backward")
+    wait_until(lambda: calls.releases() == {"backward"}, "requests backward")
     calls.peer.release = msgspec.structs.replace(FREE, forbidden=("backward",), left=0.02)
-    wait_until(lambda: not calls.releases[-1].held, "the end of them")
+    wait_until(lambda: has_ended(calls), "the end of them")
     wait_for_text(page, "#release-forbidden", "Backward is forbidden until a reset")
     assert page.is_disabled("#release-backward")
     assert page.is_enabled("#release-forward")
@@ -77,10 +86,10 @@ def test_a_forbidden_direction_is_released_and_disabled(page: Page, calls: CallS
     wait_for_text(page, "#release-forbidden", "复位前禁止后退")
     page.click("#language")
     page.keyboard.up("b")
-    calls.releases.clear()
+    calls.peer.requests.clear()
     page.keyboard.press("b")
     wait_for_text(page, "#toasts", "Backward is forbidden")
-    assert calls.releases == []
+    assert calls.releases() == set()
 
 
 def test_a_reset_answers_what_is_on_the_screen(page: Page, calls: CallServers) -> None:

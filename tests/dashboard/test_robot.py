@@ -4,8 +4,8 @@ import pytest
 
 from common import keys
 from common.bus.publisher import Publisher
-from common.messages import Direction, Done
-from common.operator import BUMPER_FREE, ESTOP_TICKS, OVERRULED_TICKS
+from common.messages import Direction, Drive
+from common.operator import ESTOP_TICKS, OVERRULED_TICKS
 from common.source import DENIED_AFTER
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
@@ -26,7 +26,6 @@ class RobotFixture:
             self.bus,
             Dashboard(),
             lambda *words: self.notices.append(words),
-            lambda _, *words: self.notices.append(words),
         )
         self.now_ns = 0
         self.release: Direction | None = None
@@ -97,22 +96,14 @@ def test_nobody_is_overruled_who_holds_no_control(fixture: RobotFixture) -> None
     assert fixture.robot.driver_state({}).other == "nav"
 
 
-def test_a_release_overrules_nobody(fixture: RobotFixture) -> None:
-    fixture.release = "backward"
-    fixture.ticks(40, "release")
-    assert fixture.is_held()
-    assert fixture.robot.driver_state({}).other is None
-
-
-def test_a_held_release_reports_once_that_the_bumper_is_free(fixture: RobotFixture) -> None:
-    fixture.release = "backward"
-    for text in ("0.15 m left", BUMPER_FREE, BUMPER_FREE):
-        fixture.ticks(1, "release")
-        fixture.bus.answers[-1][0](Done(text=text))
-    assert fixture.notices == [
-        ("info", "0.15 m left", "release_held"),
-        ("info", BUMPER_FREE, "release_freed"),
-    ]
+def test_a_release_is_requested_after_a_neutral_request(fixture: RobotFixture) -> None:
+    requests = next(p for p in fixture.bus.publishers if p.topic is keys.DRIVE)
+    directions: tuple[Direction, ...] = ("backward", "forward")
+    for fixture.release in (None, *directions):
+        for expected in ("none", fixture.release or "none"):
+            fixture.ticks(1, "web")
+            assert isinstance(requests.last, Drive)
+            assert requests.last.release == expected
 
 
 def test_an_unconfirmed_estop_is_reported(fixture: RobotFixture) -> None:

@@ -65,7 +65,7 @@ def drive(stack: RunningStack) -> None:
         source = DriveSource(bus, "demo")
 
         def publish() -> None:
-            source.request(*twist)
+            source.request(twist[0], twist[1])
 
         states: list[SafetyState] = []
         bus.subscribe(keys.SAFETY, lambda arrival: states.append(arrival.message))

@@ -11,6 +11,7 @@ from itertools import combinations
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
+from common.messages import ReleaseRequest
 from common.motion import STILL, Twist
 from common.standstill import Displacement
 from services.safety.arbiter import DriveChannel
@@ -146,13 +147,19 @@ def crossed(names: set[str]) -> Iterator[set[str]]:
             yield from (others | {name} for name in sorted(names & RARE))
 
 
-def fresh(fixture: PolicyFixture, state: State, requested: Twist | None, armed: bool) -> None:
+def fresh(
+    fixture: PolicyFixture,
+    state: State,
+    requested: Twist | None,
+    armed: bool,
+    release: ReleaseRequest = "none",
+) -> None:
     """Give the fixture a memory, all samples good and new, and one request or none."""
     channels = {}
     if requested is not None:
         channels["teleop"] = DriveChannel(
             boot=99, seq=fixture.driver_seq, received_ns=fixture.now_ns, requested=requested,
-            neutral=armed,
+            release=release, neutral=armed, neutral_ns=fixture.now_ns - 1,
         )  # fmt: skip
     arbiter = replace(state.arbiter, channels=channels)
     fixture.state = replace(state, arbiter=arbiter, decided_ns=fixture.now_ns - STEP_NS)

@@ -27,7 +27,7 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.operator import release_request, reset_request
+from common.operator import reset_request
 from tests.safety.policy_fixture import FREE, NO_ECHO, link
 from verification.harness.waiting import wait_until
 
@@ -58,6 +58,7 @@ class Peers:
         self.loop = loop
         self.pressed = False
         self.asking: float | None = None
+        self.release: ReleaseRequest = "none"
         self.state: SafetyState | None = None
         self.motion: Motion | None = None
         self.events: list[str] = []
@@ -87,7 +88,14 @@ class Peers:
             switches.put(Switches(ultrasonic_brake=True, bumper_brake=True))
             way.put(link())
             if self.asking is not None and self.state:
-                drive.put(Drive(linear=self.asking, angular=0.0, echo=self.state.heartbeat))
+                drive.put(
+                    Drive(
+                        linear=self.asking,
+                        angular=0.0,
+                        release=self.release,
+                        echo=self.state.heartbeat,
+                    )
+                )
 
         self.loop.every(0.02, play)
 
@@ -116,10 +124,6 @@ class Peers:
         """Return an operator's reset request for the newest state."""
         assert self.state is not None
         return reset_request(self.state)
-
-    def release(self) -> ReleaseRequest:
-        """Return an operator's request that holds backward."""
-        return release_request(self.state, "backward", held=True)
 
     def until(self, command: str, verdict: str, moving: bool = False) -> None:
         def there() -> bool:

@@ -18,6 +18,7 @@ from common.messages import (
     Message,
     Mileage,
     RangeStatus,
+    ReleaseRequest,
     SafetyState,
     Switches,
     Ultrasonic,
@@ -29,7 +30,6 @@ from services.safety.inputs import (
     DriveRequest,
     Estop,
     Event,
-    Hold,
     Inputs,
     KeepaliveRequest,
     LimitRequest,
@@ -47,7 +47,6 @@ NO_ECHO_TEXT = (
     "`echo`."
 )
 HOLD_TEXT = "The bumper was hit. Hold release to move off, forward or backward."
-CHOOSE_TEXT = "Choose the direction of the release: forward or backward."
 USED_UP_TEXT = "The distance for moving off is used up. Push the vehicle off by hand, then reset."
 DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
 NO_ECHO: tuple[RangeStatus, ...] = ("no_echo",) * 8
@@ -135,13 +134,22 @@ class PolicyFixture:
             self.decide()
         return self.verdict
 
-    def request(self, linear: float = 0.0, angular: float = 0.0, source: str = "teleop") -> Verdict:
+    def request(
+        self,
+        linear: float = 0.0,
+        angular: float = 0.0,
+        source: str = "teleop",
+        *,
+        release: ReleaseRequest = "none",
+        echo: int | None = None,
+    ) -> Verdict:
         """Put one request."""
         self.driver_seq += 1
         drive = Drive(
             linear=linear,
             angular=angular,
-            echo=self.state.heartbeat.number,
+            release=release,
+            echo=self.echo if echo is None else echo,
             seq=self.driver_seq,
             boot=self.driver_boot,
         )
@@ -214,15 +222,22 @@ class PolicyFixture:
         return "" if reply.done else reply.text
 
     def hold(
-        self,
-        held: bool = True,
-        direction: Direction | None = "backward",
-        echo: int | None = None,
+        self, direction: Direction = "backward", ticks: int = 0, source: str = "teleop"
     ) -> str:
-        """Hold the release; return the reason of its refusal."""
-        reply = self.decide(Hold(held, direction if held else None, echo or self.echo)).reply
-        assert reply
-        return "" if reply.done else reply.text
+        """Request the release, for some more ticks; return why it does not move the vehicle."""
+        self.request(release=direction, source=source)
+        for _ in range(ticks):
+            self.tick()
+            self.request(release=direction, source=source)
+        return self.state.release.refusal
+
+    def let_go(self, ticks: int = 1) -> Verdict:
+        """Request zero for some ticks."""
+        for _ in range(ticks):
+            self.tick()
+            self.now_ns += 1  # no two decisions have one time
+            self.request()
+        return self.verdict
 
     def published(self) -> SafetyState:
         """Return the published state."""
@@ -242,11 +257,11 @@ class PolicyFixture:
 
 
 def hit() -> PolicyFixture:
-    """Drive forward into something and stand there, pressed."""
+    """Drive forward into something, let go, and stand there, pressed."""
     fixture = PolicyFixture().running()
     fixture.pressed = True
     fixture.tick()
     fixture.linear = 0.0
-    fixture.tick(40)
+    fixture.let_go(40)
     fixture.linear = None
     return fixture

@@ -5,7 +5,7 @@ import time
 from common import keys
 from common.bus.bus import Arrival
 from common.loop import Loop
-from common.messages import Motion, ReleaseRequest
+from common.messages import Motion
 from tests.safety.peers import PATIENT, Peers, safety_process
 from verification.harness.bus import bus_on, running
 from verification.harness.waiting import wait_until
@@ -44,7 +44,7 @@ def wait(seconds: float) -> None:
     wait_until(lambda: time.monotonic() > end_s, "a while")
 
 
-def test_twenty_late_holds_and_a_late_reset_move_nothing(endpoint: str) -> None:
+def test_a_late_reset_clears_nothing(endpoint: str) -> None:
     loop = Loop()
     peers = Operator(loop)
     with (
@@ -54,10 +54,6 @@ def test_twenty_late_holds_and_a_late_reset_move_nothing(endpoint: str) -> None:
     ):
         peers.until("stop", "stop")
         peers.touch(pressed=True)
-        holds: list[ReleaseRequest] = []
-        while len(holds) < 20:  # the hand holds for two seconds, and no call arrives
-            holds.append(peers.release())
-            wait(0.1)
         peers.touch(pressed=False)
         old = peers.reset()
         wait(1.0)
@@ -66,8 +62,6 @@ def test_twenty_late_holds_and_a_late_reset_move_nothing(endpoint: str) -> None:
         wait_until(lambda: peers.shows(), "nothing latched")
         peers.touch(pressed=True)
         wait_until(lambda: peers.shows("contact"), "a newer contact")
-        answers = {peers.call(keys.RELEASE, late) for late in holds}
-        assert all("allowed is 0.4 s" in text for text in answers), answers
         peers.touch(pressed=False)
         newer = peers.reset()
         assert "no longer latched" in peers.call(

@@ -10,6 +10,7 @@ from common.freshness import NS_PER_S
 from common.motion import ROUNDED_MPS, STILL
 from services.safety.config import LimitSource, Safety
 from services.safety.inputs import LimitRequest
+from services.safety.operator_requests import LET_GO
 from tests.safety.policy_fixture import PolicyFixture
 
 LEASE_S, LEASE_NS = 0.5, 500_000_000
@@ -119,7 +120,7 @@ def test_a_limit_holds_for_a_release_too() -> None:
     fixture = PolicyFixture(IGNORED).running()
     fixture.pressed = True
     fixture.linear = 0.0
-    fixture.tick(60)
+    fixture.let_go(60)
     fixture.linear = None
     for _ in range(10):
         fixture.tick()
@@ -132,8 +133,8 @@ def test_a_limit_holds_for_a_release_too() -> None:
     fixture.limit()
     for _ in range(30):  # the key is still held
         fixture.tick()
-        assert "release the key first" in fixture.hold()
-    fixture.tick(16)
+        assert fixture.hold() == LET_GO
+    fixture.let_go()
     assert fixture.hold() == ""
 
 

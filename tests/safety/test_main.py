@@ -50,7 +50,11 @@ def scenario(endpoint: str) -> None:
 
         peers.bus.estop()
         peers.until("brake", "brake")
-        assert "no contact" in peers.call(keys.RELEASE, peers.release())
+        peers.asking, peers.release = 0.0, "backward"
+        wait_until(
+            lambda: peers.state and "demo may not release" in peers.state.release_refusal,
+            "the refusal",
+        )
         wanted = {"contact", "reset", "reset_refused", "estop", "release_refused", "source"}
         wait_until(lambda: wanted <= set(peers.events), f"{wanted - set(peers.events)}")
 

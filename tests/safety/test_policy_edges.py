@@ -168,7 +168,6 @@ def test_a_request_that_is_stopped_commands_no_motion() -> None:
 
 def test_nothing_creeps_while_two_publishers_are_active() -> None:
     fixture = hit()
-    fixture.request(0.0)
     assert fixture.hold() == ""
     assert "release" in fixture.state.latches
     fixture.driver_boot, fixture.driver_seq = 100, 0

@@ -91,9 +91,10 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
     assert fixture.reset() == ""
     assert fixture.verdict.reply is not None
     assert fixture.verdict.reply.text == f"Reset, but still latched: The bumper was hit. {UNKNOWN}"
-    fixture.tick()
     for direction in DIRECTIONS:
-        assert fixture.hold(direction=direction) == UNKNOWN
+        fixture.let_go()
+        assert fixture.hold(direction) == UNKNOWN
+    fixture.let_go()
     release = fixture.published().release
     assert release is not None
     assert release.left == 0.0
@@ -110,6 +111,6 @@ def test_the_next_contact_after_a_reset_has_a_release_again() -> None:
     assert fixture.reset() == ""
     assert latched(fixture.state.latches) == ()
     fixture.pressed = True
-    fixture.tick(5)
+    fixture.let_go(5)
     assert fixture.hold() == ""
     assert fixture.tick(3).command == "run"

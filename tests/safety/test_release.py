@@ -1,217 +1,477 @@
 """Moving off a pressed bumper, through the whole decision."""
 
-import pytest
+import math
+from collections.abc import Callable
 
-from common.messages import Direction
-from common.operator import BUMPER_FREE
-from services.safety.inputs import Hold
+import pytest
+from msgspec.structs import replace
+
+from common.freshness import NS_PER_S
+from common.messages import Direction, Mileage
+from services.safety.causes import BY_NAME
 from services.safety.latches import latched
-from services.safety.state import Reply
+from services.safety.operator_requests import BUMPER_FREE, LET_GO, room
 from tests.safety.policy_fixture import (
-    CHOOSE_TEXT,
     DIRECTIONS,
-    NO_ECHO_TEXT,
+    HOLD_TEXT,
     USED_UP_TEXT,
     PolicyFixture,
     hit,
     link,
 )
 
-LET_GO = "The release was ended after this call was made: hold it again."
-OTHER = "The release is held in the other direction: release the key first."
+BOTH = "The bumper was pressed in both directions. Push the vehicle off by hand, then reset."
+UNKNOWN = (
+    "Safety has restarted: the travel of an earlier release is unknown. Push the vehicle off by "
+    "hand, then reset."
+)
+PROGRAM = "nav may not release: only a source that an operator holds may."
+MOVES = "The vehicle still moves."
+LOST = "The link to the board is lost."
+Given = Callable[[PolicyFixture], object]
 
 
-@pytest.mark.parametrize(("direction", "sign"), [("forward", 1), ("backward", -1)])
-def test_a_held_release_moves_as_chosen_and_no_farther_than_its_way(
-    direction: Direction, sign: int
-) -> None:
-    fixture, began = hit(), hit().distance
-    for _ in range(300):
+def forbidden(direction: str) -> str:
+    return f"Release {direction} is forbidden until a reset: the bumper was pressed that way."
+
+
+def with_release(**fields: object) -> Given:
+    """Change what is known of the release."""
+
+    def change(fixture: PolicyFixture) -> None:
+        fixture.state = replace(fixture.state, release=replace(fixture.state.release, **fields))
+
+    return change
+
+
+def feed(**fields: object) -> Given:
+    """Change what the streams report from the next tick on."""
+
+    def change(fixture: PolicyFixture) -> None:
+        for name, value in fields.items():
+            setattr(fixture, name, value)
         fixture.tick()
-        if fixture.hold(direction=direction):
-            break
-        if fixture.verdict.command == "run":
-            assert 0 <= sign * fixture.verdict.twist.linear <= 0.1 + 1e-9
-            assert fixture.verdict.twist.angular == 0
-            assert fixture.verdict.source == "release"
-    fixture.tick(40)
-    assert 0.1 < sign * (fixture.distance - began) <= 0.15
-    for either in DIRECTIONS:
-        assert fixture.hold(direction=either) == USED_UP_TEXT
-    assert fixture.tick().command == "brake"
-    assert "contact" in latched(fixture.state.latches)
+
+    return change
 
 
-def test_the_operator_has_to_choose_a_direction() -> None:
+def silent(fixture: PolicyFixture) -> None:
+    fixture.muted = {"velocity"}
+    fixture.tick(11)
+
+
+def settled(fixture: PolicyFixture) -> None:
+    """End what was wrong, and wait."""
+    fixture.muted, fixture.link = set(), link()
+    fixture.tick(30)
+
+
+def stopped(fixture: PolicyFixture) -> None:
+    fixture.estop()
+    fixture.tick(3)
+
+
+def two_publishers(fixture: PolicyFixture) -> None:
+    fixture.driver_boot = 1
+    fixture.request()
+    fixture.driver_boot = 99
+
+
+def press_anew(fixture: PolicyFixture, clear: int = 1) -> None:
+    """Free the bumper for some ticks, then press it."""
+    feed(pressed=False)(fixture)
+    fixture.tick(clear - 1)
+    feed(pressed=True)(fixture)
+
+
+def freed(fixture: PolicyFixture) -> None:
+    feed(pressed=False)(fixture)
+
+
+def used(fixture: PolicyFixture) -> None:
+    with_release(integrated=room(fixture.state, fixture.policy.settings))(fixture)
+
+
+def nothing(_: PolicyFixture) -> None:
+    """Leave it at the contact."""
+
+
+# --- what is refused, and what moves -------------------------------------------------------------
+
+CASES: dict[str, tuple[Given, Direction, str]] = {
+    "backward": (nothing, "backward", ""),
+    "forward": (nothing, "forward", ""),
+    "an emergency stop": (lambda f: f.estop(), "backward", "Emergency stop."),
+    "a stop to reset": (stopped, "backward", "Emergency stop. Reset first."),
+    "no link": (feed(link=link("lost")), "backward", LOST),
+    "motion": (feed(linear=0.3), "backward", MOVES),
+    "an old velocity": (silent, "backward", "No recent data: velocity."),
+    "two publishers": (two_publishers, "backward", "Two publishers use teleop."),
+    "a free bumper": (freed, "backward", BUMPER_FREE),
+    "a new press": (press_anew, "backward", LET_GO),
+    "an earlier safety": (with_release(unknown=True), "backward", UNKNOWN),
+    "all used": (used, "backward", USED_UP_TEXT),
+    "both forbidden": (with_release(forbidden=frozenset(DIRECTIONS)), "backward", BOTH),
+    "forbidden": (with_release(forbidden=frozenset({"forward"})), "forward", forbidden("forward")),
+    "one forbidden": (with_release(forbidden=frozenset({"forward"})), "backward", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "direction", "refusal"), CASES.values(), ids=CASES)
+def test_a_release_moves_or_is_refused_with_the_reason(
+    given: Given, direction: Direction, refusal: str
+) -> None:
     fixture = hit()
-    assert fixture.hold(direction=None) == CHOOSE_TEXT
-    assert fixture.tick(3).command == "brake"
-    assert fixture.hold() == ""
-    assert fixture.tick(3).command == "run"
-    assert fixture.hold(direction=None) == CHOOSE_TEXT
-    assert fixture.verdict.command == "brake"  # a wrong call ends it
+    given(fixture)
+    assert fixture.hold(direction) == refusal
+    fixture.tick()
+    assert fixture.hold(direction) == refusal
+    sign = 1 if direction == "forward" else -1
+    assert sign * fixture.verdict.twist.linear > 0 if not refusal else fixture.verdict.twist.is_zero
+    assert (fixture.published().release_refusal, fixture.verdict.source) == (refusal, "teleop")
 
 
-def test_a_release_that_is_let_go_ends() -> None:
+def test_without_a_contact_there_is_no_release() -> None:
+    fixture = PolicyFixture().ready()
+    assert fixture.hold() == "There is no contact to release."
+    assert fixture.verdict.twist.is_zero
+    assert fixture.let_go().command == "run"
+    assert fixture.state.release.refusal == ""
+
+
+def test_only_an_operator_releases() -> None:
     fixture = hit()
-    assert fixture.hold() == ""
-    assert fixture.tick(5).command == "run"
-    assert fixture.hold(held=False) == ""
+    fixture.tick(20)
+    fixture.request(source="nav")
+    fixture.tick()
+    assert fixture.hold(source="nav") == PROGRAM
     assert fixture.verdict.command == "brake"
-    assert fixture.hold() == LET_GO  # it echoes no newer state than the call that let go
-    fixture.linear = -0.05
-    fixture.tick()
-    assert fixture.hold() == "The vehicle still moves."
-    fixture.linear = None
-    fixture.tick()
-    assert fixture.hold() == ""
-    assert fixture.tick(10).command == "run"
-    assert fixture.tick(6).command == "brake"  # not repeated within its lease
+    fixture.let_go()
+    assert fixture.hold("backward", 5) == ""
+    assert fixture.request(source="nav", release="forward").twist.linear < 0  # of lower priority
 
 
-def test_calls_that_were_overtaken_by_the_one_that_let_go_do_not_hold_again() -> None:
+def test_a_reset_due_of_a_fault_that_is_there_is_not_offered() -> None:
     fixture = hit()
-    fixture.hold()
+    fixture.left_bits = 1
     fixture.tick(3)
-    early = fixture.echo
-    fixture.tick(3)
-    fixture.hold(held=False)
-    fixture.tick(10)
-    for echo in (early, early + 3):
-        assert fixture.hold(echo=echo) == LET_GO
+    assert fixture.hold() == fixture.state.latches["driver_left"].text
+
+
+# --- beginning, ending ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("held", ["backward", "forward"])
+def test_a_key_that_was_held_into_the_contact_moves_nothing(held: Direction) -> None:
+    fixture = PolicyFixture().running()
+    fixture.request(release=held)
+    fixture.pressed = True
+    fixture.linear = 0.0
+    for _ in range(60):
+        fixture.tick()
+        fixture.hold(held)
         assert fixture.verdict.command == "brake"
-    assert fixture.hold(echo=early + 4) == ""
+    assert fixture.state.release.refusal == LET_GO
+    fixture.let_go()
+    assert fixture.hold(held, 5) == ""
+    assert fixture.verdict.command == "run"
 
 
-@pytest.mark.parametrize("echo", [None, 2**62, -5])
-def test_whoever_lets_go_is_obeyed_and_later_calls_count_again(echo: int | None) -> None:
+@pytest.mark.parametrize(
+    ("given", "over"),
+    [
+        (feed(link=link("lost")), settled),
+        (silent, settled),
+        (press_anew, nothing),
+        (freed, feed(pressed=True)),
+    ],
+)
+def test_what_ended_a_release_wants_a_neutral_request_before_the_next(
+    given: Given, over: Given
+) -> None:
     fixture = hit()
-    assert fixture.hold() == ""
-    assert fixture.tick(5).command == "run"
-    assert fixture.decide(Hold(False, None, echo)).command == "brake"
-    fixture.tick()
-    assert fixture.hold() == ""
-    assert fixture.tick(5).command == "run"
+    fixture.hold("forward", 5)
+    assert fixture.verdict.command == "run"
+    given(fixture)
+    assert fixture.hold("backward", 1)
+    assert fixture.verdict.command != "run"
+    over(fixture)
+    assert fixture.hold("backward", 5) == LET_GO
+    assert fixture.verdict.command != "run"
+    fixture.let_go()
+    assert fixture.hold("backward", 5) == ""
+    assert fixture.verdict.command == "run"
+
+
+def test_the_vehicle_is_waited_for_until_it_stands() -> None:
+    fixture = hit()
+    feed(linear=-0.05)(fixture)
+    assert fixture.hold("backward", 5) == MOVES
+    fixture.linear = 0.0
+    assert fixture.hold("backward", 2) == ""
+    assert fixture.verdict.command == "run"
+    fixture.linear = -0.3  # it moves on by itself
+    assert fixture.hold("backward", 2) == ""
+
+
+def test_a_release_that_is_let_go_or_silent_ends() -> None:
+    fixture = hit()
+    fixture.hold("backward", 5)
+    assert fixture.let_go().command == "brake"
+    fixture.hold("backward", 5)
+    assert fixture.tick(15).command == "run"  # the lease of its source
+    assert fixture.tick().command == "brake"
+    fixture.tick(49)
+    assert fixture.hold() == ""  # as a drive, within a second
+    fixture.tick(66)
+    assert fixture.hold() == LET_GO
+    assert fixture.tick(5).command == "brake"
 
 
 def test_a_change_of_direction_begins_at_rest() -> None:
     fixture = hit()
     fixture.linear = 0.0  # held by what it hit: measured, it stands all the time
-    fixture.hold()
-    assert fixture.tick(10).twist.linear < 0
-    assert fixture.hold(direction="forward") == OTHER
+    fixture.hold("backward", 10)
+    assert fixture.hold("forward") == LET_GO
     assert fixture.verdict.command == "brake"
-    fixture.tick()
-    assert fixture.hold(direction="forward") == ""
+    assert fixture.hold("forward", 10) == LET_GO
+    fixture.let_go()
     for _ in range(10):
-        assert fixture.verdict.twist.linear >= 0
         fixture.tick()
+        assert fixture.hold("forward") == ""
+        assert fixture.verdict.twist.linear >= 0
     assert fixture.verdict.twist.linear > 0
-    fixture.linear = 0.05
-    assert fixture.tick(20).command == "brake"
-    assert fixture.hold(direction="backward") == "The vehicle still moves."
 
 
-def test_late_calls_move_nothing_and_change_nothing() -> None:
+def test_late_and_repeated_requests_move_nothing() -> None:
     fixture = hit()
     old = fixture.echo
-    fixture.tick(100)
-    for number in range(20):
-        assert fixture.hold(echo=old + number).startswith("The call is ")
+    fixture.tick(21)
+    assert fixture.request(echo=old).refused == "late"
+    for _ in range(20):
+        assert fixture.request(release="backward", echo=old).refused == "late"
         assert fixture.verdict.command == "brake"
-    assert fixture.hold(echo=-7).startswith("The call echoes an unknown heartbeat")
-    assert fixture.decide(Hold(True, "backward")).reply == Reply(False, NO_ECHO_TEXT)
-    assert fixture.hold() == ""
+    fixture.hold()
     assert fixture.tick(3).command == "run"
-    assert fixture.hold(echo=old) != ""
-    assert fixture.verdict.command == "run"  # a hold that is granted continues
+    fixture.driver_seq -= 1
+    assert fixture.request(release="forward").refused == "seq_not_rising"
+    assert fixture.verdict.command == "run"
 
 
-@pytest.mark.parametrize(("ticks", "allowed"), [(20, True), (21, False)])
-def test_a_hold_is_no_older_than_a_request(ticks: int, allowed: bool) -> None:
+def test_a_higher_source_ends_a_release_and_goes_before_it() -> None:
     fixture = hit()
-    old = fixture.echo
-    fixture.tick(ticks)
-    assert (fixture.hold(echo=old) == "") == allowed
-
-
-def test_a_release_ends_when_the_bumper_is_free() -> None:
-    fixture = hit()
-    fixture.hold()
-    fixture.pressed = False
-    assert fixture.tick().command == "brake"
-    assert fixture.decide(Hold(True, "backward", fixture.echo)).reply == Reply(True, BUMPER_FREE)
-    assert fixture.tick().command == "brake"
-    fixture.hold(held=False)
-    fixture.pressed = True
-    assert fixture.tick(5).command == "brake"
-
-
-def test_a_release_does_not_go_on_when_the_bumper_is_pressed_anew() -> None:
-    fixture = hit()
-    fixture.hold()
     fixture.tick()
-    fixture.pressed = False
-    fixture.tick()
-    fixture.pressed = True
-    assert fixture.tick().command == "brake"  # within the lease of the call
-    assert fixture.tick(3).command == "brake"
+    fixture.driver_boot = 5
+    fixture.request(source="web")
+    fixture.tick(16)
+    assert fixture.hold(source="web") == LET_GO  # overruled by the zeros of teleop
+    fixture.now_ns += 1
+    fixture.request(source="web")
+    assert fixture.hold("backward", 3, source="web") == ""
+    assert fixture.verdict.source == "web"
+    fixture.driver_boot = 99
+    assert fixture.let_go().command == "brake"
+    assert fixture.verdict.source == "teleop"
 
 
-def test_a_release_goes_nowhere_without_its_conditions() -> None:
-    assert PolicyFixture().ready().hold() == "There is no contact to release."
+@pytest.mark.parametrize("rear", [0.1, None])
+def test_a_release_obeys_the_sonars(rear: float | None) -> None:
     fixture = hit()
-    fixture.estop()
-    assert fixture.hold() == "Emergency stop."
-    fixture.tick(3)
-    assert fixture.hold() == "Emergency stop. Reset first."
-    fixture = hit()
-    fixture.link = link("lost")
-    fixture.tick()
-    assert fixture.hold() == "The link to the board is lost."
-    fixture = hit()
-    fixture.linear = 0.3
-    fixture.tick()
-    assert fixture.hold() == "The vehicle still moves."
+    fixture.sonar(rear=rear)
+    fixture.let_go(60)  # no operator's override is for a release
+    assert fixture.hold("backward", 3) == ""
+    assert fixture.verdict.command == "stop"
+    texts = {
+        0.1: "No room toward the rear: 0.10 m.",
+        None: "No motion toward the rear: that sonar is faulty.",
+    }
+    assert fixture.state.latches["blocked"].text == texts[rear]
 
 
-def test_a_release_wants_a_velocity_that_is_young() -> None:
-    fixture = hit()
-    fixture.muted = {"velocity"}
-    fixture.tick(11)
-    assert fixture.hold() == "No recent data: velocity."
+# --- how far, and where --------------------------------------------------------------------------
 
 
-def test_a_release_obeys_the_sonars() -> None:
-    fixture = hit()
-    fixture.sonar(rear=0.1)
-    fixture.tick()
-    assert fixture.hold() == ""
-    assert fixture.tick(3).command == "stop"
-    assert "blocked" in fixture.state.latches
-
-
-def test_a_release_that_a_faulty_sonar_blocks_gives_no_advice_for_sources() -> None:
-    fixture = hit()
-    fixture.sonar(rear=None)
-    fixture.tick()
-    assert fixture.hold() == ""
-    assert fixture.tick(3).command == "stop"
-    text = fixture.state.latches["blocked"].text
-    assert text == "No motion toward the rear: that sonar is faulty."
-
-
-def test_a_release_is_refused_while_two_publishers_bar_motion() -> None:
-    fixture = hit()
-    for boot in (1, 2):
-        fixture.driver_boot = boot
-        fixture.request()
-    assert fixture.hold() == "Two publishers use teleop."
-    assert fixture.tick(3).command == "brake"
+@pytest.mark.parametrize(("direction", "sign"), [("forward", 1), ("backward", -1)])
+@pytest.mark.parametrize("slip", [0.0, 0.006])
+def test_a_release_moves_no_farther_than_its_distance(
+    direction: Direction, sign: int, slip: float
+) -> None:
+    fixture, began = hit(), hit().distance
+    while not fixture.hold(direction):
+        fixture.tick()
+        fixture.distance += sign * slip  # of the counters, beyond the reported velocity
+        assert 0 <= sign * fixture.verdict.twist.linear <= 0.1 + 1e-9
+        assert fixture.verdict.twist.angular == 0
     fixture.tick(40)
+    assert 0.1 < sign * (fixture.distance - began) <= 0.15
+    for clear in (1, 10):
+        press_anew(fixture, clear)
+        for either in DIRECTIONS:
+            fixture.let_go()
+            assert fixture.hold(either) == USED_UP_TEXT
+    assert fixture.tick().command == "brake"
+    assert "contact" in latched(fixture.state.latches)
+
+
+def test_pressed_again_while_it_moves_off_it_goes_no_farther_that_way() -> None:
+    fixture = hit()
+    assert fixture.hold("backward", 30) == ""
+    press_anew(fixture, 5)
+    for _ in range(30):
+        fixture.let_go()
+        assert fixture.hold() == forbidden("backward")
+        assert fixture.tick().command == "brake"
+    release = fixture.published().release
+    assert release is not None
+    assert (release.believed_free, release.forbidden) == (None, ("backward",))
+    assert 0 < release.left < 0.1
+    fixture.let_go()
+    assert fixture.hold("forward", 5) == ""
+    assert fixture.verdict.twist.linear > 0
+    press_anew(fixture)
+    fixture.tick(40)
+    for either in DIRECTIONS:
+        fixture.let_go()
+        assert fixture.hold(either) == BOTH
+    fixture.let_go()
+    assert fixture.reset() == f"Still present: {BY_NAME['contact'].text} {BOTH}"
+
+
+@pytest.mark.parametrize(
+    ("pressed_again", "advice"),
+    [
+        (
+            "backward",
+            "Hold release forward to move off. The vehicle drove forward into the contact: "
+            "check that direction first.",
+        ),
+        ("forward", "Hold release backward to move off."),
+    ],
+)
+def test_the_advice_names_only_the_direction_that_is_left(
+    pressed_again: Direction, advice: str
+) -> None:
+    fixture = hit()
+    fixture.hold(pressed_again, 10)
+    press_anew(fixture)
+    fixture.tick(40)
+    assert fixture.reset() == f"Still present: The bumper was hit. {advice}"
+
+
+def test_the_direction_that_moved_is_forbidden_not_the_one_held_next() -> None:
+    fixture = hit()
+    fixture.hold("backward", 10)
+    fixture.let_go(3)
+    assert fixture.hold("forward") == ""
+    press_anew(fixture)  # before anything moves forward
+    assert fixture.state.release.forbidden == {"backward"}
+
+
+def test_a_press_long_after_a_release_forbids_nothing() -> None:
+    fixture = hit()
+    fixture.hold("backward", 10)
+    press_anew(fixture, 60)
+    fixture.let_go()
+    assert fixture.hold("backward", 5) == ""
+    assert fixture.verdict.command == "run"
+
+
+def test_a_reset_and_a_new_contact_have_the_way_anew() -> None:
+    fixture = hit()
+    fixture.hold("backward", 30)
+    press_anew(fixture)
+    feed(pressed=False)(fixture)
+    fixture.let_go(20)
+    assert fixture.published().release is not None
+    assert fixture.reset() == ""
+    assert fixture.published().release is None
+    feed(pressed=True)(fixture)
+    release = fixture.published().release
+    assert release is not None
+    assert release.forbidden == ()
+    assert release.left == pytest.approx(0.15 - 0.025 - 0.1**2 / 1.2)
+    fixture.let_go(2)
     assert fixture.hold() == ""
-    for boot in (3, 4):  # a release that is held ends, too
-        fixture.driver_boot = boot
-        fixture.request()
-    assert fixture.hold() == "Two publishers use teleop."
+
+
+# --- the direction that is believed free ---------------------------------------------------------
+
+
+def test_a_rebound_before_the_bumper_does_not_choose_the_direction() -> None:
+    fixture = PolicyFixture().running()
+    fixture.linear = -0.05
+    fixture.tick(2)
+    fixture.pressed = True
+    fixture.tick()
+    fixture.linear = 0.0
+    fixture.tick(40)
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "backward"
+    assert release.travelled == pytest.approx(0.75, abs=0.03)
+    assert release.age == pytest.approx(0.86, abs=0.05)
+
+
+def test_a_contact_after_an_hour_reports_the_age_and_nothing_moves_by_itself() -> None:
+    fixture = PolicyFixture().running()
+    fixture.drive(0.0, seconds=2)
+    fixture.now_ns += 3600 * NS_PER_S
+    fixture.tick(60)
+    assert fixture.reset() == ""  # an emergency stop may have been missed
+    fixture.pressed = True
+    fixture.let_go(40)
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "backward"
+    assert release.age is not None
+    assert release.age > 3600
     assert fixture.verdict.command == "brake"
+    assert fixture.hold("forward", 10) == ""
+    assert fixture.verdict.twist.linear > 0
+
+
+def test_pressed_from_the_start_no_way_is_believed_free_and_either_may_be_chosen() -> None:
+    fixture = PolicyFixture()
+    fixture.pressed = True
+    fixture.let_go(50)
+    release = fixture.published().release
+    assert release is not None
+    assert (release.believed_free, release.travelled, release.age) == (None, 0.0, None)
+    assert fixture.reset() == f"Still present: {HOLD_TEXT}"
+    assert fixture.hold("forward", 5) == ""
+    assert fixture.verdict.twist.linear > 0
+    fixture.pressed = False
+    fixture.let_go(40)
+    assert fixture.reset() == ""
+    assert fixture.drive().command == "run"
+
+
+def test_a_second_contact_looks_at_the_travel_between() -> None:
+    fixture = hit()
+    fixture.hold("backward", 20)
+    fixture.pressed = False
+    fixture.tick(10)
+    fixture.linear = -0.5  # pushed by hand
+    fixture.tick(100)
+    fixture.linear = None
+    fixture.pressed = True
+    fixture.tick(2)
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "forward"
+    assert release.travelled == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("distance", [math.nan, math.inf])
+def test_counters_that_are_no_numbers_stop_no_release_and_free_no_way(distance: float) -> None:
+    fixture = hit()
+    fixture.distance = distance
+    fixture.muted = {"mileage"}
+    fixture.put("mileage", Mileage(distance=distance, heading=0.0, epoch=0))
+    while not fixture.hold():
+        fixture.tick()
+    assert fixture.state.release.refusal == USED_UP_TEXT
+    release = fixture.published().release
+    assert release is not None
+    assert release.believed_free == "backward"
+    assert math.isfinite(release.travelled)

@@ -1,8 +1,8 @@
-"""The memory of one latched contact: travel, forbidden directions, holds."""
+"""The state of one latched contact: travel and forbidden directions."""
 
 import pytest
+from msgspec.structs import replace
 
-from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
 from services.safety.latches import Held
 from services.safety.release import COAST_NS, Release, sweep
@@ -10,6 +10,7 @@ from services.safety.trajectory import Counter, Trajectory
 
 REACH = 0.65
 BACK = Twist(-0.1)
+BACKWARD = Release(direction="backward")
 CAME = Trajectory(runs=(0.4,), ended_ns=5)
 TOUCHED = Held(1, 1, 0, (1, 1), "hit", 40)
 
@@ -32,21 +33,8 @@ def moving(
 
 def test_it_moves_straight_in_the_chosen_direction() -> None:
     assert Release().away(0.1) == STILL
-    assert Release().hold("forward", 0).away(0.1) == Twist(0.1, 0.0)
-    assert Release().hold("backward", 0).away(0.1) == Twist(-0.1, 0.0)
-
-
-def test_a_hold_is_a_lease() -> None:
-    assert not Release().is_held(0, 0.3)
-    held = Release().hold("forward", 0)
-    assert held.is_held(round(0.3 * NS_PER_S), 0.3)
-    assert not held.is_held(round(0.3 * NS_PER_S) + 1, 0.3)
-
-
-def test_the_end_of_a_hold_asks_for_a_newer_heartbeat() -> None:
-    ended = Release().hold("forward", 0).end(12)
-    assert (ended.held_ns, ended.ended_echo) == (None, 12)
-    assert ended.end(11).ended_echo == 12
+    assert Release(direction="forward").away(0.1) == Twist(0.1, 0.0)
+    assert Release(direction="backward").away(0.1) == Twist(-0.1, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -103,34 +91,30 @@ def test_coasting_ends_at_standstill(known: Twist | None, moves: bool) -> None:
     assert (moving(begun, None, known, now_ns=9).moved_ns == 9) == moves
 
 
-def test_a_new_contact_has_everything_anew_but_the_end_of_the_last_hold() -> None:
-    used = Release(integrated=0.1, forbidden=frozenset({"forward"}), held_ns=3, ended_echo=12)
-    assert used.after(None, TOUCHED, CAME, 9) == Release(before=CAME, ended_echo=12)
+def test_a_new_contact_has_everything_anew() -> None:
+    used = Release(integrated=0.1, forbidden=frozenset({"forward"}), direction="backward")
+    assert used.after(None, TOUCHED, CAME, 9) == Release(before=CAME, barred_ns=9)
 
 
 def held(good: int, occurrence: int = 40) -> Held:
     return Held(1, 1, good, (1, 1), "hit", occurrence)
 
 
-def test_the_same_press_changes_nothing() -> None:
-    used = Release().hold("backward", 3)
+def test_the_same_press_and_a_clear_bumper_change_nothing() -> None:
+    used = moving(BACKWARD)
     assert used.after(held(0), TOUCHED, CAME, 9) is used
-
-
-def test_a_clear_bumper_ends_the_hold() -> None:
-    used = moving(Release().hold("backward", 3))
-    assert used.after(held(0), held(1), CAME, 9).held_ns is None
-    assert used.after(held(1), held(2), CAME, 9).forbidden == frozenset()
+    assert used.after(held(0), held(1), CAME, 9) is used
+    assert used.after(held(1), held(2), CAME, 9) is used
 
 
 @pytest.mark.parametrize(
     ("later_ns", "forbidden"), [(COAST_NS, {"backward"}), (COAST_NS + 1, set())]
 )
 def test_a_press_during_a_release_forbids_its_direction(later_ns: int, forbidden: set[str]) -> None:
-    used = moving(Release(ended_echo=5).hold("backward", 0))
+    used = moving(BACKWARD)
     after = used.after(held(1), TOUCHED, CAME, later_ns)
     assert after.forbidden == forbidden
-    assert (after.held_ns, after.ended_echo) == (None, 5)
+    assert (after.direction, after.barred_ns) == (None, later_ns)
     assert after.travelled == used.travelled
 
 
@@ -141,7 +125,7 @@ def test_a_press_without_any_release_forbids_nothing() -> None:
 
 
 def test_the_direction_that_moved_is_forbidden() -> None:
-    moved = moving(Release().hold("backward", 0)).hold("forward", 1)
+    moved = replace(moving(BACKWARD), direction="forward")
     still = moving(moved, sent=None)
     assert still.after(held(1), TOUCHED, CAME, 0).forbidden == {"backward"}
     ramp = moving(moved, sent=STILL)  # a RUN of zero has not moved it forward
@@ -151,8 +135,8 @@ def test_the_direction_that_moved_is_forbidden() -> None:
 
 
 def test_both_directions_can_be_forbidden() -> None:
-    one = moving(Release().hold("backward", 0)).after(held(1), TOUCHED, CAME, 0)
-    both = moving(one.hold("forward", 0)).after(held(1), TOUCHED, CAME, 0)
+    one = moving(BACKWARD).after(held(1), TOUCHED, CAME, 0)
+    both = moving(replace(one, direction="forward")).after(held(1), TOUCHED, CAME, 0)
     assert both.forbidden == {"forward", "backward"}
 
 

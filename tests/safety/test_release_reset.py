@@ -36,16 +36,18 @@ def test_who_stands_on_the_bumper_gets_off_by_himself_whatever_else_was_latched(
     fixture.tick(40)
     assert latched(fixture.state.latches) == ("contact", cause)
     assert fixture.hold() == f"{fixture.state.latches[cause].text} Reset first."
+    assert fixture.reset() == "Motion is requested: release the controls first."
+    fixture.let_go()
     assert fixture.reset() == ""
     assert fixture.verdict.reply is not None
     assert fixture.verdict.reply.text == f"Reset, but still latched: {HOLD_TEXT}"
     assert latched(fixture.state.latches) == ("contact",)
     assert fixture.drive(0.5).command == "brake"
     assert fixture.drive(0.0).command == "brake"
-    assert fixture.hold() == ""
-    assert fixture.tick(2).twist.linear < 0
+    assert fixture.hold("backward", 2) == ""
+    assert fixture.verdict.twist.linear < 0
     fixture.pressed = False
-    fixture.tick(10)
+    fixture.let_go(10)
     assert fixture.reset() == ""
     assert fixture.drive().command == "run"
 
@@ -82,16 +84,6 @@ def test_a_reset_on_a_pressed_bumper_leaves_what_is_not_gone() -> None:
     assert latched(fixture.state.latches) == ("contact", "driver_left")
     fixture.tick()
     assert fixture.hold() == fault
-
-
-def test_a_reset_lets_go_of_the_release() -> None:
-    fixture = hit()
-    assert fixture.hold() == ""
-    fixture.estop()
-    fixture.tick(3)
-    assert fixture.reset() == ""
-    assert fixture.verdict.command == "brake"
-    assert fixture.tick(3).command == "brake"
 
 
 def test_flapping_that_is_not_gone_is_not_forgiven() -> None:

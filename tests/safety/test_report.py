@@ -5,21 +5,18 @@ from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
 from common.codec import decode, encode
-from common.freshness import NS_PER_S
 from common.messages import MAX_REASON, Direction, Limits, SafetyState
-from common.operator import BUMPER_FREE
 from common.verdict import MAX_TEXT
 from services.safety.config import LimitSource, Safety, Source
-from services.safety.inputs import Estop, Event, Hold, Reset
+from services.safety.inputs import Estop, Event, Reset
+from services.safety.operator_requests import BUMPER_FREE
 from services.safety.report import (
-    Repetition,
     motion_message,
     sentence,
     signature,
     state_message,
     transitions,
 )
-from services.safety.state import Reply
 from tests.safety.policy_fixture import PolicyFixture, hit
 
 
@@ -27,6 +24,13 @@ def noted(fixture: PolicyFixture, event: Event | None = None) -> list[str]:
     before = fixture.state
     fixture.decide(event)
     return [note.name for note in transitions(before, fixture.state, event)]
+
+
+def held(fixture: PolicyFixture) -> list[str]:
+    """Hold the release; return the events."""
+    before = fixture.state
+    fixture.hold()
+    return [note.name for note in transitions(before, fixture.state, None)]
 
 
 def ticked(fixture: PolicyFixture) -> list[str]:
@@ -111,25 +115,36 @@ def test_a_pressed_bumper_names_the_step_that_is_accepted() -> None:
     fixture.tick(50)
     reset_first = "It is still pressed: reset first, then move off."
     assert fixture.published().text == f"The bumper was hit. {reset_first}"
-    assert fixture.hold(direction="backward") == "Emergency stop. Reset first."
+    assert fixture.hold("backward") == "Emergency stop. Reset first."
+    fixture.let_go()
     assert fixture.reset() == ""
     fixture.tick()
     assert fixture.published().text.endswith("It is still pressed: move off first, then reset.")
     fixture.state = replace(fixture.state, release=replace(fixture.state.release, forbidden=forbid))
     by_hand = "Push the vehicle off by hand, then reset."
     assert fixture.published().text == f"The bumper was hit. {by_hand}"
-    assert fixture.hold(direction="backward").endswith(by_hand)
+    assert fixture.hold("backward").endswith(by_hand)
 
 
-def test_a_hold_that_frees_the_bumper_is_not_refused() -> None:
-    fixture = hit()
-    fixture.decide(Hold(True, "backward", fixture.echo))
+def test_a_release_reports_its_beginning_its_first_refusal_and_its_success() -> None:
+    fixture = PolicyFixture().ready()
+    assert held(fixture) == ["release_refused"]
+    fixture.pressed = True
+    assert ticked(fixture) == ["contact"]  # and another text, which the state publishes
+    assert held(fixture) == []
+    fixture.linear = 0.0
+    fixture.let_go(40)
+    assert held(fixture) == ["release"]
+    assert held(fixture) == []
     fixture.pressed = False
-    fixture.tick()
-    for _ in range(3):
-        assert noted(fixture, Hold(True, "backward", fixture.echo)) == []
-        assert fixture.verdict.reply == Reply(True, BUMPER_FREE)
-        assert fixture.verdict.command == "brake"
+    assert ticked(fixture) == ["release_end", "release_free"]
+    assert held(fixture) == []
+    assert fixture.published().release_refusal == BUMPER_FREE
+    fixture.let_go()
+    assert held(fixture) == ["release_free"]
+    before = signature(fixture.state)
+    fixture.let_go()
+    assert signature(fixture.state) != before
 
 
 def test_a_repeated_emergency_stop_is_one_event() -> None:
@@ -156,7 +171,6 @@ def test_transitions_are_reported_once() -> None:
     assert ticked(fixture) == ["driver_fault"]
     assert noted(fixture, Estop()) == ["estop"]
     assert noted(fixture, Reset()) == ["reset_refused"]
-    assert noted(fixture, Hold(True)) == ["release_refused"]
     fixture.pressed, fixture.left_bits = False, 0
     fixture.tick(30)
     fixture.pressed = True
@@ -172,14 +186,6 @@ def test_a_change_of_source_is_reported() -> None:
     for _ in range(15):
         assert ticked(fixture) == []
     assert ticked(fixture) == ["stop", "source"]
-
-
-def test_a_release_is_reported_when_it_begins_and_ends() -> None:
-    fixture = hit()
-    held = Hold(True, "backward", fixture.echo)
-    assert noted(fixture, held) == ["release"]
-    assert noted(fixture, held) == []
-    assert noted(fixture, Hold(False)) == ["release_end"]
 
 
 def test_changes_are_published_at_once_and_distances_are_not_a_change() -> None:
@@ -245,15 +251,6 @@ def test_a_source_that_waited_for_safety_is_reported_when_it_may_drive() -> None
         fixture.drive()
         found += [note.about["to"] for note in transitions(before, fixture.state, None)]
     assert found.count("teleop") == 1
-
-
-def test_a_text_that_comes_again_at_once_is_a_repetition() -> None:
-    refusal = Repetition()
-    times_s = (1.0, 1.05, 1.9, 2.8, 3.8)
-    assert [refusal.continues("no", round(at * NS_PER_S)) for at in times_s] == [
-        False, True, True, True, False,
-    ]  # fmt: skip
-    assert not refusal.continues("another", round(3.85 * NS_PER_S))
 
 
 def test_the_longest_state_decodes() -> None:

@@ -132,9 +132,7 @@ def test_the_rebound_of_a_contact_and_the_end_of_a_release_latch_nothing_more() 
     fixture.linear = 0.0
     fixture.tick(40)
     fixture.linear = None
-    for _ in range(10):
-        fixture.tick()
-        fixture.hold()
+    fixture.hold("backward", 10)
     fixture.tick(100)
     assert set(fixture.state.latches) == {"contact", "no_request"}
 

@@ -94,27 +94,30 @@ def test_a_release_creeps_until_the_bumper_is_free(robot: t2.Robot, stack: Runni
 
     freeing = threading.Thread(target=free)
     freeing.start()
-    robot.release("backward")
+    robot.release("backward", "teleop")
     freeing.join()
     assert not robot.bumper.latest().pressed
     assert robot.safety.latest().latched == ("contact",)
     wait_until(lambda: not blocked(robot), "the reset")
-    robot.release("backward")  # a free bumper needs none
+    robot.release("backward", "teleop")  # a free bumper needs none
 
 
 @pytest.mark.usefixtures("pressed")
 def test_a_release_that_frees_nothing_is_not_confirmed_then_refused(robot: t2.Robot) -> None:
     with pytest.raises(t2.NotConfirmed, match=r"still pressed after 0\.5 s"):
-        robot.release("backward", timeout=0.5)
+        robot.release("backward", "teleop", timeout=0.5)
     with pytest.raises(t2.Refused, match="by hand"):  # the travel of a release is used up
-        robot.release("backward", timeout=30.0)
+        robot.release("backward", "teleop", timeout=30.0)
 
 
 @pytest.mark.usefixtures("pressed")
-def test_a_release_beside_another_latch_is_refused(robot: t2.Robot) -> None:
+@pytest.mark.parametrize(("source", "reason"), [("teleop", "mergency stop"), ("nav", "operator")])
+def test_a_release_that_safety_refuses_raises_the_reason(
+    robot: t2.Robot, source: str, reason: str
+) -> None:
     robot.estop()
-    with pytest.raises(t2.Refused, match="mergency stop"):
-        robot.release("forward", timeout=30.0)
+    with pytest.raises(t2.Refused, match=reason):
+        robot.release("forward", source, timeout=30.0)
 
 
 def test_a_limit_slows_the_vehicle_down_until_it_ends(robot: t2.Robot) -> None:

@@ -21,9 +21,9 @@ from common.wire.framing import Framing
 from common.wire.reports import BumperBrakeReport, BumperReport
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
-from services.safety import arbiter, causes, conditions, latches, policy
+from services.safety import arbiter, causes, conditions, latches, operator_requests, policy
 from services.safety.arbiter import Arbiter
-from services.safety.config import LimitSource
+from services.safety.config import LimitSource, Safety
 from services.safety.core.motion_watch import Standstill
 from services.safety.inputs import Inputs
 from services.safety.latches import Held, Observation
@@ -128,11 +128,25 @@ def authority_is_copied(stack: Stack) -> None:
     stack.forge(keys.MOTION, copy)
 
 
-def late_holds(stack: Stack) -> None:
-    seen = stack.seen
+def late_releases(stack: Stack) -> None:
+    echo = stack.sources["teleop"].echo
     stack.run(2000)
+    stack.put_release("none", echo)
     for _ in range(20):
-        stack.hold(True, "backward", seen)
+        stack.put_release("backward", echo)
+        stack.run(5)
+
+
+def held_before(stack: Stack) -> None:
+    """Hold the release before the bumper is pressed, and go on holding it."""
+    stack.request(0.0, 1500)
+    stack.hold("backward", 300)
+    stack.press(True, 1500)
+
+
+def program_releases(stack: Stack) -> None:
+    stack.request(0.0, 300, source="nav")
+    stack.hold("backward", 600, source="nav")
 
 
 def pressed_again_and_again(stack: Stack) -> None:
@@ -353,9 +367,15 @@ MUTATIONS: dict[str, Mutation] = {
         reported(BumperReport(True), BumperReport(False)), (*LATE_MOTIONS, *HIT),
         "without a BRAKE",
     ),
-    "late calls are obeyed": (
-        configured("safety", max_echo_age=10.0), (*STUCK, late_holds),
-        "no operator holds the release",
+    "late releases are obeyed": (
+        configured("safety", max_echo_age=10.0), (*STUCK, late_releases), "no fresh request",
+    ),
+    "a release needs no neutral request": (
+        (operator_requests, "_not_let_go", lambda *_: ""), (held_before,), "was not neutral",
+    ),
+    "a program may release": (
+        (Safety, "operators", frozenset({"teleop", "nav"})), (*STUCK, program_releases),
+        "no operator's source",
     ),
     "a late reset is obeyed": (
         configured("safety", max_call_age=10.0), (*STAND, late_reset, *GO),

@@ -155,10 +155,22 @@ class ScriptedStack(Stack):
         self.run(ms)
 
     def creep(self, direction: m.Direction = "backward", times: int = 10) -> None:
-        """Hold the release for a while."""
-        for _ in range(times):
-            self.hold(True, direction)
-            self.run(60)
+        """Hold the release for a while, between neutral requests; then request nothing."""
+        self.request(0.0, 60)
+        self.hold(direction, 60 * times)
+        self.request(0.0, 60)
+        self.request(None)
+
+    def hold(self, direction: m.Direction, ms: int = 0, *, source: str = "teleop") -> None:
+        """Request the release from now on."""
+        message = m.Drive(linear=0.0, angular=0.0, release=direction, echo=0)
+        self.sources[source].message = message
+        self.run(ms)
+
+    def put_release(self, direction: m.ReleaseRequest, echo: int) -> None:
+        """Put one request of teleop with this echo."""
+        drive = m.Drive(linear=0.0, angular=0.0, release=direction, echo=echo)
+        self.sources["teleop"].put(drive)
 
     def trip(self, kind: str) -> None:
         """Trip a latch whose cause ends at once."""

@@ -266,14 +266,22 @@ class StackMachine(RuleBasedStateMachine):
 
     @rule(direction=DIRECTIONS, ms=SHORT | LONG, times=st.integers(1, 8))
     def late_release(self, direction: m.Direction, ms: int, times: int) -> None:
-        """Deliver calls that hold the release late, all at once, and perhaps after its end."""
-        seen = self.stack.seen
+        """Deliver requests of a release late, all at once, and perhaps after its end."""
+        echo = self.stack.sources["teleop"].echo
         self.stack.creep(direction, times // 2)
-        self.stack.hold(False)
         self.stack.run(ms)
+        self.stack.put_release("none", echo)
         for _ in range(times):
-            self.stack.hold(True, direction, seen)
+            self.stack.put_release(direction, echo)
             self.stack.run(20)
+
+    @rule(direction=DIRECTIONS, source=st.sampled_from(["teleop", "nav"]), ms=SHORT | LONG)
+    def held_into_a_contact(self, direction: m.Direction, source: str, ms: int) -> None:
+        """Hold the release before the contact, or as a program, and go on holding it."""
+        self.stack.hold(direction, ms, source=source)
+        self.stack.press(True, 1200)
+        self.stack.request(None, source=source)
+        self.stack.press(False, 320)
 
     @rule(direction=DIRECTIONS, other=DIRECTIONS, ms=st.sampled_from([20, 60, 150, 700]))
     def pressed_again(self, direction: m.Direction, other: m.Direction, ms: int) -> None:

@@ -10,7 +10,7 @@ from textual.pilot import Pilot
 
 from common import keys
 from common.freshness import NS_PER_S
-from common.messages import Cause, ReleaseRequest, ResetRequest
+from common.messages import Cause, ResetRequest
 from tests.factories import contact_state
 from tests.teleop.local_app import LocalTerminalApp
 from tests.teleop.screen_fixture import Screen, play, tell_contact, until
@@ -40,9 +40,10 @@ def test_keys_make_their_calls(screen: Screen) -> None:
         await pilot.press("r")
         assert screen.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=7, causes=(42,)))]
         await pilot.press("f")
-        screen.speeds(1)
-        held = ReleaseRequest(direction="forward", echo=7)
-        assert screen.node.fake.asked[-1] == (keys.RELEASE.path, held)
+        screen.speeds(2)
+        _, drive = screen.node.requests
+        assert drive is not None
+        assert (drive.release, drive.echo) == ("forward", 7)
 
     play(screen, act)
 

@@ -4,6 +4,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
+from common.operator import Request
 from services.teleop.config import Teleop
 from services.teleop.controls import (
     Controls,
@@ -28,12 +29,18 @@ class Operator:
     def press(self, key: str) -> None:
         self.controls.press(key, self.now_ns)
 
-    def ticks(self, count: int, stick: Stick | None = None) -> list[Twist | None]:
+    def requests(self, count: int, stick: Stick | None = None) -> list[Request | None]:
         sent = []
         for _ in range(count):
             sent.append(self.controls.tick(stick, self.now_ns))
             self.now_ns += PERIOD_NS
         return sent
+
+    def ticks(self, count: int, stick: Stick | None = None) -> list[Twist | None]:
+        return [one.twist if one else None for one in self.requests(count, stick)]
+
+    def releases(self, count: int) -> list[str | None]:
+        return [one.release if one else None for one in self.requests(count)]
 
 
 @pytest.fixture
@@ -100,9 +107,10 @@ def test_a_release_and_driving_exclude_each_other(
     operator.ticks(2)
     operator.press(key)
     assert operator.controls.released(operator.now_ns) == direction
-    assert operator.ticks(4) == [STILL] * 3 + [None]
+    assert operator.releases(3) == ["none", direction, direction]
     operator.press("w")
     assert operator.controls.released(operator.now_ns) is None
+    assert operator.ticks(2) == [STILL, FIRST_GEAR]
 
 
 def test_the_last_direction_of_a_release_counts(operator: Operator) -> None:
@@ -159,13 +167,15 @@ def test_after_a_stop_the_deadman_must_come_up(operator: Operator, key: str) -> 
     operator.ticks(1, UP)
     operator.ticks(2, DOWN)
     operator.press(key)
-    assert operator.ticks(20, DOWN)[3:] == [None] * 17
+    sent = operator.ticks(24, DOWN)
+    assert {twist for twist in sent if twist} <= {STILL}  # a release moves nothing by its twist
+    assert sent[16:] == [None] * 8
 
 
 def test_a_release_excludes_the_gamepad(operator: Operator) -> None:
     operator.press("f")
     operator.ticks(1, UP)
-    assert operator.ticks(2, DOWN) == [None, None]
+    assert operator.ticks(2, DOWN) == [STILL, STILL]
 
 
 def test_keys_have_priority_over_the_gamepad(operator: Operator) -> None:

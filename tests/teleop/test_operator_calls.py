@@ -1,12 +1,12 @@
-"""Calls of the operator through the controller: reset and release, on a bus that never opens."""
+"""The operator's reset through the controller, on a bus that never opens."""
 
 import pytest
 from msgspec import structs
 
 from common import keys
 from common.bus.publisher import Publisher
-from common.messages import Direction, Done, ReleaseRequest, ResetDone, ResetRequest
-from common.operator import BUMPER_FREE, no_answer, not_allowed
+from common.messages import ResetDone, ResetRequest
+from common.operator import no_answer, not_allowed
 from common.source import DENIED_AFTER
 from tests.teleop.support import Operator
 
@@ -66,20 +66,19 @@ def test_a_refused_reset_is_reported_and_the_next_one_is_sent(operator: Operator
     assert len(operator.node.fake.asked) == 2
 
 
-@pytest.mark.parametrize(("key", "what"), [("r", "reset"), ("b", "release")])
 @pytest.mark.parametrize("denied", [True, False])
-def test_an_unanswered_call_without_the_right_is_not_allowed(
-    operator: Operator, monkeypatch: pytest.MonkeyPatch, key: str, what: str, denied: bool
+def test_an_unanswered_reset_without_the_right_is_not_allowed(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch, denied: bool
 ) -> None:
     monkeypatch.setattr(Publisher, "passed_on", not denied)
     for _ in range(DENIED_AFTER):
         operator.tell_contact()
         operator.ticks(1)
-    operator.press(key)
+    operator.press("r")
     operator.ticks(1)
     operator.node.fake.answers[0][1](no_answer("safety"))
     reason = not_allowed("safety") if denied else no_answer("safety")
-    assert operator.lines[-1] == f"{what} refused: {reason}"
+    assert operator.lines[-1] == f"reset refused: {reason}"
 
 
 def test_a_new_reset_replaces_one_that_waits_for_its_state(operator: Operator) -> None:
@@ -103,99 +102,3 @@ def test_a_reset_is_not_sent_without_a_fresh_state(operator: Operator, shown: bo
     operator.press("r")
     assert operator.node.fake.asked == []
     assert operator.lines == ["reset not sent: no fresh state of safety"]
-
-
-@pytest.mark.parametrize(("key", "direction"), [("f", "forward"), ("b", "backward")])
-def test_a_release_is_repeated_while_held_one_at_a_time(
-    operator: Operator, key: str, direction: Direction
-) -> None:
-    fake = operator.node.fake
-    operator.tell_contact()
-    operator.press(key)
-    operator.ticks(3)
-    held = ReleaseRequest(direction=direction, echo=7)
-    assert fake.asked == [(keys.RELEASE.path, held)]  # the first is not answered yet
-    fake.answers[-1][0](Done(text="0.15 m left"))
-    operator.tell_contact(heartbeat=8)
-    operator.ticks(1)
-    fake.answers[-1][0](Done(text="0.14 m left"))
-    operator.ticks(1)
-    fake.answers[-1][1]("safety does not answer")
-    operator.ticks(1)
-    fake.answers[-1][1]("safety does not answer")
-    assert operator.controller.view.release == direction
-    assert [request.echo for _, request in fake.asked] == [7, 8, 8, 8]
-    for _ in range(20):
-        operator.tell_contact(heartbeat=9)
-        operator.ticks(1)
-    assert fake.asked[-1][1] == ReleaseRequest(held=False, echo=9)
-    released: Direction | None = operator.controller.view.release
-    assert released is None
-    fake.answers[-1][0](Done(text="released"))
-    count = len(fake.asked)
-    operator.ticks(5)
-    assert len(fake.asked) == count
-    assert operator.lines == ["release: 0.15 m left", "release refused: safety does not answer"]
-
-
-def test_a_held_release_reports_once_that_the_bumper_is_free(operator: Operator) -> None:
-    operator.tell_contact()
-    for text in ("0.15 m left", BUMPER_FREE, BUMPER_FREE):
-        operator.press("b")
-        operator.ticks(1)
-        operator.node.fake.answers[-1][0](Done(text=text))
-    lines = operator.node.event_log.lines()
-    assert [(line.level, line.text) for line in lines] == [
-        ("info", "release: 0.15 m left"),
-        ("info", f"release: {BUMPER_FREE}"),
-    ]
-
-
-def test_a_release_is_not_sent_without_a_fresh_state(operator: Operator) -> None:
-    operator.press("b")
-    operator.ticks(5)
-    assert operator.node.fake.asked == []
-    assert operator.lines == ["release not sent: no fresh state of safety"]
-    operator.ticks(20)
-    (request,) = operator.node.fake.asked  # an end is sent in any case
-    assert request[1] == ReleaseRequest(held=False)
-
-
-def test_a_release_in_the_other_direction_ends_the_first_one(operator: Operator) -> None:
-    fake = operator.node.fake
-    operator.tell_contact(heartbeat=7)
-    operator.press("f")
-    operator.ticks(1)
-    fake.answers[-1][0](Done(text="0.15 m left"))
-    operator.press("b")
-    operator.ticks(3)  # safety takes no hold that echoes the end: wait for its next state
-    operator.tell_contact(heartbeat=8)
-    operator.ticks(2)
-    assert [request for _, request in fake.asked] == [
-        ReleaseRequest(direction="forward", echo=7),
-        ReleaseRequest(held=False, echo=7),
-        ReleaseRequest(direction="backward", echo=8),
-    ]
-
-
-def test_the_answer_to_an_end_does_not_complete_a_hold(operator: Operator) -> None:
-    fake = operator.node.fake
-    operator.tell_contact(heartbeat=7)
-    operator.press("f")
-    operator.ticks(1)
-    operator.press("b")
-    operator.tell_contact(heartbeat=8)
-    operator.ticks(1)
-    fake.answers[1][0](Done(text="Let go."))
-    fake.answers[1][1]("late")
-    operator.tell_contact(heartbeat=9)
-    operator.ticks(1)
-    assert len(fake.asked) == 2  # the first hold is not answered yet
-    fake.answers[0][1]("safety does not answer")
-    operator.ticks(1)
-    assert fake.asked[-1][1] == ReleaseRequest(direction="backward", echo=9)
-
-
-def test_a_release_sends_no_requests_to_move(operator: Operator) -> None:
-    operator.press("f")
-    assert operator.speeds(5) == [None] * 5

@@ -108,7 +108,7 @@ def estop_and_reset(box: BlackBox) -> None:
 
 @scenario(
     "a contact is latched, the bumper is free again",
-    "reset, release, switches and pose without an echo, or with one that safety never sent; resets "
+    "reset, switches and pose without an echo, or with one that safety never sent; resets "
     "that name no cause, or those of an earlier contact",
     "nothing is cleared, switched or moved; only the reset of the right causes clears",
 )
@@ -120,7 +120,6 @@ def calls_of_a_stranger(box: BlackBox) -> None:
     causes = latched_contact(box)
     calls: dict[str, Map] = {
         "safety/reset": {"causes": causes},
-        "safety/release": {"held": True, "direction": "backward"},
         "bridge/switches": {"bumper_brake": False},
         "odom/reset": {"x": 1.0},
     }

@@ -143,10 +143,9 @@ PROCESSES = [
     Fault("contact, then 20 resets 1.3 s late",
           steps(hit(0.1), request(0.0), late_calls("safety/reset", Client.reset_request)),
           RESET, within(0.02)),
-    # Safety refuses a release while motion is requested, and until the vehicle stands.
+    # A release is refused until the vehicle stands, and while a source of higher priority requests.
     Fault("contact, then 20 releases 1.3 s late",
-          steps(press, request(0.0), pause(1.5),
-                late_calls("safety/release", injectors.held_release)),
+          steps(press, request(0.0), pause(1.5), kill("driver"), injectors.late_releases()),
           RESET, within(0.02)),
 ]  # fmt: skip
 

@@ -32,7 +32,7 @@ from verification.harness.waiting import becomes_true, wait_until
 P = ParamSpec("P")
 R = TypeVar("R", bound=int | None)
 
-LATE_S = 1.3  # a reset may be 1.0 s old, a held release 0.4 s
+LATE_S = 1.3  # a reset may be 1.0 s old, a request 0.4 s
 DEATH_S = 1.0  # longer than a kernel needs to end a process
 FORGED_S = 0.6
 AHEAD = 1000
@@ -221,9 +221,17 @@ def late_calls(fixture: StackFixture, name: str, request_of: Callable[[Client], 
         time.sleep(0.02)
 
 
-def held_release(client: Client) -> Map:
-    """Return the request of a held release."""
-    return {"echo": client.state["heartbeat"], "held": True, "direction": "backward"}
+@injector
+def late_releases(fixture: StackFixture) -> None:
+    """Request zero and 20 times a release, as an operator did when the contact was latched."""
+    client = fixture.client
+    becomes_true(lambda: client.latched, 2.0)
+    drive = {"linear": 0.0, "angular": 0.0, "echo": client.state["heartbeat"], "boot": 77}
+    time.sleep(LATE_S)
+    for seq in range(1, 22):
+        drive |= {"seq": seq, "release": "backward" if seq > 1 else "none"}
+        client.bus.put(f"{ROOT}/@cmd/drive/web", msgpack.packb(drive))
+        time.sleep(0.02)
 
 
 @injector

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from common.freshness import NS_PER_S
-from common.messages import Drive, Limit, Motion, SourceMessage, Velocity
+from common.messages import Drive, Limit, Motion, ReleaseRequest, SourceMessage, Velocity
 
 LEASE_S, ECHO_AGE_S, RIVAL_S = 0.5, 0.4, 0.5
 NEEDED, IGNORED = "lidar", "fleet"  # whose silence stops; whose silence has no effect
@@ -61,9 +61,22 @@ class Channel:
         return self.rival_ns is not None and now_ns - self.rival_ns < RIVAL_S * NS_PER_S
 
     @property
+    def release(self) -> ReleaseRequest:
+        """The release that the newest message asks for."""
+        return self.message.release if isinstance(self.message, Drive) else "none"
+
+    @property
     def is_still(self) -> bool:
-        """Whether the newest message asks for no motion."""
-        return self.message is not None and self.message.linear == 0 == self.message.angular
+        """Whether the newest message asks for no velocity."""
+        message = self.message
+        return message is not None and (
+            message.linear == 0 == message.angular or self.release != "none"
+        )
+
+    @property
+    def is_neutral(self) -> bool:
+        """Whether the newest message asks for no motion at all."""
+        return self.is_still and self.release == "none"
 
 
 def channels(leases_s: dict[str, float]) -> dict[str, Channel]:

@@ -18,6 +18,7 @@ from verification.search.bus import MS, Source
 from verification.search.draw import Draw
 from verification.search.stack import Stack as Robot
 
+RELEASE_KEYS: dict[m.Direction, str] = {"forward": "f", "backward": "b"}
 KEYS = ("w", "w", "w", "w", "s", "s", "a", "d", "z", "c", "end", "pagedown")
 PATIENCE_S = 0.7  # without room, until the next manoeuvre
 LET_GO_S = 0.4  # for a neutral request
@@ -62,7 +63,6 @@ class Operator(Source):
         self.asks_since_ns: int | None = None  # of motion
         self._robot = robot
         self._pressed = False  # the bumper, as shown
-        self._held: m.Direction | None = None  # the release
         self._script = script(draw)[::-1]
         self._gamepad = draw.get("operator.device", "keyboard") == "gamepad"
         self._controls = Controls(Teleop())
@@ -86,17 +86,12 @@ class Operator(Source):
     def act(self) -> None:
         """Hold a key or the release, let go, or reset, until the next act."""
         now_ns, state = self.process.net.now_ns, self._robot.seen
-        held = None
-        if state is not None and not self.done:
-            if state.latched:
-                held = self._recover(state, now_ns)
-            else:
-                self._drive(state, now_ns)
-        if held is not None:
-            self._robot.hold(True, held)
-        elif self._held is not None:
-            self._robot.hold(False, self._held)
-        self._held = held
+        if state is None or self.done:
+            return
+        if state.latched:
+            self._recover(state, now_ns)
+        else:
+            self._drive(state, now_ns)
 
     def publish(self) -> None:
         """Publish the request of this tick, if there is one."""
@@ -104,11 +99,12 @@ class Operator(Source):
         driving = self._began_ns is not None
         push = self._script[-1].push if driving and self._script else Deflection()
         stick = Stick(push, deadman=driving, turbo=False, events=self._events)
-        twist = self._controls.tick(stick if self._gamepad else None, now_ns)
+        request = self._controls.tick(stick if self._gamepad else None, now_ns)
         self.message = None
-        if twist is not None:
-            self.message = m.Drive(linear=twist.linear, angular=twist.angular, echo=0)
-        moves = twist is not None and not twist.is_zero
+        if request is not None:
+            linear, angular = request.twist.linear, request.twist.angular
+            self.message = m.Drive(linear=linear, angular=angular, release=request.release, echo=0)
+        moves = request is not None and not request.twist.is_zero
         self.asks_since_ns = (self.asks_since_ns or now_ns) if moves else None
         if now_ns >= self.muted_until_ns:
             super().publish()
@@ -137,8 +133,8 @@ class Operator(Source):
         self._began_ns = self._blocked_ns = None
         self._idle_until_ns = now_ns + round(pause_s * NS_PER_S)
 
-    def _recover(self, state: m.SafetyState, now_ns: int) -> m.Direction | None:
-        """Wait, return the release to hold, reset."""
+    def _recover(self, state: m.SafetyState, now_ns: int) -> None:
+        """Wait, hold the release, reset."""
         if self._latched_ns is None:
             self._latched_ns = now_ns
             self._let_go(now_ns, LET_GO_S)
@@ -150,10 +146,10 @@ class Operator(Source):
         elif since_s > LOOK_S:
             self._free_ns = None if self._pressed else self._free_ns or now_ns
             if self._free_ns is None and since_s < LOOK_S + BACK_OFF_S:
-                return way_off(state.release)
-            if now_ns % RESET_NS == 0 and now_ns - (self._free_ns or now_ns) > CLEAR_NS:
+                if way := way_off(state.release):
+                    self._controls.press(RELEASE_KEYS[way], now_ns)
+            elif now_ns % RESET_NS == 0 and now_ns - (self._free_ns or now_ns) > CLEAR_NS:
                 self._robot.reset()
-        return None
 
 
 def way_off(release: m.Release | None) -> m.Direction | None:

@@ -42,6 +42,7 @@ class Record:
 
     complaints: tuple[str, ...]
     known: frozenset[Trip]
+    creeps: bool  # whether it is a release
 
 
 @dataclass(repr=False)
@@ -145,24 +146,11 @@ class Oracle:
             if book.estop_session_was_up and not up:
                 self.trip("estop_reader", book.boot)
 
-    def on_call(self, process: Process, request: m.ResetRequest | m.ReleaseRequest) -> None:
-        """Record a call before safety decides: it may move the vehicle at once."""
+    def on_answer(self, process: Process, request: m.ResetRequest, done: bool) -> None:
+        """Record the answer to a reset: a granted one clears trips."""
         book = self.safety_books.get(process.boot)
-        if book is not None and isinstance(request, m.ReleaseRequest):
-            book.operators.on_hold(request, self.now_ns)
-
-    def on_answer(
-        self, process: Process, request: m.ResetRequest | m.ReleaseRequest, done: bool
-    ) -> None:
-        """Record the answer: a refused hold changes nothing, a granted reset clears trips."""
-        book = self.safety_books.get(process.boot)
-        if book is None:
-            return
-        if isinstance(request, m.ResetRequest):
-            if done and self.estop_session_up and book.may_reset(self.now_ns):
-                self._clear(book, request)
-        elif not done:
-            book.operators.hold = book.operators.held_before
+        if book and done and self.estop_session_up and book.may_reset(self.now_ns):
+            self._clear(book, request)
 
     def _clear(self, book: SafetyBook, request: m.ResetRequest) -> None:
         """Clear trips; those that the request must not clear stay."""
@@ -217,18 +205,19 @@ class Oracle:
         if book.keepalive.is_lost(self.now_ns):
             self.trip("estop_keepalive", book.boot)
         known = frozenset(self._held_by(book.boot))
-        book.look(self.now_ns, self.estop_session_up, bool(known))
+        book.look(self.now_ns, self.estop_session_up, {trip.name for trip in known})
         rolls = book.standstill.complaint(motion, moves(motion), self.now_ns)
         self.violations += [rolls] if rolls else []
         complaints: tuple[str, ...] = ()
-        book.operators.on_verdict(motion, self.now_ns)
+        creeps = book.creeps(motion)
+        book.operators.on_verdict(motion, creeps, self.now_ns)
         if moves(motion):
             complaints = tuple(self._of_verdict(book, motion, known))
-        self._records[motion.boot, motion.seq] = Record(complaints, known)
+        self._records[motion.boot, motion.seq] = Record(complaints, known, creeps)
 
     def _of_verdict(self, book: SafetyBook, motion: m.Motion, known: frozenset[Trip]) -> list[str]:
         complaints = [f"safety: {one}" for one in book.complaints(motion, self.now_ns)]
-        creeps = motion.source == "release"
+        creeps = book.creeps(motion)
         complaints += [
             f"safety knows of {trip.name}"
             for trip in known
@@ -271,7 +260,7 @@ class Oracle:
         complaints += [
             f"bridge knows of {trip.name}, safety did not"
             for trip in self._held_by(bridge_book.boot)
-            if not (motion.source == "release" and trip in record.known)
+            if not (record.creeps and trip in record.known)
         ]
         return complaints
 

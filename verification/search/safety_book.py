@@ -6,7 +6,7 @@ Nothing here comes from the code under test: times, limits and geometry are thos
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from common import messages as m
@@ -18,7 +18,7 @@ from verification.search.condition_books import (
     StandstillBook,
     channels,
 )
-from verification.search.operator_book import OperatorBook
+from verification.search.operator_book import OperatorBook, direction_of
 
 LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
 PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
@@ -59,6 +59,7 @@ class SafetyBook:
     operators: OperatorBook = field(default_factory=OperatorBook)
     bad_ns: int = 0  # when inputs were last seen to be bad
     neutral: dict[str, int] = field(default_factory=dict)  # source: when it asked for zero
+    let_go: set[str] = field(default_factory=set)  # sources whose next release may begin
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     estop_session_was_up: bool = False
     decided_ns: int | None = None
@@ -80,12 +81,17 @@ class SafetyBook:
     def _on_drive(self, source: str, drive: m.Drive, sent_ns: int | None, now_ns: int) -> None:
         channel = self.requests[source]
         lapsed = now_ns - channel.at_ns > (channel.lease_s + LAPSE_S) * NS_PER_S
+        before = channel.message
         if not channel.take(drive, sent_ns, now_ns):
             return
         if lapsed:
             self.neutral.pop(source, None)  # a program that was suspended
-        if channel.is_still:
+        if lapsed or (before and before.boot != drive.boot):
+            self.let_go.discard(source)
+        if channel.is_neutral:
             self.zeros[source] = now_ns
+            self.let_go.add(source)
+        if channel.is_still:
             self.still_ns.setdefault(source, now_ns)
         else:
             self.still_ns.pop(source, None)
@@ -141,23 +147,28 @@ class SafetyBook:
             self.bad_ns = now_ns
             self.neutral.clear()
         is_new = before.seq != message.seq or not self.bumpers or before.boot != message.boot
-        self.operators.on_bumper(message, is_new, now_ns)
+        if self.operators.on_bumper(message, is_new, now_ns):
+            self.let_go.clear()
         if is_new:
             self.bumpers.append(message)
 
-    def look(self, now_ns: int, reader: bool, tripped: bool) -> None:
+    def look(self, now_ns: int, reader: bool, tripped: Collection[str]) -> None:
         """Note, at the time of a decision, whether anything wants a neutral request."""
         self.limits.look(now_ns)
-        tripped = tripped or any(self.limits.stops(now_ns)) or any(self.keepalive.missing())
+        barred = any(self.limits.stops(now_ns)) or any(self.keepalive.missing())
         if "old velocity" in self._what_is_bad(now_ns):
             self.fast_ns = None  # what is not measured is no runaway
         if self._what_is_bad(now_ns) or not reader:
             self.bad_ns = now_ns
-        if now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S or tripped:
+        barred = barred or now_ns - self.bad_ns < (SETTLE_S - STEP_S) * NS_PER_S
+        if barred or set(tripped) - {"contact"}:  # a key that is held meanwhile
+            self.let_go -= {name for name, one in self.requests.items() if one.release != "none"}
+        self.let_go -= {source for source in self.let_go if self._better(source, now_ns)}
+        if barred or tripped:
             self.neutral.clear()
             return
         for source, request in self.requests.items():
-            if request.is_still and request.is_fresh(now_ns):
+            if request.is_neutral and request.is_fresh(now_ns):
                 self.neutral[source] = request.at_ns
         for source in [source for source in self.neutral if self._better(source, now_ns)]:
             del self.neutral[source]  # overruled
@@ -174,10 +185,9 @@ class SafetyBook:
             yield "inputs have not settled"
         if abs(motion.linear) > MOST_MPS + ROUNDING or abs(motion.angular) > MOST_RADPS + ROUNDING:
             yield f"beyond the limits: {motion.linear} m/s, {motion.angular} rad/s"
-        if motion.source == "release":
-            yield from self._of_release(motion, now_ns)
-        else:
-            yield from self._of_source(motion.source or "", now_ns)
+        yield from self._of_source(motion.source or "", self.creeps(motion), now_ns)
+        if self.creeps(motion):
+            yield from self._of_release(motion)
         yield from self._of_zones(motion, now_ns)
         yield from self.limits.complaints(motion, now_ns)
         yield from self.keepalive.missing()
@@ -187,7 +197,7 @@ class SafetyBook:
         at_ns, velocity = self.samples.get("velocity", (0, None))
         fresh = now_ns - at_ns <= AGES_S["velocity"] * NS_PER_S
         stands = fresh and isinstance(velocity, m.Velocity) and abs(velocity.linear) < 0.02
-        asked = any(one.is_fresh(now_ns) and not one.is_still for one in self.requests.values())
+        asked = any(one.is_fresh(now_ns) and not one.is_neutral for one in self.requests.values())
         return stands and not asked
 
     def is_gone(self, trip: str) -> bool:
@@ -222,29 +232,37 @@ class SafetyBook:
                 bad.append("the board's brakes are not both on")
         return bad
 
-    def _of_source(self, source: str, now_ns: int) -> Iterator[str]:
+    def creeps(self, motion: m.Motion) -> bool:
+        """Return whether a motion is a release: asked for, and the bumper is pressed."""
+        request = self.requests.get(motion.source or "")
+        pressed = bool(self.bumpers) and self.bumpers[-1].pressed
+        return motion.command == "run" and pressed and bool(request and request.release != "none")
+
+    def _of_source(self, source: str, creeps: bool, now_ns: int) -> Iterator[str]:
         if source not in self.requests or not self.requests[source].is_fresh(now_ns):
             yield f"no fresh request of {source!r}"
             return
-        if now_ns - self.still_ns.get(source, now_ns) > RAMP_S * NS_PER_S:
+        if not creeps and now_ns - self.still_ns.get(source, now_ns) > RAMP_S * NS_PER_S:
             yield "no source requests motion"
         if better := self._better(source, now_ns):
             yield f"{better} go before {source}"
-        if source not in self.neutral:
+        if source not in (self.let_go if creeps else self.neutral):
             yield f"{source} was not neutral since the last cause"
         if self.requests[source].has_rival(now_ns):
             yield "two publishers on one source"
 
-    def _of_release(self, motion: m.Motion, now_ns: int) -> Iterator[str]:
-        yield from self.operators.complaints(motion, now_ns)
-        if not self.bumpers or not self.bumpers[-1].pressed:
-            yield "a release without a pressed bumper"
+    def _of_release(self, motion: m.Motion) -> Iterator[str]:
+        yield from self.operators.complaints(motion)
+        if motion.source not in OPERATORS:
+            yield f"{motion.source} is no operator's source and releases"
+        if direction_of(motion) != self.requests[motion.source or ""].release:
+            yield "a release the other way than the operator chose"
 
     def _of_zones(self, motion: m.Motion, now_ns: int) -> Iterator[str]:
         measured = self.samples.get("velocity")
         for sonar in range(len(SONARS)):
             room = max(0.0, self._distance(sonar, now_ns) - MARGIN_M)
-            if self._may_creep(sonar, motion.source, now_ns):
+            if not self.creeps(motion) and self._may_creep(sonar, motion.source, now_ns):
                 room = max(room, stopping_way(BLIND_MPS))
             speed = approach(sonar, motion.linear, motion.angular)
             if speed > ROUNDING and stopping_way(speed - ROUNDING) > room:

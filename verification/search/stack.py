@@ -248,22 +248,13 @@ class Stack:
         if seen is not None:
             latched = tuple(cause.id for cause in seen.causes if cause.name in seen.latched)
             request = m.ResetRequest(echo=seen.heartbeat, causes=latched)
-        return self.call(keys.RESET, request)
+        return self.call_reset(request)
 
-    def hold(
-        self, held: bool, direction: m.Direction = "backward", seen: m.SafetyState | None = None
-    ) -> Caller:
-        """Hold the release, or let it go, by what is seen now or was seen earlier."""
-        seen = seen or self.seen
-        echo = seen.heartbeat if seen else None
-        return self.call(keys.RELEASE, m.ReleaseRequest(held=held, direction=direction, echo=echo))
-
-    def call(self, call: keys.Call[Any, Any], request: m.ResetRequest | m.ReleaseRequest) -> Caller:
+    def call_reset(self, request: m.ResetRequest) -> Caller:
         """Call safety, and wait until it has decided."""
         safety = self.processes["safety"]
-        self.oracle.on_call(safety, request)
         with self.time():
-            caller = safety.call(call, request)
+            caller = safety.call(keys.RESET, request)
         self.oracle.on_answer(safety, request, bool(caller.done))
         self.run(5)
         return caller

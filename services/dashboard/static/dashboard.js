@@ -227,7 +227,7 @@ function begin() {
   $("robots").onchange = () => { localStorage.setItem("t2.robot", $("robots").value); $("robots").blur(); choose($("robots").value); };
   for (const name of ["ultrasonic_brake", "bumper_brake"]) $(name).onclick = () => toggle(name);
   notices.begin({ t, language: () => language });
-  driving.begin({ send, estop: stop, reset, toast, t, gears: () => hello?.gears ?? [] });
+  driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
   estop.begin({ send, lost, toast, robot: shown, mayDrive: () => fast?.driver.may !== false });
   slots.begin({ t, robot: shown, isDriver });
   trail.begin([]);

@@ -1,6 +1,7 @@
 // Input of the driver: stick, keys, gamepad, release. Only held controls drive. Every loss of input
 // releases them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
 // as the answer to a snapshot, so that the server can compute its age.
+import { translated } from "./phrases.js";
 import { isUsedUp, nextStep, resetRefusal } from "./state_bar.js";
 
 const DEADZONE = 0.12; // of the stick's range
@@ -110,7 +111,7 @@ export function show(isDriver, fast) {
   $("stick").title = off ? page.t("no_router") : "";
   $("reset").classList.toggle("due", next === "reset");
   $("release").classList.toggle("due", next === "release" || next === "by_hand");
-  showRelease(isDriver);
+  showRelease(isDriver, releasing ? fast?.safety?.release_refusal : "");
 }
 
 // Why safety refuses a release in this direction now, as a key; empty if it does not.
@@ -121,9 +122,9 @@ function refusal(direction) {
   return mustReset ? "release_reset_first" : "";
 }
 
-function showRelease(isDriver) {
+function showRelease(isDriver, answer) {
   $("release").hidden = !release;
-  const reasons = new Set();
+  const reasons = new Set(answer ? [translated(answer, page.language())] : []);
   for (const direction of ["forward", "backward"]) {
     const refused = refusal(direction);
     if (refused) reasons.add(page.t(refused));

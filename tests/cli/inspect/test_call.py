@@ -110,11 +110,6 @@ def test_a_rogue_answer_is_not_confirmed(payload: bytes, buses: BusFixture, tool
 @pytest.mark.parametrize(
     ("words", "call", "meant"),
     [
-        (
-            ("safety/release", '{"direction": "backward"}'),
-            keys.RELEASE,
-            m.ReleaseRequest(direction="backward"),
-        ),
         (("odom/reset", '{"x": 1.0, "echo": null}'), keys.SET_POSE, m.PoseRequest(x=1.0)),
         (("bridge/switches",), keys.SET_SWITCHES, m.SwitchesRequest()),
     ],
@@ -142,22 +137,10 @@ def test_no_operators_call_without_a_state(
     buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(command, "STATE_S", 0.3)
-    for key in ("safety/reset", "safety/release", "odom/reset", "bridge/switches"):
+    for key in ("safety/reset", "odom/reset", "bridge/switches"):
         result = tool("call", key)
         assert (result.code, result.out) == (1, "")
         assert "no state of safety within 1 s" in result.err
-
-
-def test_the_end_of_a_release_needs_no_state(buses: BusFixture, tool: Tool) -> None:
-    asked: list[m.ReleaseRequest] = []
-
-    def take(request: m.ReleaseRequest, caller: Caller[m.Done]) -> None:
-        asked.append(request)
-        caller.reply(m.Done(text="Let go."))
-
-    buses.bus(lambda bus: bus.serve(keys.RELEASE, take))
-    assert tool("call", "safety/release", '{"held": false}').code == 0
-    assert asked == [m.ReleaseRequest(held=False)]
 
 
 def test_invalid_states_are_ignored(buses: BusFixture, tool: Tool) -> None:

@@ -48,7 +48,7 @@ def offered(shell_script: str, *words: str) -> set[str]:
         (("",), {*COMMANDS, *EVERYWHERE}),
         (("echo", "tel/o"), {"tel/odom/odometry", "tel/odom/health"}),
         (("echo", "odometry", "--fi"), {"--field"}),
-        (("call", "safety/r"), {"safety/reset", "safety/release"}),
+        (("call", "safety/r"), {"safety/reset"}),
         (("schema", "Odo"), {"Odometry"}),
         (("wire", "dec"), {"decode"}),
         (("echo", "--config", "pyproject.t"), {"pyproject.toml"}),

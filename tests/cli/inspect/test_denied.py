@@ -17,10 +17,8 @@ from common.bus.probe import probe
 from common.bus.session import client_config
 from common.loop import Loop
 from common.messages import (
-    Done,
     Drive,
     EstopKeepalive,
-    ReleaseRequest,
     ResetDone,
     ResetRequest,
     SwitchesRequest,
@@ -54,7 +52,6 @@ class OnBoard:
         bus.subscribe(keys.ESTOP_KEEPALIVE, self.kept_alive.append, depth=16, source="*")
         bus.on_any(keys.estop_key(bus.robot), self.estops.append)
         bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="reset")))
-        bus.serve(keys.RELEASE, lambda _, caller: caller.reply(Done(text="release")))
         bus.serve(keys.SET_SWITCHES, lambda _, caller: caller.refuse("switches"))
         bus.live(keys.live_key(bus.robot, "safety", "1"))
         self.state = bus.publisher(keys.SAFETY)
@@ -258,7 +255,6 @@ def test_a_programs_certificate_drives_and_stops_and_cannot_reset_or_keep_a_pend
         assert {arrival.key.rpartition("/")[2] for arrival in robot.kept_alive} == {"nav"}
         for call, request, answer in (
             (keys.RESET, ResetRequest(), "reset"),
-            (keys.RELEASE, ReleaseRequest(), "release"),
             (keys.SET_SWITCHES, SwitchesRequest(), "switches"),
         ):
             assert anna.call(call, request) == answer

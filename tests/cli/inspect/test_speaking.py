@@ -6,7 +6,7 @@ from cli.inspect import estop
 from common import keys
 from common.bus.bus import Bus
 from common.bus.calls import Caller
-from common.messages import Cause, Done, Limits, ReleaseRequest, SafetyState
+from common.messages import Cause, Done, LedRequest, Limits, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from verification.harness.waiting import wait_until
@@ -73,23 +73,22 @@ def test_commands_for_one_robot(words: tuple[str, ...], tool: Tool) -> None:
 
 
 def test_call(buses: BusFixture, tool: Tool) -> None:
-    def release(request: ReleaseRequest, caller: Caller[Done]) -> None:
-        if request.held:
-            caller.refuse("the bumper is free")
+    def led(request: LedRequest, caller: Caller[Done]) -> None:
+        if request.channel:
+            caller.refuse("no such lamp")
         else:
-            caller.reply(Done(text="ended"))
+            caller.reply(Done(text="lit"))
 
-    pretend(buses, "safety", {keys.SAFETY: state}, lambda bus: bus.serve(keys.RELEASE, release))
-    whole = f"t2/v1/{buses.robot}/srv/safety/release"
-    for key in ("release", "safety/release", "/srv/safety/release", whole):
-        result = tool("call", key, '{"held": false}')
-        assert (result.code, result.lines) == (0, [{"text": "ended", "boot": 0}])
-    assert (
-        tool("call", "safety/release", '{"held": false}', "--text").out == "text: ended\nboot: 0\n"
-    )
-    result = tool("call", "safety/release")
+    pretend(buses, "bridge", {keys.SAFETY: state}, lambda bus: bus.serve(keys.SET_LED, led))
+    whole = f"t2/v1/{buses.robot}/srv/bridge/led"
+    first = '{"channel": 0, "mode": 1}'
+    for key in ("led", "bridge/led", "/srv/bridge/led", whole):
+        result = tool("call", key, first)
+        assert (result.code, result.lines) == (0, [{"text": "lit", "boot": 0}])
+    assert tool("call", "bridge/led", first, "--text").out == "text: lit\nboot: 0\n"
+    result = tool("call", "bridge/led", '{"channel": 1, "mode": 1}')
     assert (result.code, result.out) == (1, "")
-    assert result.err == "t2 call: refused: the bumper is free\n"
+    assert result.err == "t2 call: refused: no such lamp\n"
 
 
 def test_a_call_without_an_answer(tool: Tool) -> None:

@@ -230,7 +230,7 @@ def test_schema_by_type_and_by_key(tool: Tool) -> None:
     shown = tool("schema", "Odometry", "--text").out
     assert shown.startswith("Odometry: Pose in")
     assert "rad, wrapped to -pi..pi" in shown
-    assert tool("schema", "safety/release").lines[0]["$ref"].endswith("ReleaseRequest")
+    assert tool("schema", "safety/reset").lines[0]["$ref"].endswith("ResetRequest")
     assert "Odometry" in {line["type"] for line in tool("schema").lines}
 
 

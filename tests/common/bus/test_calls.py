@@ -10,7 +10,7 @@ from common import keys
 from common.bus.bus import Bus
 from common.bus.calls import Caller
 from common.keys import info_key
-from common.messages import Done, LedRequest, ReleaseRequest
+from common.messages import Done, LedRequest, PoseRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
@@ -20,21 +20,21 @@ ARRIVES_S = 0.5
 
 
 class Server:
-    """Serves the release, and keeps whom it has not answered."""
+    """Serves the pose, and keeps whom it has not answered."""
 
     def __init__(self) -> None:
         self.waiting: list[Caller[Done]] = []
-        self.asked: list[ReleaseRequest] = []
+        self.asked: list[PoseRequest] = []
         self.refuses = ""
 
     def serve(self, bus: Bus) -> None:
-        bus.serve(keys.RELEASE, self.take)
+        bus.serve(keys.SET_POSE, self.take)
 
-    def take(self, request: ReleaseRequest, caller: Caller[Done]) -> None:
+    def take(self, request: PoseRequest, caller: Caller[Done]) -> None:
         self.asked.append(request)
         if self.refuses:
             caller.refuse(self.refuses)
-        elif request.held:
+        elif request.x == 0:
             caller.reply(Done(text="held"))
         else:
             self.waiting.append(caller)
@@ -54,8 +54,8 @@ class Client:
 
     def request(self, *, held: bool = True, timeout_s: float = 20.0) -> None:
         self.bus.call(
-            keys.RELEASE,
-            ReleaseRequest(held=held),
+            keys.SET_POSE,
+            PoseRequest(x=0.0 if held else 1.0),
             self.replies.append,
             self.refusals.append,
             timeout_s,
@@ -106,7 +106,7 @@ def test_a_flood_of_queries_is_answered_one_at_a_time(
         time.sleep(ARRIVES_S)
     wait_until(lambda: client.answers == FLOOD, "an end of each query")
     assert 0 < len(client.replies) == len(server.asked) < FLOOD / 2
-    assert set(client.refusals) == {"safety does not answer; run `t2 doctor`"}
+    assert set(client.refusals) == {"odom does not answer; run `t2 doctor`"}
 
 
 def test_a_reply_may_come_later(client: Client, server: Server) -> None:
@@ -129,7 +129,7 @@ def test_a_refusal_brings_its_reason(client: Client, server: Server) -> None:
 def test_who_does_not_answer_in_time_is_named(client: Client, server: Server) -> None:
     client.request(held=False, timeout_s=0.3)
     wait_until(lambda: client.answers, "the timeout")
-    assert client.refusals == ["safety does not answer; run `t2 doctor`"]
+    assert client.refusals == ["odom does not answer; run `t2 doctor`"]
     wait_until(lambda: server.waiting, "the question, however late")
     server.waiting.pop().reply(Done(text="too late"))  # harmless: no caller receives it
     client.request(timeout_s=20.0)
@@ -142,14 +142,14 @@ def test_the_router_s_own_timeout_is_no_refusal(client: Client) -> None:
     for count in range(1, 31):
         client.request(held=False, timeout_s=0.02)
         wait_until(lambda: client.answers == count, "the timeout")  # noqa: B023
-    assert set(client.refusals) == {"safety does not answer; run `t2 doctor`"}
+    assert set(client.refusals) == {"odom does not answer; run `t2 doctor`"}
 
 
 def test_a_refusal_needs_no_encoding(buses: BusFixture) -> None:
     def answer(query: zenoh.Query) -> None:
         query.reply_err("not with us")
 
-    queryable = buses.session().declare_queryable(keys.RELEASE.on(buses.robot), answer)
+    queryable = buses.session().declare_queryable(keys.SET_POSE.on(buses.robot), answer)
     client = Client(buses.bus())
 
     def refused() -> bool:
@@ -164,7 +164,7 @@ def test_nobody_there_is_said_at_once(buses: BusFixture) -> None:
     client = Client(buses.bus())
     client.request(timeout_s=600.0)
     wait_until(lambda: client.answers, "an answer")
-    assert client.refusals == ["safety does not answer; run `t2 doctor`"]
+    assert client.refusals == ["odom does not answer; run `t2 doctor`"]
 
 
 def test_no_router_is_said_at_once(buses: BusFixture) -> None:
@@ -175,7 +175,7 @@ def test_no_router_is_said_at_once(buses: BusFixture) -> None:
 
 
 def test_a_reply_of_the_wrong_kind_is_a_refusal(buses: BusFixture) -> None:
-    key = keys.RELEASE.on(buses.robot)
+    key = keys.SET_POSE.on(buses.robot)
 
     def answer(query: zenoh.Query) -> None:
         query.reply(key, msgpack.packb({"text": 5}))
@@ -195,11 +195,11 @@ def test_a_reply_of_the_wrong_kind_is_a_refusal(buses: BusFixture) -> None:
 @pytest.mark.parametrize(
     ("payload", "reason"),
     [
-        (b"\xc1", "not a ReleaseRequest: "),
-        (msgpack.packb({"held": 1}), "Expected `bool`, got `int` - at `$.held`"),
+        (b"\xc1", "not a PoseRequest: "),
+        (msgpack.packb({"x": "1"}), "Expected `float`, got `str` - at `$.x`"),
         (msgpack.packb({"hold": True}), "unknown field `hold`"),
-        (b"\x91" * 100_000, "not a ReleaseRequest: "),
-        (b"\x00" * 1_000_000, "not a ReleaseRequest: "),
+        (b"\x91" * 100_000, "not a PoseRequest: "),
+        (b"\x00" * 1_000_000, "not a PoseRequest: "),
     ],
     ids=["no msgpack", "wrong type", "unknown field", "deep", "big"],
 )
@@ -207,7 +207,7 @@ def test_a_request_that_is_none_is_refused_with_its_fault(
     buses: BusFixture, server: Server, client: Client, payload: bytes, reason: str
 ) -> None:
     asked = len(server.asked)
-    replies = list(buses.session().get(keys.RELEASE.on(buses.robot), payload=payload))
+    replies = list(buses.session().get(keys.SET_POSE.on(buses.robot), payload=payload))
     assert len(replies) == 1
     assert replies[0].err is not None
     assert reason in replies[0].err.payload.to_bytes().decode()
@@ -217,11 +217,11 @@ def test_a_request_that_is_none_is_refused_with_its_fault(
 def test_a_request_without_payload_is_one_of_defaults(
     buses: BusFixture, server: Server, client: Client
 ) -> None:
-    (reply,) = buses.session().get(keys.RELEASE.on(buses.robot))
+    (reply,) = buses.session().get(keys.SET_POSE.on(buses.robot))
     assert reply.ok is not None
     assert msgpack.unpackb(reply.ok.payload.to_bytes()) == {"text": "held", "boot": 0}
     assert str(reply.ok.encoding) == "application/msgpack;t2.v1.Done"
-    assert server.asked[-1] == ReleaseRequest()
+    assert server.asked[-1] == PoseRequest()
 
 
 def test_a_required_field_is_missed(buses: BusFixture) -> None:
