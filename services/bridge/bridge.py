@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 from bisect import bisect_left
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,7 @@ from common.service import Node, run
 from services.bridge.config import BridgeConfig
 from services.bridge.core.core import Core, tick_s
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
-from services.bridge.guard import NAME, Heartbeat, Inherited, inherited
+from services.bridge.guard import NAME, Heartbeat
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 MOTIONS = 8  # queue length
@@ -40,10 +40,10 @@ def main() -> int:
     # systemd sends these to guard and bridge alike; the guard passes them on.
     for number in (signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    given = inherited(os.environ)
+    *sockets, pipe = map(int, os.environ[NAME].split(","))
     # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
-    return run("bridge", BridgeConfig, lambda node: Bridge(node, given), priority=ahead)
+    return run("bridge", BridgeConfig, lambda node: Bridge(node, sockets, pipe), priority=ahead)
 
 
 class Histogram:
@@ -68,11 +68,14 @@ class Histogram:
 class Bridge:
     """Passes inputs to the core and carries out its outputs."""
 
-    def __init__(self, node: Node[BridgeConfig], given: Inherited | None = None) -> None:
+    def __init__(
+        self, node: Node[BridgeConfig], sockets: Sequence[int] = (), pipe: int | None = None
+    ) -> None:
+        """Set up with the descriptors that a guard has opened."""
         self._node = node
         drive = node.open_drive(listens=True)  # safety accepts samples only from this link
-        self._sockets = Sockets(node.config.board, given.sockets if given else ())
-        self._heartbeat = Heartbeat(given.heartbeat, self._on_no_guard) if given else None
+        self._sockets = Sockets(node.config.board, sockets)
+        self._heartbeat = None if pipe is None else Heartbeat(pipe, self._on_no_guard)
         self._reactions = {"reflex": Histogram(), "judged_stop": Histogram()}
         self._core = Core(node.config, node.bus.boot, node.counters, clock.now_ns())
         self._ticked_ns = clock.now_ns()
@@ -149,7 +152,15 @@ class Bridge:
             self._heartbeat.beat(self._core.motions.port)
 
     def _on_second(self, _: int) -> None:
-        self._report_sockets()
+        sockets, counters, rejected = self._sockets, self._node.counters, self._core.rejected
+        if sockets.refused > rejected["wrong_address"]:
+            text = "datagrams from another address are dropped; see board.any_source_port"
+            self._node.log.warning(text, source=str(sockets.last_foreign_source))
+        if sockets.send_errors > counters["send_errors"]:
+            text = "the system refuses to send to the board"
+            self._node.log.warning(text, count=sockets.send_errors, error=sockets.last_error)
+        rejected["wrong_address"] = sockets.refused
+        counters["send_errors"] = sockets.send_errors
         self._do(self._core.second())
 
     # --- out ----------------------------------------------------------------------------------
@@ -177,25 +188,6 @@ class Bridge:
         sent = self._sockets.send(send.datagram, send.port, BRAKE_ATTEMPTS if is_brake else 1)
         if send.order is not None:
             self._unsent = is_brake and not sent
-
-    # --- counters ---------------------------------------------------------------------------
-
-    def _report_sockets(self) -> None:
-        sockets, counters = self._sockets, self._node.counters
-        rejected = self._core.rejected
-        foreign = sockets.last_foreign_source
-        if sockets.refused > rejected["wrong_address"] and foreign is not None:
-            board = self._node.config.board
-            self._node.log.warning(
-                "datagrams from another address are dropped; see board.any_source_port",
-                source=f"{foreign[0]}:{foreign[1]}",
-                board=f"{board.address}:{board.port}",
-            )
-        rejected["wrong_address"] = sockets.refused
-        if sockets.send_errors > counters["send_errors"]:
-            text = "the system refuses to send to the board"
-            self._node.log.warning(text, count=sockets.send_errors, error=sockets.last_error)
-            counters["send_errors"] = sockets.send_errors
 
     # --- the end ------------------------------------------------------------------------------
 

@@ -28,11 +28,9 @@ import select
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from types import FrameType
-
-from msgspec import Struct
 
 from common import child_process, clock
 from common.child_process import Backoff
@@ -50,29 +48,9 @@ START_BRAKES_MAX = 200
 EXIT_BRAKES_MAX = 20  # BRAKEs after the bridge closed its pipe, until it is killed
 NOT_STARTED = 1  # exit code when the bridge could not be started
 STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
-NAME = "T2_BRIDGE_HANDOVER"  # environment variable with the inherited descriptors
-
-
-class Inherited(Struct, frozen=True):
-    """File descriptors that the bridge inherits from its guard."""
-
-    sockets: tuple[int, ...]  # in the order of ``board.listen_ports``
-    heartbeat: int  # write end of the pipe
-
-    @property
-    def descriptors(self) -> tuple[int, ...]:
-        """All descriptors."""
-        return *self.sockets, self.heartbeat
-
-    def environ(self) -> dict[str, str]:
-        """Return the environment variable that lists them."""
-        return {NAME: ",".join(map(str, self.descriptors))}
-
-
-def inherited(environ: Mapping[str, str]) -> Inherited:
-    """Read the inherited descriptors from the environment; KeyError without a guard."""
-    *sockets, heartbeat = map(int, environ[NAME].split(","))
-    return Inherited(tuple(sockets), heartbeat)
+# Environment variable: the descriptors of the sockets, in the order of ``board.listen_ports``, and
+# of the write end of the pipe.
+NAME = "T2_BRIDGE_HANDOVER"
 
 
 class Heartbeat:
@@ -150,13 +128,13 @@ class Guard:
         self._child = None
         heartbeat, to_guard = os.pipe()
         try:
-            given = Inherited(tuple(s.fileno() for s in self._sockets.sockets), to_guard)
+            given = (*(sock.fileno() for sock in self._sockets.sockets), to_guard)
             # Own session: ctrl-c reaches only the guard, which passes it on once; a kill of the
             # guard's session spares the bridge, which stops the vehicle.
             self._child = subprocess.Popen(
                 self._command,
-                env=child_process.environ() | given.environ(),
-                pass_fds=given.descriptors,
+                env=child_process.environ() | {NAME: ",".join(map(str, given))},
+                pass_fds=given,
                 start_new_session=True,
             )
         except BaseException:

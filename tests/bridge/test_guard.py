@@ -24,7 +24,7 @@ from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
 from services.bridge import bridge as child
 from services.bridge.config import BridgeConfig
-from services.bridge.guard import Guard, Heartbeat, Inherited, inherited
+from services.bridge.guard import Guard, Heartbeat
 from services.bridge.udp import Sockets
 from tests.bridge.bridge_fixture import (
     PROC,
@@ -273,12 +273,6 @@ def pipe() -> Iterator[tuple[int, int]]:
     for descriptor in (out, into):
         with contextlib.suppress(OSError):
             os.close(descriptor)
-
-
-@pytest.mark.parametrize("given", [Inherited((3, 4), 5), Inherited((7,), 6)])
-def test_the_child_gets_what_the_parent_leaves_open(given: Inherited) -> None:
-    assert inherited(given.environ()) == given
-    assert given.descriptors == (*given.sockets, given.heartbeat)
 
 
 def test_a_beat_names_the_port_and_the_end_is_final(pipe: tuple[int, int]) -> None:

@@ -5,25 +5,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
-from common.wire.frame import Frame
-from common.wire.reports import BumperReport, DriverReport, LedReport, VelocityReport
-from services.bridge.core.ports import Ports
+from common.wire.reports import BumperReport, VelocityReport
+from services.bridge.core.ports import Ports, Stream
 
 MS = NS_PER_S // 1000
 FAILOVER = 100 * MS
-RATES: dict[type[Frame], float] = {BumperReport: 50.0, DriverReport: 2.0}
 
 
 def ports(count: int = 2) -> Ports:
-    return Ports(count, FAILOVER, RATES, NS_PER_S)
+    return Ports(count, FAILOVER, NS_PER_S)
 
 
 @pytest.mark.parametrize("port", [0, 1])
 def test_the_first_frame_of_a_kind_is_taken_from_either_port(port: int) -> None:
     made = ports()
-    assert made.of(BumperReport) is None
     assert made.takes(BumperReport, port, NS_PER_S)
-    assert (made.of(BumperReport), made.by_name()) == (port, {"BumperReport": port})
+    assert made.streams == {BumperReport: Stream(port, NS_PER_S)}
     assert not made.takes(BumperReport, 1 - port, NS_PER_S)
     assert made.takes(BumperReport, port, NS_PER_S)
 
@@ -33,71 +30,56 @@ def test_each_kind_has_a_port_of_its_own() -> None:
     for tick in range(100):
         assert made.takes(VelocityReport, 0, NS_PER_S + tick * 20 * MS)
         assert made.takes(BumperReport, 1, NS_PER_S + tick * 20 * MS)
-    assert made.by_name() == {"VelocityReport": 0, "BumperReport": 1}
-    assert made.main == 0
+    assert [stream.port for stream in made.streams.values()] == [0, 1]
 
 
-@pytest.mark.parametrize(
-    ("kind", "timeout"),
-    [(VelocityReport, FAILOVER), (BumperReport, FAILOVER), (DriverReport, 1250 * MS)],
-)
-def test_the_other_port_takes_over_when_its_kind_is_silent(kind: type[Frame], timeout: int) -> None:
+def test_the_other_port_takes_over_when_its_kind_is_silent() -> None:
     made = ports()
-    made.takes(kind, 0, NS_PER_S)
-    assert not made.takes(kind, 1, NS_PER_S + timeout)
-    assert made.takes(kind, 1, NS_PER_S + timeout + 1)
-    assert made.of(kind) == 1
-    assert not made.takes(kind, 0, NS_PER_S + timeout + 2)
+    made.takes(BumperReport, 0, NS_PER_S)
+    assert not made.takes(BumperReport, 1, NS_PER_S + FAILOVER)
+    assert made.takes(BumperReport, 1, NS_PER_S + FAILOVER + 1)
+    assert not made.takes(BumperReport, 0, NS_PER_S + FAILOVER + 2)
 
 
 def test_an_urgent_frame_is_taken_from_either_port() -> None:
     made = ports()
     made.takes(BumperReport, 0, NS_PER_S)
     assert made.takes(BumperReport, 1, NS_PER_S, urgent=True)
-    assert made.of(BumperReport) == 1
+    assert not made.takes(BumperReport, 0, NS_PER_S)
 
 
-def test_commands_leave_from_where_the_velocity_comes_to() -> None:
+def test_commands_leave_from_the_port_of_the_velocity() -> None:
     made = ports()
     mains = [made.main]
     for kind, port, at_s in (
-        (BumperReport, 1, 1), (VelocityReport, 0, 1), (BumperReport, 1, 1), (VelocityReport, 1, 2),
+        (BumperReport, 1, 1), (VelocityReport, 1, 1),
+        (VelocityReport, 0, 1), (VelocityReport, 0, 2),
     ):  # fmt: skip
         made.takes(kind, port, at_s * NS_PER_S)
         mains.append(made.main)
-    assert mains == [0, 1, 0, 0, 1], "without a velocity from the port of any frame"
+    assert mains == [0, 0, 1, 1, 0]
 
 
 @pytest.mark.parametrize(
-    ("kind", "silent_ns", "port"),
-    [
-        (BumperReport, -1, 1),
-        (BumperReport, 0, 1),
-        (BumperReport, NS_PER_S // 2 - 1, 1),
-        (BumperReport, NS_PER_S // 2, 2),
-        (BumperReport, NS_PER_S, 0),
-        (BumperReport, 3 * NS_PER_S // 2, 1),
-        (DriverReport, 1250 * MS - 1, 0),
-        (DriverReport, 1250 * MS, 1),
-        (LedReport, 9 * NS_PER_S, 1),
-    ],
-)
-def test_a_query_leaves_from_the_port_of_its_answers_and_without_any_from_all_in_turn(
-    kind: type[Frame], silent_ns: int, port: int
+    ("silent_ns", "port"),
+    [(-1, 1), (0, 1), (NS_PER_S // 2 - 1, 1), (NS_PER_S // 2, 2), (NS_PER_S, 0),
+     (3 * NS_PER_S // 2, 1)],
+)  # fmt: skip
+def test_a_query_leaves_from_the_port_of_the_answers_and_without_any_from_all_in_turn(
+    silent_ns: int, port: int
 ) -> None:
     made = ports(3)
-    for received, at in ((VelocityReport, 0), (BumperReport, 1), (DriverReport, 0)):
-        made.takes(received, at, NS_PER_S)
-    assert made.to_ask(kind, NS_PER_S + silent_ns) == port
+    made.takes(VelocityReport, 0, NS_PER_S)
+    made.takes(BumperReport, 1, NS_PER_S)
+    assert made.to_ask(NS_PER_S + silent_ns) == port
 
 
-def test_what_was_never_answered_is_asked_from_the_main_port_first() -> None:
+def test_before_any_answer_the_port_of_the_commands_comes_first() -> None:
     made = ports()
     made.takes(VelocityReport, 1, NS_PER_S)
-    turns = [made.to_ask(BumperReport, NS_PER_S + at * 250 * MS) for at in range(6)]
+    turns = [made.to_ask(NS_PER_S + at * 250 * MS) for at in range(6)]
     assert turns == [1, 1, 0, 0, 1, 1]
-    assert made.to_ask(LedReport, 9 * NS_PER_S) == 1
-    assert ports(count=1).to_ask(BumperReport, 9 * NS_PER_S) == 0
+    assert ports(count=1).to_ask(9 * NS_PER_S) == 0
 
 
 @pytest.mark.parametrize(

@@ -48,16 +48,12 @@ Handler = Callable[[Any, bytes, int], Outputs]  # frame, raw bytes, receive time
 # The lease, the silence of the board and the guard's patience are ten ticks each.
 TICK_MAX_S = 0.02
 LINK_NS = NS_PER_S * 19 // 100  # half a tick less than 0.2 s: the tick that is due may come early
-ECHO_HZ = 5.0
 STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
 ASKED: dict[str, type[Frame]] = {
     "bumper": reports.BumperReport,
     "mileage": reports.DistanceReport,
     "ultrasonic": reports.UltrasonicReport,
 }
-ANSWERS = {kind.frame.ID: kind.frame for kind in reports.FROM_BOARD.values()}
-# Continuous frames: a change of their port is an event.
-CONTINUOUS = frozenset((reports.VelocityReport, *ASKED.values(), reports.DriverReport))
 
 
 def queries(settings: Settings) -> list[tuple[str, Frame, float]]:
@@ -74,14 +70,6 @@ def queries(settings: Settings) -> list[tuple[str, Frame, float]]:
 def tick_s(settings: Settings) -> float:
     """Return the period of the tick in seconds: each query finds its tick."""
     return min(TICK_MAX_S, *(1 / rate_hz for _, _, rate_hz in queries(settings)))
-
-
-def ports_of(config: BridgeConfig, now_ns: int) -> Ports:
-    """Return the port selection, with the poll rate of each kind of frame."""
-    rates_hz = {ANSWERS[frame.ID]: rate_hz for _, frame, rate_hz in queries(config.bridge)}
-    rates_hz[reports.UltrasonicBrakeReport] = rates_hz[reports.BumperBrakeReport] = ECHO_HZ
-    failover_ns = round(config.bridge.failover * NS_PER_S)
-    return Ports(len(config.board.listen_ports), failover_ns, rates_hz, now_ns)
 
 
 class Core:
@@ -102,7 +90,8 @@ class Core:
         )
         self.readiness = readiness = Readiness(settings, config.board)
         self._calls = Calls(readiness, settings.echo_timeout, self._ask)
-        self._ports = ports_of(config, now_ns)
+        failover_ns = round(settings.failover * NS_PER_S)
+        self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
         self._polling = Polling(
             queries(settings), settings.answer_timeout, STEADY, tick_s(settings)
         )
@@ -163,13 +152,11 @@ class Core:
 
     def _on_frame(self, part: Received, port: int, now_ns: int) -> Outputs:
         frame, kind = part.frame, type(part.frame)
-        before = self._ports.of(kind)
         if not self._ports.takes(kind, port, now_ns, urgent=self._is_urgent(frame)):
             self._counters["other_port"] += 1
             if frame == self._hit.frame:
                 self._bumper.take(True)  # clear samples count only if neither port shows a hit
             return
-        self.motions.port = self._ports.main
         try:
             yield from self._handlers[kind](frame, part.raw, now_ns)
         except WireError:
@@ -179,10 +166,11 @@ class Core:
         yield from self.readiness.on_frame(now_ns)
         if not self.readiness.ready:
             self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
-        if before not in (None, port) and kind in CONTINUOUS:
+        if self.motions.port != self._ports.main:
+            self.motions.port = self._ports.main
             number = self._config.board.listen_ports[port]
-            text = f"{kind.__name__} is now taken from UDP port {number}"
-            yield Event("port_changed", "warning", text, {"port": number, "frame": kind.__name__})
+            text = f"commands leave from UDP port {number} now: the velocity comes to it"
+            yield Event("port_changed", "warning", text, {"port": number})
 
     def _is_urgent(self, frame: Frame) -> bool:
         """Return whether a frame counts from either port: a new hit or fault, or a brake as off."""
@@ -297,9 +285,8 @@ class Core:
             yield Publish("link", self.link(now_ns))
 
     def _ask(self, frame: Frame, now_ns: int) -> Send:
-        """Return a query or a setting, from the port that receives its answers."""
-        port = self._ports.to_ask(ANSWERS[frame.ID], now_ns)
-        return Send(self._framing.pack(frame), port)
+        """Return a query or a setting, from the port that receives answers."""
+        return Send(self._framing.pack(frame), self._ports.to_ask(now_ns))
 
     def second(self) -> Outputs:
         """Update the rates and counters of the last second; publish the brakes."""
@@ -323,7 +310,7 @@ class Core:
         """Return the link message: rates, rejected frames, and why a RUN would be refused."""
         self._linked, self._linked_ns = self._link_state(now_ns), now_ns
         waiting = self._waiting(now_ns)
-        board = self._config.board
+        board, streams = self._config.board, self._ports.streams
         return m.Link(
             state=self.readiness.link,
             board=f"{board.address}:{board.port}",
@@ -334,7 +321,7 @@ class Core:
             rejected={reason: count for reason, count in self.rejected.items() if count},
             round_trip=self._polling.round_trip_s(),
             latched_by=self.motions.lease.latched_by,
-            ports={name: board.listen_ports[port] for name, port in self._ports.by_name().items()},
+            ports={k.__name__: board.listen_ports[each.port] for k, each in streams.items()},
             send_errors=self._counters["send_errors"],
             relay=self.readiness.relay.message(),
             estop=self.motions.lease.estop,
