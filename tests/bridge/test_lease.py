@@ -89,18 +89,18 @@ def test_at_first_no_one_may_drive() -> None:
         (NOT_NEUTRAL, run(0.0, 0.0), RUN, None),
         (NOT_NEUTRAL, brake(), BRAKE, None),
         # an emergency stop that safety has not latched: BRAKE, whatever is commanded
-        (STOPPED, run(), BRAKE, Refusal.NOT_ACKED),
-        (STOPPED, run(estop=NOW - 1), BRAKE, Refusal.NOT_ACKED),
+        (STOPPED, run(), BRAKE, Refusal.ESTOP),
+        (STOPPED, run(estop=NOW - 1), BRAKE, Refusal.ESTOP),
         (STOPPED, run(estop=NOW), RUN, None),
         (STOPPED, stop(), BRAKE, None),
         # a hit that safety has not acknowledged: likewise
-        (HIT, run(), BRAKE, Refusal.NOT_ACKED),
+        (HIT, run(), BRAKE, Refusal.HIT),
         (HIT, stop(), BRAKE, None),
         (HIT, brake(), BRAKE, None),
-        (HIT, run(judged=4, judged_boot=OWN_BOOT), BRAKE, Refusal.NOT_ACKED),
+        (HIT, run(judged=4, judged_boot=OWN_BOOT), BRAKE, Refusal.HIT),
         (HIT, run(judged=5, judged_boot=OWN_BOOT), RUN, None),
         (HIT, run(judged=6, judged_boot=OWN_BOOT), RUN, None),
-        (HIT, run(judged=9, judged_boot=OWN_BOOT + 1), BRAKE, Refusal.NOT_ACKED),
+        (HIT, run(judged=9, judged_boot=OWN_BOOT + 1), BRAKE, Refusal.HIT),
         # seq must rise
         (ARMED, run(seq=10), None, Refusal.OLD),
         (ARMED, run(seq=9), None, Refusal.OLD),
@@ -110,8 +110,8 @@ def test_at_first_no_one_may_drive() -> None:
         (ARMED, run(0.0, float("inf")), None, Refusal.NOT_FINITE),
         (ARMED, replace(brake(), linear=float("nan")), BRAKE, None),
         # the vehicle moved without a command: BRAKE until safety has latched that
-        (MOVED, run(), BRAKE, Refusal.NOT_LATCH_OWNER),
-        (MOVED, run(0.0, 0.0), BRAKE, Refusal.NOT_LATCH_OWNER),
+        (MOVED, run(), BRAKE, Refusal.UNCOMMANDED),
+        (MOVED, run(0.0, 0.0), BRAKE, Refusal.UNCOMMANDED),
         (MOVED, stop(), BRAKE, None),
         (MOVED, brake(), BRAKE, None),
         (MOVED, taking_on(brake(), None), BRAKE, None),
@@ -121,7 +121,7 @@ def test_at_first_no_one_may_drive() -> None:
         (MOVED, taking_on(stop(), OWN_BOOT), STOP, None),
         (MOVED, taking_on(brake(), OWN_BOOT), BRAKE, None),
         (MOVED, taking_on(run(), OWN_BOOT), RUN, None),
-        (replace(MOVED, hit=5), run(), BRAKE, Refusal.NOT_ACKED),
+        (replace(MOVED, hit=5), run(), BRAKE, Refusal.HIT),
         (replace(MOVED, hit=5), stop(), BRAKE, None),
         # a latch: its own authority may creep, another must take it over
         (replace(ARMED, latched_by=1), run(), RUN, None),
@@ -385,7 +385,7 @@ class Events(RuleBasedStateMachine):
         if order is RUN and motion.linear:
             assert before.ready
             assert before.neutral
-            assert self.lease.acked
+            assert self.lease.hit is self.lease.estop is None
             assert not self.lease.uncommanded
             assert motion.boot == self.lease.boot
             assert self.lease.latched_by in (None, motion.boot)

@@ -2,28 +2,27 @@
 
 The board has no documented watchdog, so it must never hold a RUN that no running service renews. A
 motion message becomes one frame at once and is valid for the lease. A RUN is obeyed only while all
-of these conditions hold; otherwise STOP is sent instead:
+of these conditions hold. Without one of the first three BRAKE is sent instead, otherwise STOP:
 
 ============ =============================== =================================================
 condition    lost by                         regained by
 ============ =============================== =================================================
-ready        link lost, switches unverified, both emergency switches on and echoed
+estop        an emergency stop: BRAKE at     a motion message whose ``estop`` names that stop: a
+             once                            safety that hangs or restarts does not lose it
+hit          a bumper hit (the reflex: BRAKE a motion message whose ``judged`` covers that hit:
+             at once)                        a RUN that was already sent must not undo the BRAKE
+uncommanded  leaving a standstill while the  a motion message with safety's latch for this:
+             lease was over: BRAKE at once   its ``predecessor`` is the bridge itself
+latch owner  an authority that ended with a  its successor has latched in its place, and names
+             latch that was not reset        the owner of that latch in ``predecessor``
+ready        link lost, brakes unverified,   both emergency brakes on and echoed
              board restarted, stopping
 neutral      start, not ready, lease over,   a STOP, BRAKE or RUN of 0 from the authority, while
              a new authority                 ready: no motion on reconnect alone
-acked        a bumper hit (the reflex: BRAKE a motion message whose ``judged`` covers that hit:
-             at once)                        a RUN that was already sent must not undo the BRAKE
-latched      an emergency stop: BRAKE at     a motion message whose ``estop`` names that stop: a
-             once                            safety that hangs or restarts does not lose it
-standstill   0.05 m or 0.05 rad away from a  a motion message with safety's latch for this:
-             standstill while the lease was  its ``predecessor`` is the bridge itself
-             over: BRAKE at once
-latch owner  an authority that ended with a  its successor has latched in its place, and names
-             latch that was not reset        the owner of that latch in ``predecessor``
 ============ =============================== =================================================
 
 When the lease is over: STOP at once and then at 25 Hz, and BRAKE from ``coast_ns`` on while the
-vehicle is not known to be at standstill (``standstill`` defines that time). BRAKE continues if it
+vehicle is not known to be at standstill (``motion_output`` defines that time). BRAKE continues if it
 was the authority's last order. The authority is identified by the ``boot`` of the sender; until its
 lease is over, others are refused.
 
@@ -53,14 +52,27 @@ AT_ONCE = -STOP_PERIOD_NS  # a send time so old that the next STOP is due
 class Refusal(StrEnum):
     """Why a motion message, or its RUN, was refused."""
 
+    NOT_FINITE = "not_finite"
     SECOND_AUTHORITY = "second_authority"
     OLD = "seq_not_rising"
-    NOT_FINITE = "not_finite"
     LATE = "too_late"
+    ESTOP = "estop_not_latched"
+    HIT = "hit_not_judged"
+    UNCOMMANDED = "uncommanded_motion"
+    NOT_LATCH_OWNER = "latch_not_taken_on"
     NOT_READY = "not_ready"
     NOT_NEUTRAL = "waiting_for_neutral"
-    NOT_ACKED = "hit_not_judged"
-    NOT_LATCH_OWNER = "latch_not_taken_on"
+
+
+BRAKING = (Refusal.ESTOP, Refusal.HIT, Refusal.UNCOMMANDED)  # BRAKE, whatever is commanded
+WAITING = {
+    Refusal.ESTOP: "safety has not acknowledged the emergency stop",
+    Refusal.HIT: "safety has not acknowledged the bumper hit",
+    Refusal.UNCOMMANDED: "the vehicle moved without a command: safety has not latched that yet",
+    Refusal.NOT_LATCH_OWNER: "safety has not taken over the latch of its predecessor",
+    Refusal.NOT_READY: "the board is not ready",
+    Refusal.NOT_NEUTRAL: "waiting for a neutral motion from safety",
+}
 
 
 class Lease(Struct, frozen=True):
@@ -81,30 +93,27 @@ class Lease(Struct, frozen=True):
     uncommanded: bool = False  # moved from standstill; safety has not latched it yet
 
     @property
-    def braking(self) -> bool:
-        """Whether BRAKE continues, even at standstill."""
-        return not self.acked or self.uncommanded or self.braked
+    def missing(self) -> Refusal | None:
+        """The first condition for a RUN that is not met."""
+        unmet = {
+            Refusal.ESTOP: self.estop is not None,
+            Refusal.HIT: self.hit is not None,
+            Refusal.UNCOMMANDED: self.uncommanded,
+            Refusal.NOT_LATCH_OWNER: self.latched_by not in (None, self.boot),
+            Refusal.NOT_READY: not self.ready,
+            Refusal.NOT_NEUTRAL: not self.neutral,
+        }
+        return next((refusal for refusal, missing in unmet.items() if missing), None)
 
     @property
-    def acked(self) -> bool:
-        """Whether safety has acknowledged the last hit and the last emergency stop."""
-        return self.hit is None and self.estop is None
+    def braking(self) -> bool:
+        """Whether BRAKE continues, even at standstill."""
+        return self.braked or self.missing in BRAKING
 
     @property
     def waiting(self) -> str:
         """Why a RUN would be refused, as text; empty if it would be obeyed."""
-        if not self.ready:
-            return "the board is not ready"
-        if not self.acked:
-            what = "bumper hit" if self.estop is None else "emergency stop"
-            return f"safety has not acknowledged the {what}"
-        if self.uncommanded:
-            return "the vehicle moved without a command: safety has not latched that yet"
-        if self.latched_by not in (None, self.boot):
-            return "safety has not taken over the latch of its predecessor"
-        if not self.neutral:
-            return "waiting for a neutral motion from safety"
-        return ""
+        return WAITING[self.missing] if self.missing else ""
 
 
 def on_motion(
@@ -159,18 +168,15 @@ def _latched_by(lease: Lease, motion: Motion) -> int | None:
 
 
 def _order(lease: Lease, motion: Motion) -> tuple[Command, Refusal | None]:
-    if not lease.acked or lease.uncommanded:
-        refusal = Refusal.NOT_LATCH_OWNER if lease.acked else Refusal.NOT_ACKED
-        return BRAKE, refusal if motion.command is RUN else None
+    """Return what is sent for a motion of the authority, and why its RUN is not."""
+    missing = lease.missing
+    if missing in BRAKING:
+        return BRAKE, missing if motion.command is RUN else None
     if motion.command is not RUN:
         return motion.command, None
-    if lease.latched_by not in (None, motion.boot):
-        return STOP, Refusal.NOT_LATCH_OWNER
-    if not lease.ready:
-        return STOP, Refusal.NOT_READY
-    if not (lease.neutral or is_neutral(motion)):
-        return STOP, Refusal.NOT_NEUTRAL
-    return RUN, None
+    if missing is None or (missing is Refusal.NOT_NEUTRAL and is_neutral(motion)):
+        return RUN, None
+    return STOP, missing
 
 
 def on_hit(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
