@@ -228,6 +228,20 @@ def test_a_board_that_restarts_disarms_at_once(echoes: bool) -> None:
     assert bench.link().epoch == published(bench.outputs, "mileage")[-1].epoch == 1
 
 
+def test_a_board_that_was_silent_needs_its_brakes_echoed_and_a_neutral_motion(bench: Bench) -> None:
+    bench.arm()
+    bench.move(linear=0.3)
+    bench.now_ns += 201 * MS
+    assert motions(bench.tick(0)) == [MotionKind.STOP]
+    assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
+    bench.receive(STANDS)
+    assert motions(bench.move(linear=0.3)) == motions(bench.move(STOP)) == [MotionKind.STOP]
+    bench.answer(reports.UltrasonicBrakeReport(True), reports.BumperBrakeReport(True))
+    bench.tick(0)
+    assert motions(bench.move(linear=0.3)) == motions(bench.move(STOP)) == [MotionKind.STOP]
+    assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
+
+
 # --- readiness ------------------------------------------------------------------------------------
 
 

@@ -1,7 +1,5 @@
 """However the bridge ends, the board is not left with a RUN: it stops nothing by itself."""
 
-import contextlib
-import os
 import signal
 from collections.abc import Iterator
 
@@ -75,65 +73,3 @@ def test_a_bug_of_ours_leaves_a_break() -> None:
             serve(node)
         made.wait_for(MotionKind.BREAK)
         bridge._sockets.close()  # the end of the process does it otherwise
-
-
-@pytest.mark.usefixtures("_signals")
-@pytest.mark.parametrize("first", ["a bug", "a signal"])
-def test_signals_while_it_leaves_do_not_begin_its_exit_anew(
-    first: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    ended: list[int] = []
-    said: list[str] = []
-    monkeypatch.setattr(os, "_exit", ended.append)
-    sets = ["bus.connect=tcp/127.0.0.1:1"]
-    node = Node("bridge", load(BridgeConfig, Sources(environ={}, sets=sets)))
-
-    def on_exit() -> None:
-        said.append("begun")
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
-            signal.raise_signal(number)
-        said.append("over")
-
-    def begin(_: int) -> None:
-        if first == "a bug":
-            raise ZeroDivisionError
-        signal.raise_signal(signal.SIGINT)
-
-    node.on_exit = on_exit
-    node.loop.every(1.0, begin)
-    with contextlib.suppress(ZeroDivisionError):
-        serve(node)
-    assert said == ["begun", "over"]
-    assert ended == []
-
-
-@pytest.mark.usefixtures("_signals")
-def test_a_second_signal_says_the_last_words_once_and_a_third_changes_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    said: list[str] = []
-    sets = ["bus.connect=tcp/127.0.0.1:1"]
-    node = Node("bridge", load(BridgeConfig, Sources(environ={}, sets=sets)))
-
-    class Ended(BaseException):
-        pass
-
-    def end(code: int) -> None:
-        raise Ended(code)
-
-    def on_exit() -> None:
-        said.append("begun")
-        signal.raise_signal(signal.SIGINT)
-        said.append("over")
-
-    def begin(_: int) -> None:
-        for _ in range(2):
-            signal.raise_signal(signal.SIGTERM)
-
-    monkeypatch.setattr(os, "_exit", end)
-    node.on_exit = on_exit
-    node.loop.every(1.0, begin)
-    with pytest.raises(Ended) as ended:
-        serve(node)
-    assert ended.value.args == (128 + signal.SIGTERM,)
-    assert said == ["begun", "over"]

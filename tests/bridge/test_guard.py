@@ -100,17 +100,6 @@ def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(bridge: Bridg
         )
 
 
-def test_the_next_guard_waits_for_the_ports_of_an_orphan(bridge: BridgeFixture) -> None:
-    bridge.drive()
-    bridge.board.speed_mmps = 500  # the orphan waits for the vehicle to stand
-    bridge.process.kill()
-    with bridge_process(bridge.board, bridge.endpoint) as second:
-        bridge.board.speed_mmps = 0
-        bridge_pid(second)
-        bridge.board.wait_for(MotionKind.STOP)
-        assert second.poll() is None
-
-
 def test_a_second_bridge_is_refused_with_the_port(bridge: BridgeFixture) -> None:
     bridge.board.wait_for(MotionKind.STOP)  # the first one has the ports
     with bridge_process(bridge.board, bridge.endpoint) as second:
@@ -120,21 +109,6 @@ def test_a_second_bridge_is_refused_with_the_port(bridge: BridgeFixture) -> None
     port = bridge.board.ports[0]
     assert f"cannot listen on UDP 127.0.0.1:{port}: another program has it" in said
     assert bridge.process.poll() is None
-
-
-def test_ctrl_c_comes_to_rest_with_stop_and_leaves_no_break(bridge: BridgeFixture) -> None:
-    bridge.drive()
-    count = len(bridge.board.motions)
-    os.kill(bridge.process.pid, signal.SIGINT)
-    assert bridge.process.wait(20) == 0
-    assert breaks_since(bridge.board, count) == 0
-    bridge.board.wait_for(MotionKind.STOP)
-
-
-def test_the_guard_knows_nothing_of_the_bus(bridge: BridgeFixture) -> None:
-    bridge.board.wait_for(MotionKind.STOP)  # the bridge lives
-    assert "zenoh" in (PROC / f"{bridge_pid(bridge.process)}/maps").read_text()
-    assert "zenoh" not in (PROC / f"{bridge.process.pid}/maps").read_text()
 
 
 @contextmanager
@@ -252,15 +226,6 @@ def test_a_bridge_that_cannot_be_started_is_braked_for_and_tried_again(
     breaks = [at for at in made.times if tries[0] < at < tries[3]]
     assert len(breaks) > 20
     assert max(b - a for a, b in itertools.pairwise(breaks)) < 0.3
-
-
-def test_it_brakes_while_it_waits(made: Board) -> None:
-    guard = guard_of(made, "")
-    guard._backoff.after(0.0)
-    count = len(made.motions)
-    guard._await_restart(1, 0.0)
-    guard._sockets.close()
-    wait_until(lambda: breaks_since(made, count) >= 5, "BRAKE at 20 Hz for half a second")
 
 
 # --- the pipe -------------------------------------------------------------------------------------

@@ -22,9 +22,9 @@ neutral      start, not ready, lease over,   a STOP, BRAKE or RUN of 0 from the 
 ============ =============================== =================================================
 
 When the lease is over: STOP at once and then at 25 Hz, and BRAKE from ``coast_ns`` on while the
-vehicle is not known to be at standstill (``motion_output`` defines that time). BRAKE continues if it
-was the authority's last order. The authority is identified by the ``boot`` of the sender; until its
-lease is over, others are refused.
+vehicle is not known to be at standstill (``motion_output`` defines that time). BRAKE continues if
+it was the authority's last order. The authority is identified by the ``boot`` of the sender; until
+its lease is over, others are refused.
 
 The lease counts from reception of a motion, not from its handling: a message that was queued for
 longer than the lease renews nothing and is not obeyed, except a BRAKE.
