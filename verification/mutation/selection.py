@@ -12,6 +12,7 @@ from pathlib import Path
 import grimp
 
 PACKAGES = "cli", "common", "services", "sim", "tests", "verification"
+UNMIRRORED = {"services", "core"}  # folders that the tests do not repeat
 WITH_PROCESSES = {"zenoh", "subprocess"}
 
 Cores = dict[str, list[str]]  # tests of each file
@@ -36,7 +37,9 @@ def cores() -> Cores:
             raise ValueError(f"pyproject.toml: tool.mutants: {pattern} does not exist")
         for path in paths:
             core = module_of(path)
-            folder = ".".join(["tests", *(it for it in path.parts[:-1] if it != "services"), ""])
+            folder = ".".join(
+                ["tests", *(it for it in path.parts[:-1] if it not in UNMIRRORED), ""]
+            )
             found[str(path)] = [
                 f"{test.replace('.', '/')}.py"
                 for test, imported in imports.items()
