@@ -22,7 +22,7 @@ The bytes before the CRC are the same in all frames of a kind: the *opening* ide
 from collections.abc import Callable, Mapping
 from enum import IntEnum
 from struct import Struct
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self, TypeVar
 
 import msgspec
 from msgspec.structs import astuple
@@ -36,6 +36,10 @@ CRC_OFFSET, PAYLOAD_OFFSET = 6, 8
 
 SIGN_BIT = 0x8000
 MAGNITUDE_MAX = 0x7FFF
+SIGNED_15_BITS = (-MAGNITUDE_MAX, MAGNITUDE_MAX)
+
+T = TypeVar("T")
+Limits = Mapping[str, tuple[int, int]]  # lowest and highest value by field
 
 
 def to_sign_magnitude(value: int) -> int:
@@ -53,9 +57,16 @@ def refusal(field: str, value: object, allowed: str) -> WireError:
     return WireError(f"{field} is {value}, allowed is {allowed}")
 
 
-def too_fast(*velocities: int) -> WireError:
-    """Return the error for the velocity that is furthest beyond 15 bits."""
-    return refusal("velocity", max(velocities, key=abs), "-32767..32767")
+def chosen(field: str, value: int, choices: Mapping[int, T], allowed: str) -> T:
+    """Decode a byte that has a few values; raise ``WireError`` for others."""
+    if value not in choices:
+        raise refusal(field, value, allowed)
+    return choices[value]
+
+
+def side_of(value: int) -> "Side":
+    """Decode the side byte of a motor driver frame."""
+    return chosen("motor driver", value, SIDES, "0 left, 1 right")
 
 
 class Side(IntEnum):
@@ -65,11 +76,8 @@ class Side(IntEnum):
     RIGHT = 1
 
 
-def to_side(value: int) -> Side:
-    """Decode the side byte of a motor driver frame."""
-    if value > Side.RIGHT:
-        raise refusal("motor driver", value, "0 left, 1 right")
-    return Side(value)
+# By the byte on the wire; this lookup takes a fifth of ``Side(value)``.
+SIDES = {side.value: side for side in Side}
 
 
 class Frame(msgspec.Struct, frozen=True, gc=False):
@@ -77,10 +85,16 @@ class Frame(msgspec.Struct, frozen=True, gc=False):
 
     ID: ClassVar[int] = 0  # placeholder; no frame has this id
     LAYOUT: ClassVar[Struct] = Struct("<")
+    LIMITS: ClassVar[Limits] = {}
     OPENING: ClassVar[bytes]  # of its header
 
     def __init_subclass__(cls) -> None:
         cls.OPENING = OPENING.pack(MAGIC, HEADER.size + cls.LAYOUT.size, cls.ID)
+
+    def __post_init__(self) -> None:
+        for field, (lowest, highest) in self.LIMITS.items():
+            if not lowest <= getattr(self, field) <= highest:
+                raise refusal(field, getattr(self, field), f"{lowest}..{highest}")
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
@@ -102,10 +116,7 @@ class Switch(Frame, frozen=True):
     @classmethod
     def from_wire(cls, values: tuple[int, ...]) -> Self:
         """Decode its byte; raise ``WireError`` for values other than 0 and 1."""
-        (value,) = values
-        if value > 1:
-            raise refusal(cls.__name__, value, "0 or 1")
-        return cls(value == 1)
+        return cls(chosen(cls.__name__, values[0], {0: False, 1: True}, "0 or 1"))
 
 
 class Kind(NamedTuple):

@@ -1,0 +1,201 @@
+"""Frames byte for byte, both ways; the values that they refuse to hold."""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from struct import Struct
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from common.errors import WireError
+from common.wire import commands as c
+from common.wire import reports as r
+from common.wire.frame import Frame, Side, by_opening, from_sign_magnitude, to_sign_magnitude
+from common.wire.framing import Framing, Received
+from verification.harness.frame_strategies import COMMANDS, REPORTS, made, read_all
+
+# As the public driver of this vehicle sends them.
+GOLDEN = json.loads((Path(__file__).parent / "frames.json").read_text(encoding="utf-8"))
+BY_NAME = {each["name"]: each for each in GOLDEN["pc_to_board"]}
+RUN = partial(c.MotionCommand, c.MotionKind.RUN)
+
+
+def frame_of(each: dict[str, Any]) -> Frame:
+    """Build the frame that a golden line describes."""
+    if "cmd" in each:
+        return c.MotionCommand(c.MotionKind(each["cmd"]), each["linear_mmps"], each["angular_raw"])
+    if "side" in each:
+        return c.DriverQuery(Side(each["side"]))
+    if "fields" in each:
+        return c.LedSet(*each["fields"])
+    frames: dict[str, Frame] = {
+        "query distance": c.DistanceQuery(),
+        "query ultrasonic": c.UltrasonicQuery(),
+        "query bumper": c.BumperQuery(),
+        "set bumper brake on": c.BumperBrakeSet(True),
+    }
+    return frames[each["name"]]
+
+
+@pytest.mark.parametrize("name", BY_NAME)
+def test_golden_bytes_both_ways(name: str) -> None:
+    each = BY_NAME[name]
+    frame, raw = frame_of(each), bytes.fromhex(each["hex"])
+    framing = Framing()
+    assert framing.pack(frame) == raw
+    assert read_all(framing, raw, c.TO_BOARD) == [Received(frame, raw)]
+
+
+def test_the_golden_bytes_name_their_source() -> None:
+    assert "public ROS 1 driver" in GOLDEN["source"]
+    assert len(BY_NAME) == 11
+
+
+@pytest.mark.parametrize(
+    ("frame", "payload"),
+    [
+        (c.MotionCommand(c.MotionKind.STOP), "0000000000"),
+        (RUN(500, -32767), "01f401ffff"),
+        (c.DistanceQuery(), ""),
+        (c.UltrasonicBrakeSet(True), "01"),
+        (c.UltrasonicBrakeSet(False), "00"),
+        (c.DriverQuery(Side.RIGHT), "01"),
+        (c.LedSet(0, 0, 10, 255, 0, 0, 0, 0, 0), "00000aff0000000000"),
+        (r.VelocityReport(500, -300), "f4012c81"),
+        (r.VelocityReport(-1, 1), "01800100"),
+        (r.DistanceReport(1, -1), "01000000ffffffff"),
+        (r.DistanceReport(-(2**31), -1800), "00000080f8f8ffff"),
+        (r.DistanceReport(2**31 - 1, 1800), "ffffff7f08070000"),
+        (
+            r.UltrasonicReport((1, 2, 3, 4, 5, 6, 7, r.SONAR_FAULT_MM)),
+            "0100020003000400050006000700ffff",
+        ),
+        (r.BumperReport(True), "01"),
+        (r.UltrasonicBrakeReport(False), "00"),
+        (r.BumperBrakeReport(True), "01"),
+        (r.DriverReport(Side.RIGHT, 0x80000010), "0110000080"),
+        (r.LedReport(True), "55"),
+        (r.LedReport(False), "aa"),
+    ],
+)
+def test_payloads_both_ways(frame: Frame, payload: str) -> None:
+    raw = bytes.fromhex(payload)
+    assert frame.to_bytes() == raw
+    assert made(type(frame), raw) == frame
+
+
+@pytest.mark.parametrize(("byte", "pressed"), [(0, False), *((b, True) for b in range(1, 256))])
+def test_every_bumper_byte_but_zero_is_pressed(byte: int, pressed: bool) -> None:
+    assert made(r.BumperReport, bytes((byte,))) == r.BumperReport(pressed)
+
+
+@pytest.mark.parametrize(
+    ("value", "raw"),
+    [(0, 0x0000), (1, 0x0001), (-1, 0x8001), (32767, 0x7FFF), (-32767, 0xFFFF), (-500, 0x81F4)],
+)
+def test_sign_and_magnitude(value: int, raw: int) -> None:
+    assert to_sign_magnitude(value) == raw
+    assert from_sign_magnitude(raw) == value
+
+
+def test_minus_zero_is_read_as_zero() -> None:
+    assert made(r.VelocityReport, bytes.fromhex("00800080")) == r.VelocityReport(0, 0)
+    assert made(c.MotionCommand, bytes.fromhex("0100800080")) == RUN(0, 0)
+
+
+@given(st.integers(-32767, 32767))
+def test_minus_zero_is_never_sent(value: int) -> None:
+    assert to_sign_magnitude(value) != 0x8000
+    assert from_sign_magnitude(to_sign_magnitude(value)) == value
+
+
+# --- refusals -----------------------------------------------------------------------------------
+
+LED = [0] * 9
+REFUSED: list[tuple[Callable[[], Frame], str]] = [
+    *(
+        (partial(make, *values), f"{field} is {value}, allowed is -32767..32767")
+        for make in (r.VelocityReport, RUN)
+        for value in (32768, -32768, 10**9)
+        for field, values in (("linear_mmps", (value, 0)), ("angular_raw", (0, value)))
+    ),
+    *(
+        (partial(c.LedSet, *LED[:n], value, *LED[n + 1 :]), f"{name} is {value}, allowed is 0..")
+        for n, name in enumerate(c.LedSet.__struct_fields__)
+        for value in (-1, 256)
+    ),
+    (partial(c.LedSet, 0, 0, 11, 0, 0, 0, 0, 0, 0), "on_lightness is 11, allowed is 0..10"),
+    *(
+        (partial(r.DistanceReport, mm, 0), f"distance_mm is {mm}, allowed is -2147483648..21474836")
+        for mm in (2**31, -(2**31) - 1)
+    ),
+    *(
+        (partial(r.DistanceReport, 0, n), f"heading_ddeg is {n}, allowed is -1800..1800")
+        for n in (1801, -1801)
+    ),
+    *(
+        (partial(r.UltrasonicReport, some), f"ranges_mm is {some}, allowed is 8 of 0..65535")
+        for some in ((0,) * 7, (0,) * 9, (*(0,) * 7, -1), (*(0,) * 7, 0x10000))
+    ),
+    *(
+        (partial(r.DriverReport, Side.LEFT, n), f"fault_bits is {n}, allowed is 0..4294967295")
+        for n in (-1, 2**32)
+    ),
+    # From the wire.
+    *(
+        (partial(made, c.MotionCommand, bytes([kind, 0, 0, 0, 0])),
+         f"motion command is {kind}, allowed is 0 STOP, 1 RUN, 2 BREAK")
+        for kind in (3, 0x80, 255)
+    ),
+    *(
+        (partial(made, kind, bytes([value])), f"{kind.__name__} is {value}, allowed is 0 or 1")
+        for kind in (c.BumperBrakeSet, r.UltrasonicBrakeReport)
+        for value in (2, 0x80, 255)
+    ),
+    (partial(made, c.DriverQuery, b"\2"), "motor driver is 2, allowed is 0 left, 1 right"),
+    (partial(made, r.DriverReport, b"\2" + bytes(4)), "motor driver is 2, allowed is 0 left, 1 r"),
+    *(
+        (partial(made, r.LedReport, bytes([n])), f"LED answer is {n}, allowed is 85 done, 170 fail")
+        for n in (0x00, 0x01, 0x54, 0xFF)
+    ),
+    (partial(made, r.DistanceReport, r.DistanceReport.LAYOUT.pack(0, 1801)), "heading_ddeg is"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "text"), REFUSED)
+def test_what_the_wire_cannot_carry_is_refused(make: Callable[[], Frame], text: str) -> None:
+    with pytest.raises(WireError) as refused:
+        make()
+    assert str(refused.value).startswith(text)
+
+
+# --- the tables of frames -----------------------------------------------------------------------
+
+
+def test_a_frame_begins_with_magic_size_and_id() -> None:
+    class Odd(Frame, frozen=True):
+        ID = 0x1234
+        LAYOUT = Struct("<BHH")
+
+    assert Odd.OPENING == b"GS\x0d\x00\x34\x12"
+
+
+def test_a_table_finds_a_frame_by_its_opening() -> None:
+    table = by_opening(c.DriverQuery, c.DistanceQuery)
+    assert [(kind.frame, kind.size) for kind in table.values()] == [
+        (c.DriverQuery, 9),
+        (c.DistanceQuery, 8),
+    ]
+    kind = table[b"GS\x09\x00\x05\x76"]
+    assert kind.from_wire(kind.unpack(b"\x01")) == c.DriverQuery(Side.RIGHT)
+
+
+def test_both_directions_know_the_same_eight_ids() -> None:
+    ids = {0x7426, 0x7600, 0x7601, 0x7602, 0x7603, 0x7604, 0x7605, 0x7503}
+    for kinds, frames in (c.TO_BOARD, COMMANDS), (r.FROM_BOARD, REPORTS):
+        assert {kind.frame.ID for kind in kinds.values()} == ids
+        assert {type(frame) for frame in frames} == {kind.frame for kind in kinds.values()}
