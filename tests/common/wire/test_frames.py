@@ -115,7 +115,12 @@ def test_minus_zero_is_never_sent(value: int) -> None:
 
 # --- refusals -----------------------------------------------------------------------------------
 
-LED = [0] * 9
+
+def lamp(field: int, value: int) -> Frame:
+    """Build the frame of a lamp with zeros in its other fields."""
+    return c.LedSet(*(value if n == field else 0 for n in range(9)))
+
+
 REFUSED: list[tuple[Callable[[], Frame], str]] = [
     *(
         (partial(make, *values), f"{field} is {value}, allowed is -32767..32767")
@@ -124,11 +129,11 @@ REFUSED: list[tuple[Callable[[], Frame], str]] = [
         for field, values in (("linear_mmps", (value, 0)), ("angular_raw", (0, value)))
     ),
     *(
-        (partial(c.LedSet, *LED[:n], value, *LED[n + 1 :]), f"{name} is {value}, allowed is 0..")
+        (partial(lamp, n, value), f"{name} is {value}, allowed is 0..")
         for n, name in enumerate(c.LedSet.__struct_fields__)
         for value in (-1, 256)
     ),
-    (partial(c.LedSet, 0, 0, 11, 0, 0, 0, 0, 0, 0), "on_lightness is 11, allowed is 0..10"),
+    (partial(lamp, 2, 11), "on_lightness is 11, allowed is 0..10"),
     *(
         (partial(r.DistanceReport, mm, 0), f"distance_mm is {mm}, allowed is -2147483648..21474836")
         for mm in (2**31, -(2**31) - 1)
