@@ -6,6 +6,9 @@ REPLACED = {
         f"{section}.i_accept": f"{section}.unsafe_overrides"
         for section in ("safety", "bridge", "board", "bus", "teleop", "metrics")
     },
+    "teleop.turbo_linear": "gear 5 of teleop.gears_linear",
+    "teleop.turbo_angular": "gear 5 of teleop.gears_angular",
+    "teleop.turbo_button": "the gears",
 }
 CONSTANT = {
     "ros2.odom_rate": "25 Hz",

@@ -154,7 +154,8 @@ class TeleopApp(App[None]):
 
     def on_app_blur(self) -> None:
         """Release the controls when the terminal loses the focus, and with it the key repeats."""
-        self._post(self._controller.release_controls)
+        now_ns = self._clock()
+        self._post(lambda: self._controller.release_controls(now_ns))
 
     def action_leave(self) -> None:
         """Request the final zeros; ``draw`` exits after them. A second call exits at once."""

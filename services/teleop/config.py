@@ -23,8 +23,6 @@ class Teleop(settings.ProtectedSection, frozen=True, kw_only=True):
     source: SourceName = "teleop"  # the name to drive under; safety knows its priority
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
-    turbo_linear: Speed = 1.0  # m/s
-    turbo_angular: Speed = 1.0  # rad/s
     hold_first: Hold = 0.6  # s that a tap drives: most terminals send the first repeat after ~0.5 s
     hold: Hold = 0.3  # s that a repeat drives
     round_trip: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15  # s; slower: no driving keys
@@ -35,7 +33,6 @@ class Teleop(settings.ProtectedSection, frozen=True, kw_only=True):
     linear_axis: Index = 1  # left stick, up and down
     angular_axis: Index = 3  # right stick, left and right
     deadman_button: Index = 4  # left shoulder
-    turbo_button: Index = 5  # right shoulder
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -47,8 +44,6 @@ class Teleop(settings.ProtectedSection, frozen=True, kw_only=True):
             raise ValueError(f"hold {self.hold} s must not exceed hold_first {self.hold_first} s")
         if self.linear_axis == self.angular_axis:
             raise ValueError(f"linear_axis and angular_axis are both {self.linear_axis}")
-        if self.deadman_button == self.turbo_button:
-            raise ValueError(f"deadman_button and turbo_button are both {self.deadman_button}")
 
 
 class TeleopConfig(settings.Shared, frozen=True, kw_only=True):

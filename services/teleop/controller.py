@@ -1,65 +1,84 @@
 """Controller of teleop: combines keys, gamepad and bus in the node's loop.
 
 The screen runs in another thread. It posts key presses to this loop and reads ``view``. A slow
-terminal can therefore delay a key, but never a zero request.
+terminal can therefore delay a key, but never a zero request. ``Controls`` decides what counts.
 """
+
+from functools import partial
+from typing import Any
+
+from msgspec.structs import replace
 
 from common import clock, keys
 from common.bus.bus import Arrival
-from common.freshness import NS_PER_S
-from common.messages import Event, SafetyState
-from common.operator import Contest, EstopRepetition, EstopStep, Request
+from common.freshness import NS_PER_S, Latest, fresh
+from common.messages import Event, ResetDone, SafetyState
+from common.operator import (
+    Contest,
+    EstopRepetition,
+    EstopStep,
+    Request,
+    ResetCheck,
+    no_answer,
+    not_allowed,
+    reset_request,
+)
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
-from services.teleop.controls import DIRECTIONS, RELEASE, STOP, Controls, Deflection, Stick, twist
+from services.teleop.core.controls import Action, Controls, Stick
 from services.teleop.core.hold import Press
-from services.teleop.core.round_trip import ADVICE, RoundTrip
-from services.teleop.gamepad import Gamepad, NoGamepad
-from services.teleop.operator_calls import OperatorCalls
-from services.teleop.view import LINES, EventLog, LatestTopic, View
+from services.teleop.core.round_trip import ADVICE
+from services.teleop.gamepad import Gamepad
+from services.teleop.view import LINES, EventLog, View
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 SCREEN_TIMEOUT_S = 1.0  # without a redraw the terminal is lost: the gamepad is released
-MAX_PRESS_AGE_S = 0.5  # an older press is ignored, except a stop
 UNHEARD_TICKS = 10  # without a fresh state of safety; with its own 0.5 s this is 1 s
-ESTOP, RESET = "e", "r"
-BY_TERMINAL = {*DIRECTIONS, *RELEASE, RESET}  # the keys that need a fast terminal
-FAST_S, LINK_S, SLOW_S = 0.5, 1.0, 2.0  # how long a stream's last value is shown
+RESET_TIMEOUT_S = 1.0  # safety refuses an older reset
+UNHEARD = "no state of safety for 1 s: controls released; check it with `t2 doctor`"
+NOT_CONFIRMED = (
+    "RESET NOT CONFIRMED: safety's state does not show the effect of the reset; "
+    "look at the vehicle, then at `t2 services`"
+)
+# The topics of the view, and how long (s) their last message is shown.
+TOPICS: dict[str, tuple[Any, float, str]] = {
+    "safety": (keys.SAFETY, 0.5, ""),
+    "velocity": (keys.VELOCITY, 0.5, ""),
+    "odometry": (keys.ODOMETRY, 0.5, ""),
+    "ultrasonic": (keys.ULTRASONIC, 0.5, ""),
+    "bumper": (keys.BUMPER, 0.5, ""),
+    "link": (keys.LINK, 1.0, ""),
+    "left": (keys.DRIVER, 2.0, "left"),
+    "right": (keys.DRIVER, 2.0, "right"),
+}
 
 
 class Controller:
     """Key presses in, requests out, and a view of the state; all methods in the loop's thread."""
 
     def __init__(self, node: Node[TeleopConfig], event_log: EventLog) -> None:
-        self._node = node
-        self._bus = bus = node.bus
+        self._node, self._bus, self._event_log = node, node.bus, event_log
         self._settings = node.config.teleop
-        self._event_log = event_log
         self._controls = Controls(self._settings)
-        self._gamepad: Gamepad = NoGamepad("searching")
+        self.terminal = self._controls.terminal
+        self._gamepad = Gamepad("searching")
         self._drawn_ns = 0  # the last redraw of the screen
         self._requested: Request | None = None
         self._leaving = False
-        self.terminal = RoundTrip(self._settings.round_trip)
-        self._slow = False  # the warning about the slow terminal was shown
-        self._dropped_ns: int | None = None  # when a late press was last reported
+        self._reported: set[str] = set()  # rules that are broken, and in the event log
+        self._late_ns = -NS_PER_S  # when a late press was last reported
         self._unheard: int | None = None  # ticks; None before the first state of safety
         self._estop = EstopRepetition()
         self._contest = Contest(self._settings.source)
         self._overruled_by: str | None = None  # while that source drives
         self._unconfirmed = False  # whether safety never showed our emergency stop
-        self._source = source = DriveSource(bus, self._settings.source, self._report_denied)
-        self._calls = OperatorCalls(node, event_log, lambda: source.denied)
-        self._safety = LatestTopic(bus, keys.SAFETY, FAST_S)
-        self._velocity = LatestTopic(bus, keys.VELOCITY, FAST_S)
-        self._odometry = LatestTopic(bus, keys.ODOMETRY, FAST_S)
-        self._ultrasonic = LatestTopic(bus, keys.ULTRASONIC, FAST_S)
-        self._bumper = LatestTopic(bus, keys.BUMPER, FAST_S)
-        self._link = LatestTopic(bus, keys.LINK, LINK_S)
-        self._left = LatestTopic(bus, keys.DRIVER, SLOW_S, side="left")
-        self._right = LatestTopic(bus, keys.DRIVER, SLOW_S, side="right")
-        bus.subscribe(keys.EVENTS, self._on_event, depth=LINES, service="*")
+        self._reset: ResetCheck | None = None
+        self._source = DriveSource(self._bus, self._settings.source, self._report_denied)
+        self._latest: dict[str, Latest[Any]] = {}  # messages, by the names of TOPICS
+        for name, (topic, _, side) in TOPICS.items():
+            self._bus.subscribe(topic, partial(self._on_message, name), side=side)
+        self._bus.subscribe(keys.EVENTS, self._on_event, depth=LINES, service="*")
         self.view = self._make_view(clock.now_ns())
         node.loop.every(PERIOD_S, self.tick)
 
@@ -74,119 +93,109 @@ class Controller:
         self._drawn_ns = now_ns
 
     def press(self, press: Press, now_ns: int) -> None:
-        """Handle a key press or its repeat.
-
-        ========== ============================== ======================== =============
-        key        older than ``MAX_PRESS_AGE_S`` terminal refused         otherwise
-        ========== ============================== ======================== =============
-        E, space   accepted                       accepted                 accepted
-        R          ignored, with a line           ignored, with an event   accepted
-        motion     ignored, with a line           muted, with an event     accepted
-        others     ignored, with a line           accepted                 accepted
-        ========== ============================== ======================== =============
-        """
+        """Process a key press or its repeat."""
         if self._leaving:
             return
-        if press.key == ESTOP:
-            self._start_estop(now_ns)
-        elif press.key == STOP:
-            self._controls.press(STOP, now_ns)
-        elif press.age_s(now_ns) > MAX_PRESS_AGE_S:
-            self._drop(press, now_ns)
-        elif press.key in BY_TERMINAL and (reason := self.terminal.refusal(press.at_ns)):
-            self._refuse(reason, now_ns)
-        elif press.key == RESET:
-            self._calls.reset(press.shown, self._safety.at(now_ns))
-        else:
-            self._controls.press(press.key, press.at_ns)
+        action = self._controls.press(press, now_ns)
+        if action is Action.ESTOP:
+            self._start_estop(self._state(now_ns))
+        elif action is Action.RESET:
+            self._start_reset(press.shown, self._state(now_ns))
+        elif action is Action.SLOW:
+            self._report_slow(self.terminal.refusal(press.at_ns))
+        elif action is Action.LATE and now_ns - self._late_ns > NS_PER_S:  # a held key repeats
+            self._late_ns = now_ns
+            text = f"key {press.key.upper()} ignored: it is {press.age_s(now_ns):.1f} s old"
+            self._event_log.add("teleop", "warning", text)
 
-    def release_controls(self) -> None:
-        """Release keys and gamepad, as when the terminal loses the focus."""
-        self._controls.release_all()
+    def release_controls(self, now_ns: int) -> None:
+        """Release keys and gamepad: the terminal has lost the focus."""
+        self._controls.enforce("unfocused", now_ns)
 
     def leave(self) -> None:
         """Send the final zeros, then stop the loop."""
         if not self._leaving:
             self._leaving = True
-            self._controls.stop()
+            self._controls.stop(clock.now_ns())
 
     # --- the loop ---------------------------------------------------------------------------
 
     def tick(self, now_ns: int) -> None:
         """Send the requests of this tick and renew the view."""
-        if self._leaving and self._controls.silent:
+        if self._leaving and self._controls.is_silent:
             self._node.loop.stop()
             return
-        self._check_safety(now_ns)
-        self._check_terminal(now_ns)
-        self._repeat_estop(now_ns)
-        self._drive(now_ns)
-        self._yield(now_ns)
-        self._calls.check_reset(self._safety.at(now_ns), now_ns)
-        self.view = self._make_view(now_ns)
-
-    def _drive(self, now_ns: int) -> None:
-        had_expired = self._controls.gamepad_expired
+        state = self._state(now_ns)
+        self._enforce_rules(state, now_ns)
         self._requested = self._controls.tick(self._read_stick(now_ns), now_ns)
         if (request := self._requested) is not None:
             self._source.request(request.twist.linear, request.twist.angular, request.release)
-        if self._controls.gamepad_expired and not had_expired:
-            text = (
-                f"gamepad released: deflected, and no event for {self._settings.gamepad_silence:g} "
-                "s; release the deadman, then press it again"
-            )
-            self._node.event("gamepad_silent", "warning", text)
+        self._repeat_estop(state)
+        self._check_reset(state, now_ns)
+        self.view = self._make_view(now_ns)
 
-    def _yield(self, now_ns: int) -> None:
-        """End a hold while another source drives: its end must not resume our motion."""
+    def _enforce_rules(self, state: SafetyState | None, now_ns: int) -> None:
+        """Release the controls by the rules of ``hold``, so that nothing old moves the vehicle."""
+        if state is not None:
+            self._unheard = 0
+        elif self._unheard is not None:
+            self._unheard += 1
         contest = self._contest
-        was_lost = contest.is_lost
-        contest.tick(self._safety.at(now_ns), requests=self._requested is not None)
-        if contest.is_lost and contest.other:
+        contest.tick(state, requests=self._requested is not None)
+        if contest.is_lost:
             self._overruled_by = contest.other
-            self._controls.cut(now_ns)
-            if not was_lost:  # the zeros after the cut are requests, too
-                text = f"overruled by {contest.other}: controls released"
-                self._node.event("overruled", "warning", text)
         elif contest.other is None and not self._controls.is_muted(now_ns):
             self._overruled_by = None
+        self._enforce("unheard", (self._unheard or 0) >= UNHEARD_TICKS, UNHEARD, now_ns)
+        text = f"overruled by {contest.other}: controls released"
+        self._enforce("overruled", contest.is_lost, text, now_ns)
+        if not (reason := self.terminal.refusal(now_ns)):
+            self._reported.discard("terminal_slow")
+        elif self._controls.holds_keys(now_ns):
+            self._controls.enforce("terminal_slow", now_ns)
+            self._report_slow(reason)
 
-    def _report_denied(self) -> None:
-        text = "NOT ALLOWED: the router drops our requests; this certificate may only watch"
-        self._node.event("barred", "error", text)
+    def _enforce(self, rule: str, is_broken: bool, text: str, now_ns: int) -> None:
+        if is_broken:
+            self._controls.enforce(rule, now_ns)
+            self._report(rule, text)
+        else:
+            self._reported.discard(rule)
+
+    def _report(self, rule: str, text: str) -> None:
+        """Report a rule once, until it holds again."""
+        if rule not in self._reported:
+            self._reported.add(rule)
+            self._node.event(rule, "warning", text)
+
+    def _report_slow(self, reason: str) -> None:
+        self._report("terminal_slow", f"keys ignored: {reason}; {ADVICE}")
 
     def _read_stick(self, now_ns: int) -> Stick | None:
         before = self._gamepad.status
         stick = self._gamepad.read()
         if self._gamepad.status != before:
             self._node.event("gamepad", "info", f"gamepad: {self._gamepad.status}")
+        if self._controls.is_gamepad_silent:
+            self._report("gamepad_silent", (
+                f"gamepad released: deflected, and no event for {self._settings.gamepad_silence:g} "
+                "s; release the deadman, then press it again"))  # fmt: skip
+        else:
+            self._reported.discard("gamepad_silent")
         is_shown = now_ns - self._drawn_ns <= SCREEN_TIMEOUT_S * NS_PER_S
         return stick if is_shown and not self._leaving else None
 
-    def _check_safety(self, now_ns: int) -> None:
-        """Release the controls while safety is silent, so that its return moves nothing."""
-        if self._safety.at(now_ns) is not None:
-            self._unheard = 0
-        elif self._unheard is not None:
-            self._unheard += 1
-            if self._unheard >= UNHEARD_TICKS:
-                self._controls.cut(now_ns)
-            if self._unheard == UNHEARD_TICKS:
-                text = "no state of safety for 1 s: controls released; check it with `t2 doctor`"
-                self._node.event("unheard", "warning", text)
+    # --- emergency stop -----------------------------------------------------------------------
 
-    def _start_estop(self, now_ns: int) -> None:
+    def _start_estop(self, state: SafetyState | None) -> None:
         """Stop; a key that repeats, or a press during the stop, is no further event."""
-        state = self._safety.at(now_ns)
         is_known = self._estop.is_pending or (state is not None and "estop" in state.latched)
-        self._controls.stop()
         self._bus.estop()
         self._estop.start()
         if not is_known:
             self._node.event("estop", "warning", "emergency stop requested by the operator")
 
-    def _repeat_estop(self, now_ns: int) -> None:
-        state = self._safety.at(now_ns)
+    def _repeat_estop(self, state: SafetyState | None) -> None:
         step = self._estop.tick(state)
         if step is not EstopStep.NONE:
             self._bus.estop()
@@ -194,11 +203,8 @@ class Controller:
             self._unconfirmed = False
         if step is EstopStep.LAST:
             self._unconfirmed = True
-            self._node.event(
-                "estop_denied" if self._source.denied else "estop_unconfirmed",
-                "error",
-                self._no_estop,
-            )
+            name = "estop_denied" if self._source.denied else "estop_unconfirmed"
+            self._node.event(name, "error", self._no_estop)
 
     @property
     def _no_estop(self) -> str:
@@ -206,25 +212,43 @@ class Controller:
         denied = ", probably not allowed" if self._source.denied else ""
         return f"EMERGENCY STOP NOT CONFIRMED{denied}: use the vehicle's own switch"
 
-    def _check_terminal(self, now_ns: int) -> None:
-        """Release the keys of a terminal that has become slow: buffered presses are old."""
-        reason = self.terminal.refusal(now_ns)
-        if not reason:
-            self._slow = False
-        elif self._controls.holds_keys(now_ns):
-            self._refuse(reason, now_ns)
+    # --- reset --------------------------------------------------------------------------------
 
-    def _refuse(self, reason: str, now_ns: int) -> None:
-        self._controls.mute_keys(now_ns)
-        if not self._slow:
-            self._slow = True
-            self._node.event("terminal_slow", "warning", f"keys ignored: {reason}; {ADVICE}")
-
-    def _drop(self, press: Press, now_ns: int) -> None:
-        if self._dropped_ns is None or now_ns - self._dropped_ns > NS_PER_S:  # a held key repeats
-            self._dropped_ns = now_ns
-            text = f"key {press.key.upper()} ignored: it is {press.age_s(now_ns):.1f} s old"
+    def _start_reset(self, shown: SafetyState | None, newest: SafetyState | None) -> None:
+        """Clear the causes that the screen showed, while the state of safety is fresh."""
+        if shown is None or newest is None:
+            text = "reset not sent: no fresh state of safety"
             self._event_log.add("teleop", "warning", text)
+            return
+        if self._reset is not None and not self._reset.is_answered:
+            return  # a held key repeats
+        self._reset = check = ResetCheck(shown)
+        self._bus.call(
+            keys.RESET,
+            replace(reset_request(shown), echo=newest.heartbeat),
+            lambda done: self._reset_answered(check, done),
+            lambda reason: self._reset_refused(check, reason),
+            timeout_s=RESET_TIMEOUT_S,
+        )
+
+    def _reset_answered(self, check: ResetCheck, done: ResetDone) -> None:
+        check.answer(done)
+        self._event_log.add("safety", "info", done.text)
+
+    def _reset_refused(self, check: ResetCheck, reason: str) -> None:
+        if self._reset is check:
+            self._reset = None
+        if reason == no_answer("safety") and self._source.denied:
+            reason = not_allowed("safety")
+        self._event_log.add("safety", "warning", reason)
+
+    def _check_reset(self, state: SafetyState | None, now_ns: int) -> None:
+        """Report an unconfirmed reset."""
+        outcome = self._reset.outcome(state, now_ns) if self._reset else None
+        if outcome is not None:
+            self._reset = None
+        if outcome is False:
+            self._node.event("reset_unconfirmed", "error", NOT_CONFIRMED)
 
     # --- the view -----------------------------------------------------------------------------
 
@@ -234,7 +258,23 @@ class Controller:
             service = arrival.key.rpartition("/")[2]
             self._event_log.add(service, event.level, event.text, event.t_ns)
 
-    def _alarm(self, state: SafetyState | None) -> str:
+    def _report_denied(self) -> None:
+        text = "NOT ALLOWED: the router drops our requests; this certificate may only watch"
+        self._node.event("barred", "error", text)
+
+    def _on_message(self, name: str, arrival: Arrival[Any]) -> None:
+        self._latest[name] = Latest(arrival.message, arrival.received_ns)
+
+    def _newest(self, name: str, now_ns: int) -> Any:
+        """Return the newest message of a topic; None once it is too old to show."""
+        latest = self._latest.get(name)
+        return latest.value if latest and fresh(latest, now_ns, TOPICS[name][1]) else None
+
+    def _state(self, now_ns: int) -> SafetyState | None:
+        state: SafetyState | None = self._newest("safety", now_ns)
+        return state
+
+    def _alarm(self) -> str:
         """Return what the operator must know before anything else; empty for nothing."""
         if self._unconfirmed:
             return self._no_estop
@@ -245,27 +285,18 @@ class Controller:
         return ""
 
     def _make_view(self, now_ns: int) -> View:
-        controls, state = self._controls, self._safety.at(now_ns)
+        controls = self._controls
         return View(
             robot=self._bus.robot,
             source=self._settings.source,
             connected=self._bus.connected,
-            alarm=self._alarm(state),
+            alarm=self._alarm(),
             gear=controls.gear,
-            turbo=controls.turbo,
-            top=twist(Deflection(1, 1), controls.gear, controls.turbo, self._settings),
-            requested=self._requested.twist if self._requested else None,
-            release=controls.released(now_ns),
+            top=controls.top(),
+            requested=self._requested,
             keys_refused=self.terminal.refusal(now_ns),
             gamepad=self._gamepad.status,
-            move_stick=controls.gamepad_is_due(now_ns),
-            safety=state,
-            velocity=self._velocity.at(now_ns),
-            odometry=self._odometry.at(now_ns),
-            ultrasonic=self._ultrasonic.at(now_ns),
-            bumper=self._bumper.at(now_ns),
-            link=self._link.at(now_ns),
-            left=self._left.at(now_ns),
-            right=self._right.at(now_ns),
+            move_stick=controls.is_gamepad_due(now_ns),
             lines=self._event_log.lines(),
+            **{name: self._newest(name, now_ns) for name in TOPICS},
         )

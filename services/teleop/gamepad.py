@@ -7,10 +7,10 @@ that all calls come from one thread: the loop's.
 import contextlib
 import os
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any
 
 from services.teleop.config import Teleop
-from services.teleop.controls import Deflection, Stick
+from services.teleop.core.controls import Deflection, Stick
 
 ENVIRON = {
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",  # its banner would overwrite the screen
@@ -20,32 +20,22 @@ ENVIRON = {
 }
 
 
-class Gamepad(Protocol):
-    """The interface of a gamepad."""
+class Gamepad:
+    """A gamepad; this one is disabled or unavailable."""
 
-    @property
-    def status(self) -> str:
-        """The gamepad's name, or why it is missing."""
+    def __init__(self, status: str) -> None:
+        self.status = status  # its name, or why it is missing
 
     def read(self) -> Stick | None:
         """Return the current state; None without a gamepad."""
-
-
-class NoGamepad:
-    """A gamepad that is disabled or unavailable."""
-
-    def __init__(self, status: str) -> None:
-        self.status = status
-
-    def read(self) -> Stick | None:
-        """Return None."""
         return None
 
 
-class SdlGamepad:
+class SdlGamepad(Gamepad):
     """The first gamepad that SDL finds; after its loss, the next one."""
 
     def __init__(self, pygame: ModuleType, settings: Teleop) -> None:
+        super().__init__("none")
         self._pygame: Any = pygame
         self._settings = settings
         self._joystick: Any = None
@@ -57,11 +47,6 @@ class SdlGamepad:
         pygame.display.init()
         pygame.joystick.init()
 
-    @property
-    def status(self) -> str:
-        """The gamepad's name, or "none"."""
-        return str(self._joystick.get_name()) if self._joystick else "none"
-
     def read(self) -> Stick | None:
         """Return the current state; None without a gamepad."""
         for event in self._pygame.event.get():
@@ -69,6 +54,7 @@ class SdlGamepad:
         if self._joystick is None and self._pygame.joystick.get_count():
             with contextlib.suppress(self._pygame.error):  # unplugged in the meantime
                 self._joystick = self._pygame.joystick.Joystick(0)
+        self.status = str(self._joystick.get_name()) if self._joystick else "none"
         return self._stick() if self._joystick else None
 
     def _handle(self, event: Any) -> None:
@@ -87,24 +73,22 @@ class SdlGamepad:
             joystick.get_axis(index) if index < joystick.get_numaxes() else 0.0
             for index in (settings.linear_axis, settings.angular_axis)
         )
-        deadman, turbo = (
-            index < joystick.get_numbuttons() and bool(joystick.get_button(index))
-            for index in (settings.deadman_button, settings.turbo_button)
-        )
-        return Stick(Deflection(-linear, -angular), deadman, turbo, self._events)
+        button = settings.deadman_button
+        deadman = button < joystick.get_numbuttons() and bool(joystick.get_button(button))
+        return Stick(Deflection(-linear, -angular), deadman, self._events)
 
 
 def find(settings: Teleop) -> Gamepad:
-    """Return the gamepad of the settings, or a ``NoGamepad`` with the reason."""
+    """Return the gamepad of the settings, or one without input that names the reason."""
     if not settings.gamepad:
-        return NoGamepad("off")
+        return Gamepad("off")
     for name, value in ENVIRON.items():
         os.environ.setdefault(name, value)
     try:
         import pygame
     except ImportError:
-        return NoGamepad("none: pygame-ce is not installed")
+        return Gamepad("none: pygame-ce is not installed")
     try:
         return SdlGamepad(pygame, settings)
     except pygame.error as error:
-        return NoGamepad(f"none: {error}")
+        return Gamepad(f"none: {error}")

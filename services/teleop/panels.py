@@ -30,7 +30,7 @@ PREFIX, MIN_TEXT = len("00:00:00 safety  "), 20  # columns of an event line
 LEVELS = {"info": "", "warning": WARN, "error": BAD}
 SLOW_KEYS = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # accepted from a slow terminal
 KEYS = (
-    ("WASD", "drive"), ("␣", "stop"), ("1-5", "gear"), ("T", "turbo"), ("E", "ESTOP"),
+    ("WASD", "drive"), ("␣", "stop"), ("1-5", "gear"), ("E", "ESTOP"),
     ("R", "reset"), ("FB", "release"), ("Q", "quit"), ("?", "help"),
 )  # fmt: skip
 HELP = (
@@ -41,9 +41,8 @@ HELP = (
     ("R", "reset the latched causes on the screen"),
     ("F B, held", "move forward or backward off a pressed bumper"),
     ("1 to 5", "gear: 0.2 to 0.8 m/s"),
-    ("T", "turbo for the next hold; T, a gear or space cancels it"),
     ("Q, ctrl-c", "stop and quit"),
-    ("gamepad", "left shoulder held: sticks drive; right shoulder: turbo"),
+    ("gamepad", "left shoulder held: sticks drive"),
     ("?", "close this help; any other key closes it and counts"),
 )
 
@@ -56,7 +55,7 @@ def rows_of(*rows: Text) -> Text:
 def header(view: View) -> Text:
     """Return the header: robot, connections, gear."""
     bus = ("● bus", GOOD) if view.connected else ("○ no router yet", WARN)
-    gear = ("TURBO", BAD) if view.turbo else (f"gear {view.gear}/5", "bold")
+    gear = (f"gear {view.gear}/5", "bold")
     top = (f"{view.top.linear:.2f} m/s {view.top.angular:.2f} rad/s", "")
     parts = [(f"T2 {view.robot}", "bold"), bus, _board(view), _bumper(view), gear, top]
     return Text("  ", no_wrap=True).join(Text(*part) for part in parts)
@@ -136,7 +135,8 @@ def release(view: View) -> list[Text]:
     known = view.safety.release if view.safety else None
     if known is None or (view.bumper is not None and not view.bumper.pressed):
         return []
-    keys = Text("   ").join(_key(known, direction, view.release) for direction in DIRECTIONS)
+    held = view.requested.release if view.requested else "none"
+    keys = Text("   ").join(_key(known, direction, held) for direction in DIRECTIONS)
     return [_believed(known), keys.append(f"   {known.left:.2f} m left until reset", style="bold")]
 
 
@@ -151,7 +151,7 @@ def _believed(known: Release) -> Text:
     )  # fmt: skip
 
 
-def _key(known: Release, direction: Direction, held: Direction | None) -> Text:
+def _key(known: Release, direction: Direction, held: str) -> Text:
     key = (f" {DIRECTIONS[direction][0]} ", HELD if held == direction else KEY)
     if direction in known.forbidden:
         return Text.assemble(key, f" {direction} ", ("FORBIDDEN", BAD))
@@ -201,7 +201,7 @@ def motion(view: View) -> Text:
 
 
 def _speeds(view: View) -> dict[str, Text]:
-    requested, measured = view.requested, view.velocity
+    requested, measured = view.requested.twist if view.requested else None, view.velocity
     linear = angular = None
     if view.safety:
         limits = view.safety.limits
@@ -264,8 +264,8 @@ def _faults(driver: Driver | None) -> Part:
 
 
 def _driver(view: View) -> Text:
-    if view.release:
-        return Text(f"you, release {view.release}", style=WARN)
+    if view.requested and view.requested.release != "none":
+        return Text(f"you, release {view.requested.release}", style=WARN)
     driving = view.safety.source if view.safety else None
     if driving is None:
         return Text("none", style=DIM)

@@ -1,22 +1,33 @@
 """A screen with a real controller on a bus that never opens, and a clock of the test."""
 
 import asyncio
+import re
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
+from textual.events import CursorPosition
 from textual.pilot import Pilot
 
 from common import keys
 from common.freshness import NS_PER_S
 from common.loop import Post
-from services.teleop.app import Panel
+from services.teleop.app import Panel, TeleopApp
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from tests.factories import contact_state
-from tests.teleop.local_app import LocalTerminalApp
 from tests.teleop.support import FakeNode, answer
 from verification.harness.waiting import PATIENCE_S
+
+
+class LocalTerminalApp(TeleopApp):
+    """The screen of a local terminal, which answers each query at once."""
+
+    def query_terminal(self, query: str) -> None:
+        """Answer like a terminal."""
+        if place := re.search(r"\[(\d+);(\d+)H", query):
+            row, column = map(int, place.groups())
+            self.post_message(CursorPosition(column - 1, row - 1))
 
 
 class Screen:
@@ -50,12 +61,30 @@ class Screen:
     def answer(self) -> None:
         """Simulate a fast terminal, so that keys that the host delayed count."""
         for ago in range(10, 0, -1):
-            answer(self.controller, self.now_ns - ago * NS_PER_S // 20)
+            answer(self.controller.terminal, self.now_ns - ago * NS_PER_S // 20)
+
+    def tell_contact(self) -> None:
+        """Simulate a pressed bumper in safety's state."""
+        self.node.fake.deliver(keys.SAFETY, contact_state(), self.now_ns)
+        self.controller.tick(self.now_ns)
 
     def text_of(self, name: str) -> str:
         """Return the text of a panel; empty before it exists."""
         panels = self.app.query(Panel).filter(f"#{name}")
         return "".join(panel.shown.plain for panel in panels if panel.shown)
+
+    def fits(self, *names: str) -> bool:
+        """Return whether these panels are shown without clipping."""
+        for name in names:
+            panel, lines = self.app.query_one(f"#{name}", Panel), self.text_of(name).split("\n")
+            room = panel.content_size
+            if (
+                not self.app.screen.region.contains_region(panel.region)
+                or len(lines) > room.height
+                or max(map(len, lines)) > room.width
+            ):
+                return False
+        return True
 
     @asynccontextmanager
     async def shown(self, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[None]]:
@@ -79,20 +108,3 @@ async def until(true: Callable[[], object], what: str) -> None:
     while not true():
         assert time.monotonic() < deadline, f"waited for: {what}"
         await asyncio.sleep(0.01)
-
-
-def tell_contact(screen: Screen) -> None:
-    """Simulate a pressed bumper in safety's state."""
-    screen.node.fake.deliver(keys.SAFETY, contact_state(), screen.now_ns)
-    screen.controller.tick(screen.now_ns)
-
-
-def fits(screen: Screen, name: str) -> bool:
-    """Return whether a panel is shown without clipping."""
-    panel, lines = screen.app.query_one(f"#{name}", Panel), screen.text_of(name).split("\n")
-    room = panel.content_size
-    return (
-        screen.app.screen.region.contains_region(panel.region)
-        and len(lines) <= room.height
-        and max(map(len, lines)) <= room.width
-    )

@@ -10,17 +10,21 @@ from common.motion import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
-from services.teleop.controls import Stick
+from services.teleop.core.controls import Deflection, Stick
 from services.teleop.core.hold import Press
+from services.teleop.core.round_trip import RoundTrip
+from services.teleop.gamepad import Gamepad
 from services.teleop.view import EventLog, View
 from tests.factories import contact_state, safety_state
 from tests.fake_bus import FakeBus
+
+PERIOD_NS = NS_PER_S // 20
 
 
 class FakeNode(Node[TeleopConfig]):
     """A node on a ``FakeBus``; its logs go to an event log, its loop does not run."""
 
-    def __init__(self, **settings: Any) -> None:
+    def __init__(self) -> None:
         self.event_log = EventLog()
         config = TeleopConfig()
         super().__init__("teleop", Loaded(config, {}))
@@ -51,26 +55,28 @@ def view(**fields: Any) -> View:
         "source": "teleop",
         "connected": True,
         "gear": 1,
-        "turbo": False,
         "top": Twist(0.2, 0.3),
     }
     return View(**usual | fields)
 
 
-def answer(controller: Controller, now_ns: int) -> None:
-    """Simulate a terminal that answers at once."""
-    controller.terminal.sent(0, now_ns - NS_PER_S // 1000)
-    controller.terminal.answered(0, now_ns)
+def answer(terminal: RoundTrip, now_ns: int, took_s: float = 0.001) -> None:
+    """Simulate a terminal that answers now."""
+    terminal.sent(0, now_ns - round(took_s * NS_PER_S))
+    terminal.answered(0, now_ns)
 
 
-PERIOD_NS = NS_PER_S // 20
+def stick(linear: float = 1.0, *, deadman: bool = True, events: int = 0) -> Stick:
+    """Return the state of a gamepad."""
+    return Stick(Deflection(linear, 0), deadman, events)
 
 
-class FakeGamepad:
+class FakeGamepad(Gamepad):
     """A gamepad with a configured state."""
 
-    status = "Fake Pad"
-    stick: Stick | None = None
+    def __init__(self) -> None:
+        super().__init__("Fake Pad")
+        self.stick: Stick | None = None
 
     def read(self) -> Stick | None:
         return self.stick
@@ -85,7 +91,7 @@ class Operator:
         self.now_ns = 100 * NS_PER_S
         self.near = True  # the terminal answers at once
         self.shown: SafetyState | None = None
-        answer(self.controller, self.now_ns)
+        answer(self.controller.terminal, self.now_ns)
 
     def press(self, key: str, waited_s: float = 0.0) -> None:
         at_ns = self.now_ns - round(waited_s * NS_PER_S)
@@ -94,7 +100,7 @@ class Operator:
     def wait(self, seconds: float) -> None:
         """Advance the clock without ticks; then the terminal answers at once."""
         self.now_ns += round(seconds * NS_PER_S)
-        answer(self.controller, self.now_ns)
+        answer(self.controller.terminal, self.now_ns)
 
     def tell_safety(self, **fields: Any) -> None:
         self.node.fake.deliver(keys.SAFETY, safety_state(**fields), self.now_ns)
@@ -114,7 +120,7 @@ class Operator:
             sent.append(last if after > before else None)
             self.now_ns += PERIOD_NS
             if self.near:
-                answer(self.controller, self.now_ns)
+                answer(self.controller.terminal, self.now_ns)
         return sent
 
     def speeds(self, count: int) -> list[float | None]:

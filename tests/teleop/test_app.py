@@ -1,4 +1,4 @@
-"""Keys, queries of the terminal, and the end of the screen."""
+"""The screen: keys, queries of the terminal, what is shown and that it fits, and its end."""
 
 import time
 from collections.abc import Callable
@@ -10,10 +10,12 @@ from textual.pilot import Pilot
 
 from common import keys
 from common.freshness import NS_PER_S
-from common.messages import Cause, ResetRequest
-from tests.factories import contact_state
-from tests.teleop.local_app import LocalTerminalApp
-from tests.teleop.screen_fixture import Screen, play, tell_contact, until
+from common.messages import Cause, ResetRequest, Ultrasonic
+from services.teleop.app import Panel
+from tests.factories import contact_state, link, safety_state
+from tests.teleop.screen_fixture import LocalTerminalApp, Screen, play, until
+
+# --- keys -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -31,26 +33,9 @@ def test_a_key_drives_and_then_requests_end(screen: Screen, key: str, speed: flo
     play(screen, act)
 
 
-def test_keys_make_their_calls(screen: Screen) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        await pilot.press("e")
-        assert screen.node.fake.estops == 1
-        tell_contact(screen)
-        await until(lambda: "pressed" in screen.text_of("safety"), "the contact on the screen")
-        await pilot.press("r")
-        assert screen.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=7, causes=(42,)))]
-        await pilot.press("f")
-        screen.speeds(2)
-        _, drive = screen.node.requests
-        assert drive is not None
-        assert (drive.release, drive.echo) == ("forward", 7)
-
-    play(screen, act)
-
-
 def test_a_reset_clears_what_the_screen_showed(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        tell_contact(screen)
+        screen.tell_contact()
         await until(lambda: "pressed" in screen.text_of("safety"), "the contact on the screen")
         later = Cause(name="estop", action="brake", age=0.0, text="Stopped.", id=43)
         newest = contact_state(heartbeat=9)
@@ -60,6 +45,8 @@ def test_a_reset_clears_what_the_screen_showed(screen: Screen) -> None:
         screen.node.fake.deliver(keys.SAFETY, newest, screen.now_ns)  # not drawn yet
         await pilot.press("r")
         assert screen.node.fake.asked == [(keys.RESET.path, ResetRequest(echo=9, causes=(42,)))]
+        await pilot.press("e")
+        assert screen.node.fake.estops == 1
 
     play(screen, act)
 
@@ -69,6 +56,40 @@ def test_a_key_carries_its_receive_time(screen: Screen) -> None:
     key.time = time.monotonic() - 3.0
     came_ns = LocalTerminalApp._received_ns(screen.app, key)
     assert (screen.now_ns - came_ns) / NS_PER_S == pytest.approx(3.0, abs=0.5)
+
+
+def test_losing_the_focus_of_the_screen_releases(screen: Screen) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("w")
+        screen.app.post_message(AppBlur())
+        await pilot.pause()
+        assert screen.speeds(5) == []
+
+    play(screen, act)
+
+
+@pytest.mark.parametrize("key", ["q", "Q", "ctrl+c", "ctrl+q"])
+def test_quitting_waits_for_the_final_zeros(screen: Screen, key: str) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press(key)
+        assert screen.app.is_running
+        assert screen.speeds(5) == [0.0] * 3
+        screen.ended = True
+        await until(lambda: not screen.app.is_running, "the screen to leave")
+
+    play(screen, act)
+
+
+def test_quitting_twice_does_not_wait(screen: Screen) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("q")
+        await pilot.press("q")
+        await until(lambda: not screen.app.is_running, "the screen to leave")
+
+    play(screen, act)
+
+
+# --- the terminal ---------------------------------------------------------------------------
 
 
 def test_a_redraw_that_is_posted_late_keeps_its_time(screen: Screen) -> None:
@@ -107,39 +128,14 @@ def test_a_terminal_that_does_not_answer_is_queried_less_often(
             screen.app.probe()
         assert len(asked) - before in (14, 15, 16)  # ten, then every tenth
         assert asked[-1].startswith("\x1b7\x1b[2;")
+        screen.now_ns += 10 * NS_PER_S
+        screen.controller.tick(screen.now_ns)
+        await until(lambda: "KEYS OFF" in screen.text_of("hints"), "the refusal")
 
     play(screen, act)
 
 
-def test_losing_the_focus_of_the_screen_releases(screen: Screen) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        await pilot.press("w")
-        screen.app.post_message(AppBlur())
-        await pilot.pause()
-        assert screen.speeds(5) == []
-
-    play(screen, act)
-
-
-@pytest.mark.parametrize("key", ["q", "Q", "ctrl+c", "ctrl+q"])
-def test_quitting_waits_for_the_final_zeros(screen: Screen, key: str) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        await pilot.press(key)
-        assert screen.app.is_running
-        assert screen.speeds(5) == [0.0] * 3
-        screen.ended = True
-        await until(lambda: not screen.app.is_running, "the screen to leave")
-
-    play(screen, act)
-
-
-def test_quitting_twice_does_not_wait(screen: Screen) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        await pilot.press("q")
-        await pilot.press("q")
-        await until(lambda: not screen.app.is_running, "the screen to leave")
-
-    play(screen, act)
+# --- panels ---------------------------------------------------------------------------------
 
 
 def test_a_control_character_reaches_no_panel(screen: Screen) -> None:
@@ -151,3 +147,78 @@ def test_a_control_character_reaches_no_panel(screen: Screen) -> None:
 
     hostile = replace(contact_state(), text="Stopped.\x1b[2J\x9b31m", release=None)
     play(screen, act)
+
+
+def test_help_opens_and_any_other_key_closes_it(screen: Screen) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("question_mark")
+        await until(lambda: screen.app.query_one("#help", Panel).display, "the help")
+        assert not screen.app.query_one("#events", Panel).display
+        assert screen.fits("help")
+        await pilot.press("w")
+        await until(lambda: not screen.app.query_one("#help", Panel).display, "its end")
+        assert screen.speeds(5)  # the key counts
+
+    play(screen, act)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+def test_an_unconfirmed_emergency_stop_is_shown_until_it_is_latched(
+    screen: Screen, size: tuple[int, int]
+) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        await pilot.press("e")
+        for _ in range(70):
+            screen.controller.tick(screen.now_ns)
+        await until(lambda: "EMERGENCY STOP NOT CONFIRMED" in screen.text_of("safety"), "it")
+        await until(lambda: screen.fits("safety", "motion", "around", "hints"), "all to fit")
+        state = safety_state(verdict="brake", latched=("estop",))
+        screen.node.fake.deliver(keys.SAFETY, state, received_ns=screen.now_ns)
+        screen.controller.tick(screen.now_ns)
+        await until(lambda: "NOT CONFIRMED" not in screen.text_of("safety"), "its end")
+
+    play(screen, act, *size)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+def test_a_contact_shows_its_release_without_clipping(
+    screen: Screen, size: tuple[int, int]
+) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        screen.tell_contact()
+        await until(lambda: "LATCHED" in screen.text_of("safety"), "the cause")
+        await until(lambda: screen.fits("safety", "motion", "around"), "all to fit")
+        assert "0.12 m left" in screen.text_of("safety")
+        refusal = "release refused: " + "the vehicle needs two rows to say why it may not. " * 2
+        screen.node.event_log.add("safety", "warning", refusal.strip())
+        screen.controller.tick(screen.now_ns)
+        await until(
+            lambda: " ".join(screen.text_of("events").split())[16:] == refusal.strip(), "all of it"
+        )
+
+    play(screen, act, *size)
+
+
+@pytest.mark.parametrize(("size", "rows"), [((80, 24), 11), ((120, 40), 13)])
+def test_received_values_are_shown_on_a_screen_that_grows(
+    screen: Screen, size: tuple[int, int], rows: int
+) -> None:
+    async def act(pilot: Pilot[None]) -> None:
+        fake = screen.node.fake
+        fake.deliver(keys.SAFETY, safety_state(text="Driving, slowly."))
+        fake.deliver(keys.LINK, link())
+        fake.deliver(
+            keys.ULTRASONIC, Ultrasonic(ranges=(1.5, *(None,) * 7), status=("ok", *("fault",) * 7))
+        )
+        screen.node.event_log.add("safety", "error", "contact")
+        screen.controller.tick(0)
+        await until(lambda: "Driving, slowly." in screen.text_of("safety"), "safety's words")
+        assert "10.7.5.224:4002" in screen.text_of("motion")
+        assert "no router yet" in screen.text_of("header")
+        assert "contact" in screen.text_of("events")
+        await until(lambda: screen.text_of("around").count("\n") == rows - 1, f"{rows} rows")
+        assert "1.50 m" in screen.text_of("around")
+        assert screen.text_of("around").count("fault") == 7
+        assert screen.fits("header", "safety", "around", "motion", "hints")
+
+    play(screen, act, *size)

@@ -1,15 +1,21 @@
 """The controller: key presses in, requests and view out; on a bus that never opens."""
 
 import pytest
+from msgspec import structs
 
 from common import keys
 from common.bus.publisher import Publisher
-from common.messages import Bumper, Driver, Event, Velocity
+from common.messages import Bumper, Driver, Event, ResetDone, ResetRequest, Velocity
 from common.motion import Twist
-from common.operator import ESTOP_TICKS, OVERRULED_TICKS
-from services.teleop.controls import Deflection, Stick
+from common.operator import ESTOP_TICKS, OVERRULED_TICKS, no_answer, not_allowed
+from common.source import DENIED_AFTER
 from tests.factories import link, safety_state
-from tests.teleop.support import FakeGamepad, Operator
+from tests.teleop.support import FakeGamepad, Operator, answer, stick
+
+DONE = ResetDone(text="Reset.", boot=5, heartbeat=8, cleared=(42,))
+
+
+# --- requests -------------------------------------------------------------------------------
 
 
 def test_a_tap_sends_requests_and_then_nothing(operator: Operator) -> None:
@@ -18,12 +24,31 @@ def test_a_tap_sends_requests_and_then_nothing(operator: Operator) -> None:
     assert operator.speeds(17) == [0.0] + [0.2] * 11 + [0.0] * 3 + [None] * 2
 
 
-def test_requests_carry_the_echo(operator: Operator) -> None:
+@pytest.mark.parametrize(("key", "release"), [("w", "none"), ("f", "forward"), ("b", "backward")])
+def test_requests_carry_echo_and_release(operator: Operator, key: str, release: str) -> None:
     operator.node.fake.deliver(keys.SAFETY, safety_state(heartbeat=99))
-    operator.press("w")
-    (request,) = operator.ticks(1)
+    operator.press(key)
+    request = operator.ticks(2)[-1]
     assert request is not None
-    assert request.echo == 99
+    assert (request.echo, request.release) == (99, release)
+    assert (request.linear > 0) is (key == "w")
+
+
+@pytest.mark.parametrize("driving", [True, False])
+def test_quitting_sends_three_zeros_then_stops_the_loop(operator: Operator, driving: bool) -> None:
+    if driving:
+        operator.press("w")
+        operator.ticks(3)
+    operator.controller.leave()
+    operator.controller.leave()  # once is enough
+    operator.press("w")
+    operator.press("e")
+    assert operator.speeds(4) == [0.0] * 3 + [None]
+    assert operator.node.fake.estops == 0
+    operator.node.loop.run()  # returns, for it has been stopped
+
+
+# --- emergency stop -------------------------------------------------------------------------
 
 
 def test_estop_releases_and_stops_the_robot(operator: Operator) -> None:
@@ -82,6 +107,9 @@ def test_an_estop_that_the_router_drops_is_reported(
     assert operator.controller.view.alarm == operator.lines[-1]
 
 
+# --- rules ----------------------------------------------------------------------------------
+
+
 def test_a_lost_bus_releases_and_a_held_key_does_not_drive_again(
     operator: Operator,
 ) -> None:
@@ -110,9 +138,9 @@ def test_a_gamepad_drives_while_the_screen_is_redrawn(operator: Operator) -> Non
     pad = FakeGamepad()
     operator.controller.use_gamepad(pad)
     operator.controller.screen_drawn(operator.now_ns)
-    pad.stick = Stick(Deflection(1, 0), deadman=False, turbo=False)
+    pad.stick = stick(deadman=False)
     operator.ticks(1)
-    pad.stick = Stick(Deflection(1, 0), deadman=True, turbo=False)
+    pad.stick = stick()
     sent = operator.speeds(24)
     assert sent[:19] == [0.0] + [0.2] * 18
     assert sent[20:] == [0.0, 0.0, 0.0, None]  # the screen is not redrawn any more
@@ -121,14 +149,14 @@ def test_a_gamepad_drives_while_the_screen_is_redrawn(operator: Operator) -> Non
 def test_a_gamepad_that_freezes_is_released_and_reported(operator: Operator) -> None:
     pad = FakeGamepad()
     operator.controller.use_gamepad(pad)
-    pad.stick = Stick(Deflection(1, 0), deadman=False, turbo=False)
+    pad.stick = stick(deadman=False)
     speeds: list[float | None] = []
     hinted = 0
     for tick in range(70):
         operator.controller.screen_drawn(operator.now_ns)
         speeds += operator.speeds(1)
         hinted += operator.controller.view.move_stick
-        pad.stick = Stick(Deflection(1, 0), deadman=True, turbo=False, events=min(tick, 10))
+        pad.stick = stick(events=min(tick, 10))
     assert speeds.count(0.2) == 10 + 40
     assert speeds[-10:] == [None] * 10
     assert hinted == 20
@@ -150,22 +178,184 @@ def test_a_gamepad_change_is_reported(operator: Operator) -> None:
 def test_losing_the_focus_releases(operator: Operator) -> None:
     operator.press("w")
     operator.ticks(2)
-    operator.controller.release_controls()
+    operator.controller.release_controls(operator.now_ns)
     assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
-@pytest.mark.parametrize("driving", [True, False])
-def test_quitting_sends_three_zeros_then_stops_the_loop(operator: Operator, driving: bool) -> None:
-    if driving:
-        operator.press("w")
-        operator.ticks(3)
-    operator.controller.leave()
-    operator.controller.leave()  # once is enough
-    operator.press("w")
+def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -> None:
+    def hold(ticks: int, source: str | None) -> list[float | None]:
+        speeds: list[float | None] = []
+        for _ in range(ticks):
+            operator.tell_safety(source=source)
+            operator.press("w")
+            speeds += operator.speeds(1)
+        return speeds
+
+    operator.tell_safety(source="web")
+    operator.ticks(1)
+    assert operator.controller.view.alarm == ""
+    assert hold(2 * OVERRULED_TICKS, "web")[-1] is None
+    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
+    assert set(hold(20, None)) == {None}
+    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
+    for _ in range(20):
+        operator.tell_safety()
+        operator.ticks(1)
+    assert operator.controller.view.alarm == ""
+    assert operator.lines == ["overruled by web: controls released"]
+    assert hold(3, "teleop")[-1] == 0.2
+
+
+@pytest.mark.parametrize("key", ["w", "r", "f", "b", "5"])
+def test_a_press_that_waited_for_long_does_nothing(operator: Operator, key: str) -> None:
+    operator.tell_contact()
+    for _ in range(5):
+        operator.press(key, waited_s=0.51)
+    assert operator.speeds(3) == [None] * 3
+    assert operator.node.fake.asked == []
+    assert operator.controller.view.gear == 1
+    assert operator.lines == [f"key {key.upper()} ignored: it is 0.5 s old"]
+    operator.wait(1.5)
+    operator.press(key, waited_s=3.0)
+    assert operator.lines[1:] == [f"key {key.upper()} ignored: it is 3.0 s old"]
+
+
+def slow(operator: Operator) -> None:
+    """Simulate a terminal that answers late from now on."""
+    operator.near = False
+    answer(operator.controller.terminal, operator.now_ns, 0.42)
+
+
+@pytest.mark.parametrize("key", ["w", "b", "r"])
+def test_on_a_slow_terminal_keys_move_and_reset_nothing(operator: Operator, key: str) -> None:
+    operator.tell_contact()
+    slow(operator)
+    for _ in range(3):
+        operator.press(key)
+        assert operator.speeds(1) == [None]
+    assert operator.node.fake.asked == []
+    assert operator.lines == [
+        "keys ignored: terminal too slow: 0.42 s, allowed 0.15 s; "
+        "use `t2 drive` on a machine near the robot, or the dashboard"
+    ]
+    assert operator.controller.view.keys_refused == "terminal too slow: 0.42 s, allowed 0.15 s"
     operator.press("e")
-    assert operator.speeds(4) == [0.0] * 3 + [None]
-    assert operator.node.fake.estops == 0
-    operator.node.loop.run()  # returns, for it has been stopped
+    assert operator.node.fake.estops == 1
+
+
+def test_a_terminal_that_becomes_slow_releases_its_keys(operator: Operator) -> None:
+    operator.press("w")
+    assert operator.speeds(2) == [0.0, 0.2]
+    slow(operator)
+    assert operator.speeds(5) == [0.0] * 3 + [None] * 2
+    operator.near = True
+    for _ in range(40):  # what is still held when it is fast again does not drive
+        operator.press("w")
+        assert operator.speeds(1) == [None]
+    operator.ticks(20)
+    operator.press("w")
+    assert operator.speeds(2) == [0.0, 0.2]
+    operator.near = False
+    speeds = []
+    for _ in range(20):  # it does not answer any more
+        operator.press("w")
+        speeds += operator.speeds(1)
+    assert speeds[-5:] == [None] * 5
+    assert len([line for line in operator.lines if "keys ignored" in line]) == 2
+
+
+# --- reset ----------------------------------------------------------------------------------
+
+
+def test_a_reset_clears_the_shown_causes_and_is_confirmed(operator: Operator) -> None:
+    operator.tell_contact()
+    operator.press("r")
+    request = ResetRequest(echo=7, causes=(42,))
+    assert operator.node.fake.asked == [(keys.RESET.path, request)]
+    operator.node.fake.answers[0][0](DONE)
+    operator.ticks(1)
+    for _ in range(60):
+        operator.tell_safety(boot=5, heartbeat=8)
+        operator.ticks(1)
+    assert operator.lines == ["Reset."]
+
+
+def test_a_reset_without_effect_is_not_confirmed(operator: Operator) -> None:
+    operator.tell_contact()
+    operator.press("r")
+    operator.node.fake.answers[0][0](DONE)
+    for _ in range(20):  # the latch stays
+        operator.tell_contact(heartbeat=8)
+        operator.ticks(1)
+    assert_unconfirmed(operator)
+
+
+def test_a_reset_that_another_program_answers_is_not_confirmed(operator: Operator) -> None:
+    operator.tell_contact()
+    operator.press("r")
+    operator.node.fake.answers[0][0](structs.replace(DONE, boot=77))
+    for _ in range(20):
+        operator.tell_safety(boot=5, heartbeat=8)
+        operator.ticks(1)
+    assert_unconfirmed(operator)
+
+
+def assert_unconfirmed(operator: Operator) -> None:
+    operator.ticks(3)
+    (line,) = (line for line in operator.node.event_log.lines() if "NOT CONFIRMED" in line.text)
+    assert line.level == "error"
+
+
+def test_a_refused_reset_is_reported_and_the_next_one_is_sent(operator: Operator) -> None:
+    operator.tell_contact()
+    operator.press("r")
+    operator.press("r")  # the key repeats
+    assert len(operator.node.fake.asked) == 1
+    operator.node.fake.answers[0][1]("The call is 5.0 s old, allowed is 0.4 s: repeat it.")
+    operator.ticks(5)
+    assert operator.lines == ["The call is 5.0 s old, allowed is 0.4 s: repeat it."]
+    operator.tell_contact()
+    operator.press("r")
+    assert len(operator.node.fake.asked) == 2
+
+
+@pytest.mark.parametrize("denied", [True, False])
+def test_an_unanswered_reset_without_the_right_is_not_allowed(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch, denied: bool
+) -> None:
+    monkeypatch.setattr(Publisher, "passed_on", not denied)
+    for _ in range(DENIED_AFTER):
+        operator.tell_contact()
+        operator.ticks(1)
+    operator.press("r")
+    operator.node.fake.answers[0][1](no_answer("safety"))
+    assert operator.lines[-1] == (not_allowed("safety") if denied else no_answer("safety"))
+
+
+def test_a_new_reset_replaces_one_that_waits_for_its_state(operator: Operator) -> None:
+    operator.tell_contact()
+    operator.press("r")
+    operator.node.fake.answers[0][0](DONE)
+    operator.press("r")
+    assert len(operator.node.fake.asked) == 2
+    operator.node.fake.answers[0][1]("late")  # of the first one
+    operator.press("r")
+    assert len(operator.node.fake.asked) == 2
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_a_reset_is_not_sent_without_a_fresh_state(operator: Operator, shown: bool) -> None:
+    operator.tell_contact()
+    if not shown:
+        operator.shown = None
+    else:
+        operator.wait(0.6)
+    operator.press("r")
+    assert operator.node.fake.asked == []
+    assert operator.lines == ["reset not sent: no fresh state of safety"]
+
+
+# --- view -----------------------------------------------------------------------------------
 
 
 def test_the_view_shows_fresh_values(operator: Operator) -> None:
@@ -209,27 +399,3 @@ def test_a_denied_operator_is_notified_once(
     assert [line for line in operator.lines if "NOT ALLOWED" in line] == [
         "NOT ALLOWED: the router drops our requests; this certificate may only watch"
     ]
-
-
-def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -> None:
-    def hold(ticks: int, source: str | None) -> list[float | None]:
-        speeds: list[float | None] = []
-        for _ in range(ticks):
-            operator.tell_safety(source=source)
-            operator.press("w")
-            speeds += operator.speeds(1)
-        return speeds
-
-    operator.tell_safety(source="web")
-    operator.ticks(1)
-    assert operator.controller.view.alarm == ""
-    assert hold(2 * OVERRULED_TICKS, "web")[-1] is None
-    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
-    assert set(hold(20, None)) == {None}
-    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
-    for _ in range(20):
-        operator.tell_safety()
-        operator.ticks(1)
-    assert operator.controller.view.alarm == ""
-    assert operator.lines == ["overruled by web: controls released"]
-    assert hold(3, "teleop")[-1] == 0.2

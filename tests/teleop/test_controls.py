@@ -1,46 +1,52 @@
-"""Key presses and sticks to twists, and to drive requests tick by tick."""
+"""Key presses and sticks to actions, twists, and drive requests tick by tick."""
+
+import math
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Twist
-from common.operator import Request
+from common.operator import NEUTRAL, Request
 from services.teleop.config import Teleop
-from services.teleop.controls import (
+from services.teleop.core.controls import (
+    DIRECTIONS,
+    Action,
     Controls,
     Deflection,
     Stick,
+    deflection,
+    shaped,
+    twist,
 )
+from services.teleop.core.hold import Press
+from tests.teleop.support import PERIOD_NS, answer, stick
 
 SETTINGS = Teleop()
-PERIOD_NS = NS_PER_S // 20
-FIRST_GEAR = Twist(0.2, 0.0)
-UP = Stick(Deflection(1, 0), deadman=False, turbo=False)
-DOWN = Stick(Deflection(1, 0), deadman=True, turbo=False)
+FIRST_GEAR = Request(Twist(0.2, 0.0))
+UP, DOWN = stick(deadman=False), stick()
+LIMIT_TICKS = 40  # 2 s
 
 
 class Operator:
-    """Controls with a simulated clock that advances by ticks."""
+    """Controls with a simulated clock, at a terminal that answers at once."""
 
     def __init__(self) -> None:
-        self.controls = Controls(Teleop())
-        self.now_ns = 0
+        self.controls = Controls(SETTINGS)
+        self.now_ns = 100 * NS_PER_S
 
-    def press(self, key: str) -> None:
-        self.controls.press(key, self.now_ns)
+    def press(self, key: str, waited_s: float = 0.0, took_s: float = 0.001) -> Action:
+        at_ns = self.now_ns - round(waited_s * NS_PER_S)
+        answer(self.controls.terminal, at_ns, took_s)
+        return self.controls.press(Press(key, at_ns), self.now_ns)
 
-    def requests(self, count: int, stick: Stick | None = None) -> list[Request | None]:
+    def ticks(self, count: int, stick: Stick | None = None) -> list[Request | None]:
         sent = []
         for _ in range(count):
             sent.append(self.controls.tick(stick, self.now_ns))
             self.now_ns += PERIOD_NS
         return sent
-
-    def ticks(self, count: int, stick: Stick | None = None) -> list[Twist | None]:
-        return [one.twist if one else None for one in self.requests(count, stick)]
-
-    def releases(self, count: int) -> list[str | None]:
-        return [one.release if one else None for one in self.requests(count)]
 
 
 @pytest.fixture
@@ -48,11 +54,60 @@ def operator() -> Operator:
     return Operator()
 
 
-def test_a_tap_is_a_zero_the_twist_and_three_zeros(operator: Operator) -> None:
-    assert operator.ticks(2) == [None, None]
+# --- keys -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "late", "slow", "accepted"),
+    [
+        ("e", Action.ESTOP, Action.ESTOP, Action.ESTOP),
+        ("space", Action.NONE, Action.NONE, Action.NONE),
+        ("r", Action.LATE, Action.SLOW, Action.RESET),
+        ("w", Action.LATE, Action.SLOW, Action.NONE),
+        ("b", Action.LATE, Action.SLOW, Action.NONE),
+        ("5", Action.LATE, Action.NONE, Action.NONE),
+    ],
+)
+def test_a_key_counts_by_its_age_and_the_round_trip(
+    key: str, late: Action, slow: Action, accepted: Action
+) -> None:
+    assert Operator().press(key, waited_s=0.51) is late
+    assert Operator().press(key, took_s=0.42) is slow
+    assert Operator().press(key, waited_s=0.5) is accepted
+
+
+@pytest.mark.parametrize(
+    ("key", "waited_s", "took_s"),
+    [
+        *((key, 0.51, 0.0) for key in ("w", "left", "f", "b", "r", "5")),
+        *((key, 0.0, 0.42) for key in ("w", "left", "f", "b", "r")),
+    ],
+)
+def test_a_refused_key_changes_nothing(
+    operator: Operator, key: str, waited_s: float, took_s: float
+) -> None:
+    operator.press(key, waited_s, took_s)
+    assert operator.ticks(3) == [None] * 3
+    assert operator.controls.gear == 1
+
+
+def test_a_slow_terminal_releases_its_keys_until_a_pause(operator: Operator) -> None:
     operator.press("w")
-    assert operator.ticks(18) == [STILL] + [FIRST_GEAR] * 11 + [STILL] * 3 + [None] * 3
-    assert operator.controls.silent
+    operator.ticks(3)
+    operator.press("r", took_s=0.42)
+    assert operator.ticks(4) == [NEUTRAL] * 3 + [None]
+    assert operator.controls.is_muted(operator.now_ns)
+
+
+@pytest.mark.parametrize(("waited_s", "ticks"), [(0.0, 11), (0.3, 5)])
+def test_a_tap_is_a_zero_the_twist_and_three_zeros(
+    operator: Operator, waited_s: float, ticks: int
+) -> None:
+    assert operator.ticks(2) == [None, None]
+    operator.press("w", waited_s)
+    sent = operator.ticks(ticks + 7)
+    assert sent == [NEUTRAL] + [FIRST_GEAR] * ticks + [NEUTRAL] * 3 + [None] * 3
+    assert operator.controls.is_silent
 
 
 def test_repeats_keep_driving(operator: Operator) -> None:
@@ -63,40 +118,30 @@ def test_repeats_keep_driving(operator: Operator) -> None:
     assert operator.ticks(20)[-1] is None
 
 
-def test_space_ends_a_hold_at_once(operator: Operator) -> None:
-    operator.press("w")
-    operator.ticks(3)
-    operator.press("space")
-    assert operator.ticks(5) == [STILL] * 3 + [None] * 2
+@pytest.mark.parametrize("key", ["space", "e"])
+def test_a_stop_ends_a_hold_at_once_and_sends_zeros_in_any_case(
+    operator: Operator, key: str
+) -> None:
+    for held in ("w", "f", ""):
+        operator.press(held)
+        operator.ticks(3)
+        operator.press(key, waited_s=60.0)
+        assert operator.ticks(5) == [NEUTRAL] * 3 + [None] * 2
 
 
-@pytest.mark.parametrize("key", ["x", "enter", "6", "0", "e", ""])
+@pytest.mark.parametrize("key", ["x", "enter", "6", "0", "t", "["])
 def test_an_unknown_key_moves_nothing(operator: Operator, key: str) -> None:
-    operator.press(key)
+    assert operator.press(key) is Action.NONE
     assert operator.ticks(3) == [None] * 3
 
 
 def test_gears_are_chosen_by_number(operator: Operator) -> None:
+    assert operator.controls.top() == Twist(0.2, 0.3)
     operator.press("5")
     operator.press("s")
-    assert operator.ticks(2)[-1] == Twist(-0.8, 0.0)
-
-
-def test_turbo_lasts_for_one_hold(operator: Operator) -> None:
-    operator.press("t")
-    operator.press("w")
-    assert operator.ticks(2)[-1] == Twist(1.0, 0.0)
-    operator.ticks(20)
-    assert not operator.controls.turbo
-    operator.press("w")
-    assert operator.ticks(2)[-1] == FIRST_GEAR
-
-
-@pytest.mark.parametrize("key", ["t", "1", "space"])
-def test_turbo_is_cancelled(operator: Operator, key: str) -> None:
-    operator.press("t")
-    operator.press(key)
-    assert not operator.controls.turbo
+    assert operator.ticks(2)[-1] == Request(Twist(-0.8, 0.0))
+    assert operator.controls.top() == Twist(0.8, 0.9)
+    assert list(SETTINGS.gears_linear) == sorted(set(SETTINGS.gears_linear))
 
 
 @pytest.mark.parametrize(("key", "direction"), [("f", "forward"), ("b", "backward")])
@@ -106,138 +151,151 @@ def test_a_release_and_driving_exclude_each_other(
     operator.press("w")
     operator.ticks(2)
     operator.press(key)
-    assert operator.controls.released(operator.now_ns) == direction
-    assert operator.releases(3) == ["none", direction, direction]
+    release = Request(release=direction)  # type: ignore[arg-type]
+    assert operator.ticks(3, DOWN)[1:] == [release] * 2
     operator.press("w")
-    assert operator.controls.released(operator.now_ns) is None
-    assert operator.ticks(2) == [STILL, FIRST_GEAR]
+    assert operator.ticks(2, DOWN) == [NEUTRAL, FIRST_GEAR]
 
 
-def test_the_last_direction_of_a_release_counts(operator: Operator) -> None:
+def test_the_last_direction_of_a_release_counts_and_ends_by_itself(operator: Operator) -> None:
     for key, direction in (("f", "forward"), ("b", "backward"), ("f", "forward")):
         operator.press(key)
-        assert operator.controls.released(operator.now_ns) == direction
-
-
-def test_a_release_ends_by_itself(operator: Operator) -> None:
-    operator.press("f")
-    operator.ticks(11)
+        (_, request) = operator.ticks(2)
+        assert request == Request(release=direction)  # type: ignore[arg-type]
     assert operator.controls.holds_keys(operator.now_ns)
-    operator.ticks(1)
-    assert operator.controls.released(operator.now_ns) is None
+    assert operator.ticks(14)[-4:] == [NEUTRAL] * 3 + [None]
     assert not operator.controls.holds_keys(operator.now_ns)
 
 
-@pytest.mark.parametrize("key", ["w", "b"])
-def test_muted_keys_count_again_after_a_pause(operator: Operator, key: str) -> None:
-    operator.press(key)
-    operator.controls.mute_keys(operator.now_ns)
-    for _ in range(20):  # still held
-        operator.press(key)
-        assert not operator.controls.holds_keys(operator.now_ns)
-        operator.ticks(1)
-    operator.ticks(12)
-    operator.press(key)
-    assert operator.controls.holds_keys(operator.now_ns)
+# --- gamepad --------------------------------------------------------------------------------
 
 
 def test_a_gamepad_drives_while_its_deadman_is_down(operator: Operator) -> None:
     assert operator.ticks(2, UP) == [None, None]
-    assert operator.ticks(3, DOWN) == [STILL, FIRST_GEAR, FIRST_GEAR]
-    assert operator.ticks(4, UP) == [STILL] * 3 + [None]
-
-
-def test_a_gamepad_has_turbo_of_its_own(operator: Operator) -> None:
-    operator.ticks(1, UP)
-    sent = operator.ticks(2, Stick(Deflection(1, 0), deadman=True, turbo=True))
-    assert sent[-1] == Twist(1.0, 0.0)
+    assert operator.ticks(3, DOWN) == [NEUTRAL, FIRST_GEAR, FIRST_GEAR]
+    assert operator.ticks(4, UP) == [NEUTRAL] * 3 + [None]
 
 
 def test_a_lost_gamepad_releases_and_its_return_moves_nothing(operator: Operator) -> None:
     operator.ticks(1, UP)
     operator.ticks(3, DOWN)
-    assert operator.ticks(4, None) == [STILL] * 3 + [None]
+    assert operator.ticks(4, None) == [NEUTRAL] * 3 + [None]
     assert operator.ticks(3, DOWN) == [None] * 3
     operator.ticks(1, UP)
-    assert operator.ticks(2, DOWN) == [STILL, FIRST_GEAR]
+    assert operator.ticks(2, DOWN) == [NEUTRAL, FIRST_GEAR]
 
 
-@pytest.mark.parametrize("key", ["space", "f", "b"])
-def test_after_a_stop_the_deadman_must_come_up(operator: Operator, key: str) -> None:
+@pytest.mark.parametrize("key", ["space", "e", "f", "b"])
+def test_after_a_stop_or_a_release_the_deadman_must_come_up(operator: Operator, key: str) -> None:
     operator.ticks(1, UP)
     operator.ticks(2, DOWN)
     operator.press(key)
-    sent = operator.ticks(24, DOWN)
-    assert {twist for twist in sent if twist} <= {STILL}  # a release moves nothing by its twist
-    assert sent[16:] == [None] * 8
-
-
-def test_a_release_excludes_the_gamepad(operator: Operator) -> None:
-    operator.press("f")
+    assert FIRST_GEAR not in operator.ticks(20, DOWN)
     operator.ticks(1, UP)
-    assert operator.ticks(2, DOWN) == [STILL, STILL]
+    assert operator.ticks(2, DOWN)[-1] == FIRST_GEAR
 
 
 def test_keys_have_priority_over_the_gamepad(operator: Operator) -> None:
     operator.ticks(1, UP)
     operator.press("s")
-    assert operator.ticks(2, DOWN)[-1] == Twist(-0.2, 0.0)
-
-
-def pushed(events: int, linear: float = 0.6, deadman: bool = True) -> Stick:
-    """Return a gamepad that has sent so many events."""
-    return Stick(Deflection(linear, 0), deadman=deadman, turbo=False, events=events)
-
-
-LIMIT_TICKS = 40  # 2 s
+    assert operator.ticks(2, DOWN)[-1] == Request(Twist(-0.2, 0.0))
 
 
 def test_a_gamepad_that_freezes_while_it_drives_is_released(operator: Operator) -> None:
-    operator.ticks(1, pushed(0, deadman=False))
+    operator.ticks(1, UP)
     for event in range(1, 60):  # a hand's tremor: three seconds of it
-        assert operator.ticks(1, pushed(event)) != [None]
-    frozen = operator.ticks(100, pushed(59))
-    driven = [twist for twist in frozen if twist]
-    assert driven == [driven[0]] * LIMIT_TICKS + [STILL] * 3
-    assert frozen[len(driven) :] == [None] * (100 - len(driven))
-    assert operator.controls.gamepad_expired
-
-
-def test_a_frozen_gamepad_that_recovers_needs_its_deadman_again(operator: Operator) -> None:
-    operator.ticks(1, pushed(0, deadman=False))
-    operator.ticks(60, pushed(1))
-    for event in range(2, 30):  # it recovers with the stick still pushed
-        assert operator.ticks(1, pushed(event)) == [None]
-    operator.ticks(1, pushed(31, deadman=False))
-    assert operator.ticks(2, pushed(32))[-1] is not None
-    assert not operator.controls.gamepad_expired
+        assert operator.ticks(1, stick(0.6, events=event)) != [None]
+    due, frozen = [], []
+    for _ in range(100):
+        frozen += operator.ticks(1, stick(0.6, events=59))
+        due.append(operator.controls.is_gamepad_due(operator.now_ns - PERIOD_NS))
+    assert frozen == [frozen[0]] * LIMIT_TICKS + [NEUTRAL] * 3 + [None] * 57
+    assert due == [False] * 20 + [True] * 20 + [False] * 60
+    assert operator.controls.is_gamepad_silent
+    for event in range(60, 90):  # it recovers with the stick still pushed
+        assert operator.ticks(1, stick(events=event)) == [None]
+    operator.ticks(1, UP)
+    assert operator.ticks(2, stick(events=91))[-1] == FIRST_GEAR
+    assert not operator.controls.is_gamepad_silent
 
 
 @pytest.mark.parametrize("linear", [0.0, 0.05])
 def test_a_stick_at_rest_needs_no_event(operator: Operator, linear: float) -> None:
-    operator.ticks(1, pushed(0, deadman=False))
-    assert operator.ticks(400, pushed(1, linear)) == [STILL] * 400
-    assert operator.ticks(1, pushed(2)) != [STILL]  # its own movement is an event
-
-
-def test_full_deflection_has_the_same_limit(operator: Operator) -> None:
-    operator.ticks(1, pushed(0, deadman=False))
-    assert operator.ticks(LIMIT_TICKS + 3, pushed(1, 1.0))[-2:] == [STILL] * 2
-
-
-def test_the_operator_is_asked_to_move_the_stick_in_time(operator: Operator) -> None:
-    operator.ticks(1, pushed(0, deadman=False))
-    due = []
-    for _ in range(LIMIT_TICKS + 5):
-        operator.ticks(1, pushed(1))
-        due.append(operator.controls.gamepad_is_due(operator.now_ns - PERIOD_NS))
-    assert due == [False] * 21 + [True] * 20 + [False] * 4
+    operator.ticks(1, UP)
+    assert operator.ticks(400, stick(linear, events=1)) == [NEUTRAL] * 400
+    assert not operator.controls.is_gamepad_due(operator.now_ns)
+    assert operator.ticks(1, stick(events=2)) == [FIRST_GEAR]  # its own movement is an event
 
 
 def test_after_the_keys_a_frozen_gamepad_does_not_drive(operator: Operator) -> None:
-    operator.ticks(1, pushed(0, deadman=False))
-    operator.ticks(2, pushed(1))
+    operator.ticks(1, UP)
+    operator.ticks(2, stick(events=1))
     for _ in range(60):
         operator.press("s")
-        operator.ticks(1, pushed(1))
-    assert {twist.linear for twist in operator.ticks(30, pushed(1)) if twist} == {-0.2, 0.0}
+        operator.ticks(1, stick(events=1))
+    after = operator.ticks(30, stick(events=1))
+    assert {request.twist.linear for request in after if request} == {-0.2, 0.0}
+
+
+# --- mapping --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("held", "push"),
+    [
+        ([], (0, 0)),
+        (["w"], (1, 0)),
+        (["down"], (-1, 0)),
+        (["a"], (0, 1)),
+        (["right"], (0, -1)),
+        (["w", "a"], (1, 1)),
+        (["z"], (1, 1)),
+        (["c"], (1, -1)),
+        (["w", "s"], (0, 0)),
+        (["w", "up"], (1, 0)),  # twice the same is not twice as fast
+        (["z", "w", "a"], (1, 1)),
+        (["s", "a"], (-1, 1)),
+        (["end"], (-1, -1)),  # the tail goes left
+        (["pagedown"], (-1, 1)),
+    ],
+)
+def test_keys_give_a_direction(held: list[str], push: tuple[float, float]) -> None:
+    assert deflection(held) == Deflection(*push)
+
+
+@given(st.lists(st.sampled_from(sorted(DIRECTIONS))))
+def test_keys_never_exceed_full_deflection(held: list[str]) -> None:
+    push = deflection(held)
+    assert max(abs(push.linear), abs(push.angular)) <= 1
+
+
+def test_no_deflection_is_no_motion() -> None:
+    assert [twist(Deflection(), gear, SETTINGS) for gear in (1, 5)] == [STILL, STILL]
+
+
+@pytest.mark.parametrize(
+    ("raw", "expo", "expected"),
+    [
+        (0.0, 0.5, 0.0),
+        (0.1, 0.0, 0.0),
+        (-0.1, 0.0, 0.0),
+        (1.0, 0.5, 1.0),
+        (-1.0, 0.5, -1.0),
+        (1.5, 1.0, 1.0),
+        (0.55, 0.0, 0.5),
+        (0.55, 1.0, 0.125),
+        (-0.55, 1.0, -0.125),
+        (math.nan, 0.5, 0.0),
+        (math.inf, 0.5, 0.0),
+    ],
+)
+def test_a_stick_has_a_deadzone_and_full_deflection(
+    raw: float, expo: float, expected: float
+) -> None:
+    both = shaped(Deflection(raw, raw), 0.1, expo)
+    assert (both.linear, both.angular) == pytest.approx((expected, expected))
+
+
+@given(st.floats(), st.floats(0.02, 0.5), st.floats(0, 1))
+def test_a_stick_never_exceeds_full_deflection(raw: float, deadzone: float, expo: float) -> None:
+    assert -1 <= shaped(Deflection(raw, 0), deadzone, expo).linear <= 1

@@ -1,65 +1,73 @@
-"""Hold to drive: deadlines of keys, the deadman, and the gamepad watchdog's table."""
+"""Hold to drive: deadlines of keys, the deadman, and the rules as one stateful property."""
 
 import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
 from common.freshness import NS_PER_S
-from services.teleop.core.hold import Deadman, GamepadWatchdog, Keys, Press
+from common.motion import STILL
+from common.operator import ZEROS
+from services.teleop.config import Teleop
+from services.teleop.core.controls import Controls, Deflection, Stick
+from services.teleop.core.hold import RULES, Again, Deadman, Keys, Press
 
 
 def at(seconds: float) -> int:
     return round(seconds * NS_PER_S)
 
 
-@pytest.fixture
-def keys() -> Keys:
-    return Keys(first_s=0.6, repeat_s=0.3)
+@pytest.mark.parametrize(
+    ("presses", "held", "released"),
+    [
+        ([("w", 10.0)], {10.0: "w", 10.599: "w"}, 10.6),  # a tap
+        ([("w", 10.0), ("w", 10.5)], {10.799: "w"}, 10.8),  # a repeat holds for less
+        ([("w", 10.0), ("w", 10.6)], {11.199: "w"}, 11.2),  # a first press again
+        ([("w", 10.0), ("a", 10.5)], {10.55: "wa", 10.7: "a"}, 11.1),  # own deadlines
+    ],
+)
+def test_deadlines_of_keys(
+    presses: list[tuple[str, float]], held: dict[float, str], released: float
+) -> None:
+    keys = Keys(first_s=0.6, repeat_s=0.3)
+    for key, at_s in presses:
+        keys.press(key, at(at_s))
+    for at_s, names in held.items():
+        assert keys.held(at(at_s)) == list(names)
+    assert keys.held(at(released)) == []
 
 
-def test_a_tap_holds_for_the_first_time(keys: Keys) -> None:
-    keys.press("w", at(10))
-    assert keys.held(at(10.599)) == ["w"]
-    assert keys.held(at(10.6)) == []
-
-
-def test_a_repeat_holds_for_less(keys: Keys) -> None:
-    keys.press("w", at(10))
-    keys.press("w", at(10.5))
-    assert keys.held(at(10.799)) == ["w"]
-    assert keys.held(at(10.8)) == []
-
-
-def test_a_press_after_the_hold_is_a_first_one_again(keys: Keys) -> None:
-    keys.press("w", at(10))
-    keys.press("w", at(10.6))
-    assert keys.held(at(11.199)) == ["w"]
-
-
-def test_each_key_has_its_own_deadline(keys: Keys) -> None:
-    keys.press("w", at(10))
-    keys.press("a", at(10.5))
-    assert keys.held(at(10.55)) == ["w", "a"]
-    assert keys.held(at(10.7)) == ["a"]
-
-
-def test_a_key_pressed_alone_releases_the_others_and_repeats(keys: Keys) -> None:
+def test_other_keys_are_released_and_a_kept_one_repeats() -> None:
+    keys = Keys(first_s=0.6, repeat_s=0.3)
     keys.press("f", at(10))
-    keys.press_alone("b", at(10.1))
-    assert keys.held(at(10.15)) == ["b"]
-    keys.press_alone("b", at(10.5))
-    assert keys.held(at(10.799)) == ["b"]
+    for at_s in (10.1, 10.5):
+        keys.keep({"b"})
+        keys.press("b", at(at_s))
+        assert keys.held(at(at_s)) == ["b"]
     assert keys.held(at(10.8)) == []
 
 
-def test_clear_releases_all_keys(keys: Keys) -> None:
+@pytest.mark.parametrize(
+    ("again", "held", "counts_at"),
+    [
+        (Again.HELD, ["w"], 10.1),
+        (Again.NEXT_PRESS, [], 10.1),
+        (Again.AFTER_PAUSE, [], 10.7),
+    ],
+)
+def test_when_released_keys_count_again(again: Again, held: list[str], counts_at: float) -> None:
+    keys = Keys(first_s=0.6, repeat_s=0.3)
     keys.press("w", at(10))
-    keys.clear()
-    assert keys.held(at(10)) == []
+    keys.release(again, at(10.1))
+    assert keys.held(at(10.1)) == held
+    assert keys.is_muted(at(10.699)) is (again is Again.AFTER_PAUSE)
+    keys.press("w", at(counts_at))
+    assert keys.held(at(counts_at)) == ["w"]
 
 
-def test_muted_keys_count_again_after_a_pause(keys: Keys) -> None:
-    keys.press("w", at(10))
-    keys.mute(at(10.1))
-    assert keys.held(at(10.1)) == []
+def test_a_key_that_is_still_held_extends_the_pause() -> None:
+    keys = Keys(first_s=0.6, repeat_s=0.3)
+    keys.release(Again.AFTER_PAUSE, at(10.1))
     for still_held in (10.699, 11.298):
         keys.press("w", at(still_held))
         assert keys.held(at(still_held)) == []
@@ -71,61 +79,128 @@ def test_the_age_of_a_press() -> None:
     assert Press("w", at(10)).age_s(at(12.5)) == 2.5
 
 
-def test_a_deadman_that_is_found_down_does_not_count() -> None:
-    deadman = Deadman()
-    assert [deadman.held(down) for down in (True, True, False, True)] == [False, False, False, True]
-
-
-def test_a_dropped_deadman_must_come_up_again() -> None:
-    deadman = Deadman()
-    deadman.held(False)
-    assert deadman.held(True)
+def test_a_deadman_counts_after_it_was_up() -> None:
+    deadman, held = Deadman(2.0), []
+    for down in (True, True, False, True):
+        deadman.update(down, 0, at(10))
+        held.append(deadman.is_held)
     deadman.drop()
-    assert deadman.seen_up is False
-    assert not deadman.held(True)
-    assert not deadman.held(False)
-    assert deadman.held(True)
-
-
-@pytest.fixture
-def watchdog() -> GamepadWatchdog:
-    watchdog = GamepadWatchdog(2.0)
-    watchdog.update(5, 10 * NS_PER_S)
-    return watchdog
+    for down in (True, False, True):
+        held.append(deadman.is_held)
+        deadman.update(down, 0, at(10))
+    assert [*held, deadman.is_held] == [False, False, False, True, False, False, False, True]
 
 
 @pytest.mark.parametrize(
-    ("quiet_s", "due", "expired"),
+    ("quiet_s", "due", "silent"),
     [(0.0, False, False), (1.0, False, False), (1.05, True, False), (2.0, True, False),
      (2.05, True, True), (60.0, True, True)],
 )  # fmt: skip
-def test_the_limits_of_the_gamepad_watchdog(
-    watchdog: GamepadWatchdog, quiet_s: float, due: bool, expired: bool
-) -> None:
-    now_ns = 10 * NS_PER_S + round(quiet_s * NS_PER_S)
-    watchdog.update(5, now_ns)
-    assert watchdog.quiet_s(now_ns) == pytest.approx(quiet_s)
-    assert (watchdog.is_due(now_ns), watchdog.is_expired(now_ns)) == (due, expired)
+def test_the_limits_of_a_quiet_gamepad(quiet_s: float, due: bool, silent: bool) -> None:
+    deadman, now_ns = Deadman(2.0), at(10 + quiet_s)
+    deadman.update(True, 5, at(10))
+    deadman.update(True, 5, now_ns)
+    assert (deadman.is_due(now_ns), deadman.is_silent(now_ns)) == (due, silent)
+    for events in (6, 0):
+        deadman.update(True, events, now_ns)
+        assert not deadman.is_due(now_ns)
 
 
-@pytest.mark.parametrize("events", [6, 0, None])
-def test_an_event_and_a_new_or_lost_gamepad_restart_the_time(
-    watchdog: GamepadWatchdog, events: int | None
-) -> None:
-    watchdog.update(events, 15 * NS_PER_S)
-    assert not watchdog.is_due(15 * NS_PER_S)
+def test_a_gamepad_that_is_found_again_has_its_whole_time() -> None:
+    deadman = Deadman(2.0)
+    deadman.update(False, 0, at(10))
+    deadman.lose()
+    deadman.update(False, 0, at(20))
+    assert not deadman.is_due(at(20))
+    deadman.update(True, 0, at(20))
+    assert deadman.is_held
+    deadman.lose()
+    assert not deadman.is_held
 
 
-def test_the_watchdog_starts_without_a_gamepad() -> None:
-    watchdog = GamepadWatchdog(2.0)
-    assert watchdog.quiet_s(10 * NS_PER_S) == 10.0
-    watchdog.update(0, 10 * NS_PER_S)
-    assert watchdog.quiet_s(10 * NS_PER_S) == 0.0
+def test_every_rule_releases_something() -> None:
+    assert all(each.keys is not Again.HELD or each.deadman for each in RULES.values())
+    assert {name for name, each in RULES.items() if not each.deadman} == {"terminal_slow"}
 
 
-def test_no_gamepad_is_never_silent(watchdog: GamepadWatchdog) -> None:
-    watchdog.update(None, 12 * NS_PER_S)
-    watchdog.update(None, 20 * NS_PER_S)
-    assert watchdog.quiet_s(20 * NS_PER_S) == 0.0
-    watchdog.update(5, 21 * NS_PER_S)  # it is back
-    assert watchdog.quiet_s(22 * NS_PER_S) == 1.0
+class Hold(RuleBasedStateMachine):
+    """Keys, a gamepad and rules in any order, against what the operator's hands did.
+
+    Nothing moves without a hand that holds since the last rule; a hand that holds, moves; a drive
+    begins with a zero and ends with three.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.settings = Teleop()
+        self.controls = Controls(self.settings)
+        self.now_ns = at(100)
+        self.until_ns: dict[str, int] = {}  # the last moment at which a key may drive
+        self.counts_ns = 0  # when keys count again
+        self.stick: Stick | None = None
+        self.was_up = False  # the deadman, since the last rule
+        self.moved_ns = 0  # the last event of the gamepad
+        self.zeros = ZEROS  # sent since the last motion
+        self.was_held = False
+
+    @rule(key=st.sampled_from("wasdzc"))
+    def press(self, key: str) -> None:
+        self.controls.terminal.sent(0, self.now_ns)
+        self.controls.terminal.answered(0, self.now_ns)
+        self.controls.press(Press(key, self.now_ns), self.now_ns)
+        if self.now_ns < self.counts_ns:
+            self.counts_ns = self.now_ns + at(self.settings.hold_first)
+            return
+        repeats = self.now_ns < self.until_ns.get(key, 0)
+        hold_s = self.settings.hold if repeats else self.settings.hold_first
+        self.until_ns[key] = self.now_ns + at(hold_s)
+
+    @rule(name=st.sampled_from(sorted(RULES)))
+    def enforce(self, name: str) -> None:
+        self.controls.enforce(name, self.now_ns)
+        if RULES[name].keys is not Again.HELD:
+            self.until_ns = {}
+        if RULES[name].keys is Again.AFTER_PAUSE:
+            self.counts_ns = self.now_ns + at(self.settings.hold_first)
+        if RULES[name].deadman:
+            self.was_up = False
+
+    @rule(push=st.sampled_from((-1.0, 0.0, 0.05, 0.5)), deadman=st.booleans())
+    def move_stick(self, push: float, deadman: bool) -> None:
+        events = self.stick.events + 1 if self.stick else 0
+        self.stick = Stick(Deflection(push, 0.0), deadman, events)
+        self.moved_ns = self.now_ns
+
+    @precondition(lambda self: self.stick is not None)
+    @rule()
+    def unplug(self) -> None:
+        self.stick = None
+
+    @rule(ticks=st.sampled_from((1, 2, 5, 7, 13, 41)))
+    def tick(self, ticks: int) -> None:
+        for _ in range(ticks):
+            self.check()
+            self.now_ns += NS_PER_S // 20
+
+    def check(self) -> None:
+        request = self.controls.tick(self.stick, self.now_ns)
+        by_keys = {key for key, until_ns in self.until_ns.items() if self.now_ns < until_ns}
+        self.was_up = self.stick is not None and (self.was_up or not self.stick.deadman)
+        by_stick = self.stick is not None and self.stick.deadman and self.was_up
+        push = self.stick.push.linear if self.stick else 0.0
+        is_late = self.now_ns - self.moved_ns > at(self.settings.gamepad_silence)
+        if by_stick and not by_keys and abs(push) > self.settings.deadzone and is_late:
+            by_stick = self.was_up = False
+        is_held = bool(by_keys) or by_stick
+        moves = request is not None and request.twist != STILL
+        if is_held and self.was_held and (len(by_keys) == 1 or (not by_keys and abs(push) > 0.1)):
+            assert moves
+        if not is_held or not self.was_held:
+            assert not moves
+        assert (request is None) == (not is_held and self.zeros == ZEROS)
+        self.zeros = 0 if is_held else min(ZEROS, self.zeros + 1)
+        self.was_held = is_held
+
+
+Hold.TestCase.settings = settings(max_examples=200, stateful_step_count=40)
+TestHold = Hold.TestCase

@@ -4,8 +4,9 @@ from typing import Any
 
 import pytest
 
-from common.messages import Bumper, Cause, Direction, Driver, Limits, Velocity
+from common.messages import Bumper, Cause, Driver, Limits, ReleaseRequest, Velocity
 from common.motion import Twist
+from common.operator import Request
 from services.teleop import panels
 from services.teleop.core.round_trip import UNKNOWN
 from services.teleop.view import Line, View
@@ -115,9 +116,11 @@ def test_alarm_verdict_and_causes(fields: dict[str, Any], rows: int, expected: l
     assert panels.safety(view(**fields), rows).plain.split("\n") == expected
 
 
-def contact_rows(rows: int = 4, held: Direction | None = None, **fields: object) -> list[str]:
+def contact_rows(rows: int = 4, held: ReleaseRequest = "none", **fields: object) -> list[str]:
     state = contact_state(release=release(**fields))
-    return panels.safety(view(safety=state, release=held), rows).plain.split("\n")
+    return panels.safety(view(safety=state, requested=Request(release=held)), rows).plain.split(
+        "\n"
+    )
 
 
 def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
@@ -201,10 +204,10 @@ def table(of: View) -> dict[str, str]:
         ),
         ({"safety": safety_state(source="teleop")}, {"driver": "teleop (you)"}),
         ({"safety": safety_state(source="nav")}, {"driver": "nav"}),
-        ({"release": "forward"}, {"driver": "you, release forward"}),
+        ({"requested": Request(release="forward")}, {"driver": "you, release forward"}),
         ({"gamepad": "Pad"}, {"gamepad": "Pad"}),
         ({"gamepad": "Pad", "move_stick": True}, {"gamepad": "no event: MOVE THE STICK"}),
-        ({"requested": Twist(-0.0, -0.0)}, {"m/s": "+0.00        -         -"}),
+        ({"requested": Request(Twist(-0.0, -0.0))}, {"m/s": "+0.00        -         -"}),
     ],
 )
 def test_rows_of_the_motion_panel(fields: dict[str, Any], expected: dict[str, str]) -> None:
@@ -218,7 +221,7 @@ def test_speeds_requested_allowed_and_measured(linear: float, allowed: str) -> N
     limits = Limits(forward=0.22, backward=0.5, angular=0.9)
     shown = table(
         view(
-            requested=Twist(linear, 0.1),
+            requested=Request(Twist(linear, 0.1)),
             safety=safety_state(limits=limits),
             velocity=Velocity(linear=0.21, angular=-0.02),
         )

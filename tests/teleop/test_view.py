@@ -1,15 +1,11 @@
-"""The event log, and a topic's newest value."""
+"""The event log: newest lines, repeated lines, captured log lines."""
 
 import pytest
 
-from common import keys
-from common.freshness import NS_PER_S
 from common.log import Logger
-from common.messages import Bumper
 from common.settings import Log
 from common.verdict import MAX_TEXT
-from services.teleop.view import ANSWER_NS, LINES, EventLog, LatestTopic, Line
-from tests.fake_bus import FakeBus
+from services.teleop.view import LINES, EventLog, Line
 
 
 def test_lines_are_kept_the_newest_last() -> None:
@@ -53,21 +49,6 @@ def test_a_repeated_line_is_kept_once_with_its_last_time() -> None:
     ]
 
 
-def test_an_answer_that_also_comes_as_an_event_is_one_line() -> None:
-    event_log = EventLog()
-    for t_ns, text in (
-        (1, "reset refused: contact"),
-        (2, "contact"),
-        (3, "reset refused: contact"),
-    ):
-        event_log.add("safety", "warning", text, t_ns)
-        event_log.add("safety", "warning", "contact", t_ns)
-    (line,) = event_log.lines()
-    assert (line.t_ns, line.text) == (3, "reset refused: contact")
-    event_log.add("safety", "warning", "contact", 2 * ANSWER_NS)  # of another operator
-    assert [line.text for line in event_log.lines()] == ["reset refused: contact", "contact"]
-
-
 def test_control_characters_of_an_event_are_escaped() -> None:
     event_log = EventLog()
     event_log.add("odom\x1b", "info", "\x1b]0;title\x07\x1b[2J\u202e急停\n" * 500, t_ns=1)
@@ -75,22 +56,3 @@ def test_control_characters_of_an_event_are_escaped() -> None:
     assert line.service == "odom\\u001b"
     assert line.text.startswith("\\u001b]0;title\\u0007\\u001b[2J\\u202e急停\\n")
     assert len(line.text) == MAX_TEXT
-
-
-def test_a_value_is_shown_until_it_is_too_old() -> None:
-    bus = FakeBus()
-    topic = LatestTopic(bus, keys.BUMPER, 0.5)
-    assert topic.at(0) is None
-    bus.deliver(keys.BUMPER, Bumper(pressed=True), 10 * NS_PER_S)
-    assert topic.at(10 * NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
-    assert topic.at(10 * NS_PER_S + NS_PER_S // 2 + 1) is None
-
-
-def test_each_side_has_its_own_topic() -> None:
-    bus = FakeBus()
-    LatestTopic(bus, keys.DRIVER, 2.0, side="left")
-    LatestTopic(bus, keys.DRIVER, 2.0, side="right")
-    assert sorted(bus.handlers) == [
-        "t2/v1/001/tel/bridge/driver/left",
-        "t2/v1/001/tel/bridge/driver/right",
-    ]

@@ -13,7 +13,8 @@ from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from services.teleop.config import Teleop
-from services.teleop.controls import Controls, Deflection, Stick
+from services.teleop.core.controls import Controls, Deflection, Stick
+from services.teleop.core.hold import Press
 from verification.search.bus import MS, Source
 from verification.search.draw import Draw
 from verification.search.stack import Stack as Robot
@@ -66,7 +67,7 @@ class Operator(Source):
         self._script = script(draw)[::-1]
         self._gamepad = draw.get("operator.device", "keyboard") == "gamepad"
         self._controls = Controls(Teleop())
-        self._controls.press(str(draw.get("operator.gear", 3)), 0)
+        self._controls.gear = int(draw.get("operator.gear", 3))
         self._events = 0
         self._began_ns: int | None = None  # the current manoeuvre
         self._idle_until_ns = 0
@@ -98,7 +99,7 @@ class Operator(Source):
         now_ns = self.process.net.now_ns
         driving = self._began_ns is not None
         push = self._script[-1].push if driving and self._script else Deflection()
-        stick = Stick(push, deadman=driving, turbo=False, events=self._events)
+        stick = Stick(push, deadman=driving, events=self._events)
         request = self._controls.tick(stick if self._gamepad else None, now_ns)
         self.message = None
         if request is not None:
@@ -120,7 +121,7 @@ class Operator(Source):
         if self._gamepad:
             self._events += 1
         else:
-            self._controls.press(self._script[-1].key, now_ns)
+            self._press(self._script[-1].key, now_ns)
         self._blocked_ns = (self._blocked_ns or now_ns) if "blocked" in causes else None
         blocked_s = (now_ns - (self._blocked_ns or now_ns)) / NS_PER_S
         if held_s > self._script[-1].hold_s or blocked_s > PATIENCE_S:
@@ -128,8 +129,14 @@ class Operator(Source):
         elif "neutral" in causes and held_s > LET_GO_S:
             self._let_go(now_ns, LET_GO_S)
 
+    def _press(self, key: str, now_ns: int) -> None:
+        """Press a key of a terminal that answers at once."""
+        self._controls.terminal.sent(0, now_ns)
+        self._controls.terminal.answered(0, now_ns)
+        self._controls.press(Press(key, now_ns), now_ns)
+
     def _let_go(self, now_ns: int, pause_s: float) -> None:
-        self._controls.release_all()
+        self._controls.enforce("unfocused", now_ns)
         self._began_ns = self._blocked_ns = None
         self._idle_until_ns = now_ns + round(pause_s * NS_PER_S)
 
@@ -147,7 +154,7 @@ class Operator(Source):
             self._free_ns = None if self._pressed else self._free_ns or now_ns
             if self._free_ns is None and since_s < LOOK_S + BACK_OFF_S:
                 if way := way_off(state.release):
-                    self._controls.press(RELEASE_KEYS[way], now_ns)
+                    self._press(RELEASE_KEYS[way], now_ns)
             elif now_ns % RESET_NS == 0 and now_ns - (self._free_ns or now_ns) > CLEAR_NS:
                 self._robot.reset()
 

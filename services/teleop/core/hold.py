@@ -1,38 +1,69 @@
-"""Hold to drive: which keys count as held, and when a gamepad counts.
+"""Hold to drive: which keys and which gamepad count as held, and what releases them.
 
-**Keys.** A terminal sends a key when it goes down and again while it stays down, but nothing when
-it comes up. A key is therefore held until a deadline: ``first`` seconds after its first press (most
-terminals send the first repeat after half a second) and ``repeat`` seconds after each repeat. After
-a loss of the bus, keys count only after ``first`` seconds without any key: a key that is still held
-then is an old request.
+A terminal sends a key when it goes down and again while it stays down, but nothing when it comes
+up. A key is therefore held until a deadline: ``hold_first`` seconds after its first press (most
+terminals send the first repeat after half a second) and ``hold`` seconds after each repeat. A
+gamepad's deadman button reports both edges, but it counts only after it was seen up.
 
-**Deadman.** A gamepad's button reports both edges, but it counts only after it was seen up. A
-button that is down when the gamepad is found, or after a stop, must be released first.
+Each of these rules releases controls that are still held down (``RULES``):
 
-**Gamepad watchdog.** A gamepad that freezes while its USB receiver stays enumerated keeps its last
-state: the deadman stays down, the stick stays deflected. SDL reports changes only, so silence alone
-is no fault:
+============== ============================================ ================== ==================
+rule           condition                                    keys count again   deadman counts
+============== ============================================ ================== ==================
+stop           space, E, quit, or F and B, which exclude    with the next      again after it was
+               driving                                      press              up
+unfocused      the terminal lost the focus, and with it     with the next      after it was up
+               the repeats                                  press
+terminal_slow  ``round_trip`` refuses a key                 after a pause      not released
+unheard        no state of safety for a second              after a pause      after it was up
+overruled      another source drives for half a second      after a pause      after it was up
+gamepad_silent deflected stick, no event of the gamepad for not released       after it was up
+               ``gamepad_silence``
+gamepad_gone   no gamepad, or a screen that hangs           not released       after it was up
+============== ============================================ ================== ==================
 
-========= ============ ==================== ==========================================
-deadman   stick        events               gamepad
-========= ============ ==================== ==========================================
-up        any          any or none          moves nothing
-down      at rest      any or none          requests zero, which is harmless
-down      deflected    one within the limit drives
-down      deflected    none within it       released, until the deadman was released
-========= ============ ==================== ==========================================
+The pause is ``hold_first`` without any key: a key that repeats is still held, and an old request.
 
-A thumb on a deflected stick is never still: at 8 to 16 bits its tremor changes one of the two axes
-many times a second. At the mechanical end one axis may be clamped, but the cross axis is not, and
-every axis, hat and button counts. Full deflection is the fastest motion, so it has the same limit.
-The screen asks for a movement after half of it.
+A gamepad that freezes while its USB receiver stays enumerated keeps its last state. SDL reports
+changes only, so silence alone is no fault: a stick at rest requests zero. A thumb on a deflected
+stick is never still: at 8 to 16 bits its tremor changes one of the two axes many times a second. At
+the mechanical end one axis may be clamped, but the cross axis is not, and every axis, hat and
+button counts. The screen asks for a movement after half of the limit.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
 
 from common.freshness import NS_PER_S
 from common.messages import SafetyState
+
+
+class Again(Enum):
+    """When released keys count again."""
+
+    HELD = "not released"
+    NEXT_PRESS = "with the next press"
+    AFTER_PAUSE = "after a pause"
+
+
+class Rule(NamedTuple):
+    """What a rule releases."""
+
+    keys: Again
+    deadman: bool  # counts again after it was up
+
+
+RULES = {
+    "stop": Rule(Again.NEXT_PRESS, True),
+    "unfocused": Rule(Again.NEXT_PRESS, True),
+    "terminal_slow": Rule(Again.AFTER_PAUSE, False),
+    "unheard": Rule(Again.AFTER_PAUSE, True),
+    "overruled": Rule(Again.AFTER_PAUSE, True),
+    "gamepad_silent": Rule(Again.HELD, True),
+    "gamepad_gone": Rule(Again.HELD, True),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,78 +86,69 @@ class Keys:
         self._first_ns = round(first_s * NS_PER_S)
         self._repeat_ns = round(repeat_s * NS_PER_S)
         self._until_ns: dict[str, int] = {}
-        self._muted_until_ns: int | None = None
+        self._muted_until_ns = 0
 
     def press(self, key: str, now_ns: int) -> None:
         """Handle a key press or its repeat; a terminal does not distinguish them."""
         if self.is_muted(now_ns):
-            self.mute(now_ns)
+            self.release(Again.AFTER_PAUSE, now_ns)
             return
         hold_ns = self._repeat_ns if key in self.held(now_ns) else self._first_ns
         self._until_ns[key] = now_ns + hold_ns
 
-    def press_alone(self, key: str, now_ns: int) -> None:
-        """Handle a key press or its repeat, and release every other key."""
-        self._until_ns = {held: at for held, at in self._until_ns.items() if held == key}
-        self.press(key, now_ns)
+    def keep(self, keys: Collection[str]) -> None:
+        """Release all other keys."""
+        self._until_ns = {key: at for key, at in self._until_ns.items() if key in keys}
 
-    def held(self, now_ns: int) -> Iterable[str]:
+    def held(self, now_ns: int) -> list[str]:
         """Return the keys that are held."""
         return [key for key, until_ns in self._until_ns.items() if now_ns < until_ns]
 
-    def clear(self) -> None:
-        """Release all keys."""
-        self._until_ns.clear()
+    def release(self, again: Again, now_ns: int) -> None:
+        """Release all keys, until they count again."""
+        if again is not Again.HELD:
+            self._until_ns.clear()
+        if again is Again.AFTER_PAUSE:
+            self._muted_until_ns = now_ns + self._first_ns
 
     def is_muted(self, now_ns: int) -> bool:
         """Return whether key presses are still ignored."""
-        return self._muted_until_ns is not None and now_ns < self._muted_until_ns
-
-    def mute(self, now_ns: int) -> None:
-        """Release all keys and ignore further ones until there was a pause."""
-        self.clear()
-        self._muted_until_ns = now_ns + self._first_ns
+        return now_ns < self._muted_until_ns
 
 
-@dataclass
 class Deadman:
-    """A button that enables motion while it is down, after it was seen up once."""
+    """A gamepad's button that enables motion while it is down, and the events of its stick."""
 
-    seen_up: bool = False
+    def __init__(self, silence_s: float) -> None:
+        self.is_held = False
+        self._silence_s = silence_s
+        self._seen_up = False
+        self._events: int | None = None
+        self._event_ns = 0
 
-    def held(self, down: bool) -> bool:
-        """Update the button's state and return whether it counts as held."""
-        self.seen_up = self.seen_up or not down
-        return down and self.seen_up
-
-    def drop(self) -> None:
-        """Require a release before it counts again."""
-        self.seen_up = False
-
-
-class GamepadWatchdog:
-    """Time without events of a gamepad, against a limit."""
-
-    _events: int | None
-    _event_ns: int
-
-    def __init__(self, limit_s: float) -> None:
-        self._limit_s = limit_s
-        self.update(None, 0)
-
-    def update(self, events: int | None, now_ns: int) -> None:
-        """Update the number of events so far; None without a gamepad."""
-        if events is None or events != self._events:
+    def update(self, down: bool, events: int, now_ns: int) -> None:
+        """Process the button and the number of events since the gamepad was found."""
+        self._seen_up = self._seen_up or not down
+        self.is_held = down and self._seen_up
+        if events != self._events:
             self._events, self._event_ns = events, now_ns
 
-    def quiet_s(self, now_ns: int) -> float:
-        """Return the time since the last event, in seconds."""
-        return (now_ns - self._event_ns) / NS_PER_S
+    def drop(self) -> None:
+        """Release it: it counts again after it was up."""
+        self.is_held = self._seen_up = False
+
+    def lose(self) -> None:
+        """Release it without a gamepad: its next state is an event."""
+        self.drop()
+        self._events = None
 
     def is_due(self, now_ns: int) -> bool:
         """Return whether the operator should move the stick to keep driving."""
-        return self.quiet_s(now_ns) > self._limit_s / 2
+        return self._quiet_s(now_ns) > self._silence_s / 2
 
-    def is_expired(self, now_ns: int) -> bool:
-        """Return whether the gamepad may no longer drive."""
-        return self.quiet_s(now_ns) > self._limit_s
+    def is_silent(self, now_ns: int) -> bool:
+        """Return whether a deflected stick may no longer drive."""
+        return self._quiet_s(now_ns) > self._silence_s
+
+    def _quiet_s(self, now_ns: int) -> float:
+        return (now_ns - self._event_ns) / NS_PER_S

@@ -1,0 +1,198 @@
+"""The operator's controls: keys and gamepad to requests, 20 times a second.
+
+A key counts by its age, and by the round trip of the terminal:
+
+========== ============================== ==================== =============
+key        older than ``MAX_PRESS_AGE_S`` ``round_trip`` slow  otherwise
+========== ============================== ==================== =============
+E, space   accepted                       accepted             accepted
+R          LATE                           SLOW                 RESET
+motion     LATE                           SLOW, rule           accepted
+others     LATE                           accepted             accepted
+========== ============================== ==================== =============
+
+``hold`` has the rules that release controls. Keys have priority over the gamepad. ``f`` or ``b``,
+held, requests a release off a pressed bumper and excludes driving; the last one pressed counts.
+
+A key gives a direction, a stick a deflection: -1..1 on each of the two axes. The gear sets the
+speed of full deflection, in ``base_link``: m/s and rad/s, counter-clockwise. Backward left means
+that the rear goes left, as in a car.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+from common import codec
+from common.messages import Direction
+from common.motion import Twist, clamp
+from common.operator import DriveRequests, Phase, Request
+from services.teleop.config import Teleop
+from services.teleop.core.hold import RULES, Deadman, Keys, Press
+from services.teleop.core.round_trip import RoundTrip
+
+MAX_PRESS_AGE_S = 0.5
+ESTOP, RESET, STOP = "e", "r", "space"
+RELEASE: dict[str, Direction] = {"f": "forward", "b": "backward"}
+GEARS = {"1": 1, "2": 2, "3": 3, "4": 4, "5": 5}
+
+
+@dataclass(frozen=True, slots=True)
+class Deflection:
+    """Deflection of a control, -1..1: forward and counter-clockwise positive."""
+
+    linear: float = 0.0
+    angular: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stick:
+    """State of a gamepad."""
+
+    push: Deflection
+    deadman: bool  # held down; without it the sticks are ignored
+    events: int = 0  # received since the gamepad was found
+
+
+# The keypad without NumLock sends home, pageup, end and pagedown from its corners. A terminal
+# repeats one key only, so each arc has its own key.
+DIRECTIONS = {
+    "w": Deflection(1, 0), "up": Deflection(1, 0),
+    "s": Deflection(-1, 0), "down": Deflection(-1, 0),
+    "a": Deflection(0, 1), "left": Deflection(0, 1),
+    "d": Deflection(0, -1), "right": Deflection(0, -1),
+    "z": Deflection(1, 1), "home": Deflection(1, 1),
+    "c": Deflection(1, -1), "pageup": Deflection(1, -1),
+    "end": Deflection(-1, -1), "pagedown": Deflection(-1, 1),
+}  # fmt: skip
+
+
+class Action(Enum):
+    """What a key press asks of the shell."""
+
+    NONE = "none"
+    ESTOP = "stop the vehicle"
+    RESET = "reset the causes on the screen"
+    LATE = "report a press that is too old"
+    SLOW = "report a slow terminal"
+
+
+class Controls:
+    """Held keys and gamepad; ``tick`` runs at the request rate."""
+
+    def __init__(self, settings: Teleop) -> None:
+        self.gear = 1
+        self.terminal = RoundTrip(settings.round_trip)
+        self.is_gamepad_silent = False  # deflected without events; until it drives again
+        self._settings = settings
+        self._keys = Keys(settings.hold_first, settings.hold)
+        self._deadman = Deadman(settings.gamepad_silence)
+        self._by_gamepad = False  # whether a stick moves the vehicle
+        self._requests = DriveRequests()
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether no request is being sent."""
+        return self._requests.phase is Phase.SILENT
+
+    def press(self, press: Press, now_ns: int) -> Action:
+        """Process a key press or its repeat; unknown keys are ignored."""
+        key = press.key
+        if key in (ESTOP, STOP):
+            self.stop(now_ns)
+            return Action.ESTOP if key == ESTOP else Action.NONE
+        if press.age_s(now_ns) > MAX_PRESS_AGE_S:
+            return Action.LATE
+        moves = key in DIRECTIONS or key in RELEASE
+        if (moves or key == RESET) and self.terminal.refusal(press.at_ns):
+            self.enforce("terminal_slow", now_ns)
+            return Action.SLOW
+        if moves:
+            self._keys.keep(DIRECTIONS.keys() if key in DIRECTIONS else {key})
+            self._keys.press(key, press.at_ns)
+        if key in RELEASE:
+            self._deadman.drop()
+        self.gear = GEARS.get(key, self.gear)
+        return Action.RESET if key == RESET else Action.NONE
+
+    def enforce(self, rule: str, now_ns: int) -> None:
+        """Release what a rule of ``hold`` releases."""
+        self._keys.release(RULES[rule].keys, now_ns)
+        if RULES[rule].deadman:
+            self._deadman.drop()
+
+    def stop(self, now_ns: int) -> None:
+        """Release everything and send zeros, even if nothing was sent before."""
+        self.enforce("stop", now_ns)
+        self._requests.stop()
+
+    def is_muted(self, now_ns: int) -> bool:
+        """Return whether keys are ignored until there was a pause."""
+        return self._keys.is_muted(now_ns)
+
+    def holds_keys(self, now_ns: int) -> bool:
+        """Return whether a key that moves the vehicle is held."""
+        return bool(self._keys.held(now_ns))
+
+    def is_gamepad_due(self, now_ns: int) -> bool:
+        """Return whether the operator must move the stick to keep driving."""
+        return self._by_gamepad and self._deadman.is_due(now_ns)
+
+    def top(self) -> Twist:
+        """Return the twist of full deflection."""
+        return twist(Deflection(1, 1), self.gear, self._settings)
+
+    def tick(self, stick: Stick | None, now_ns: int) -> Request | None:
+        """Return the request to send now, or None; ``stick`` is None without a gamepad."""
+        if stick is None:
+            self.enforce("gamepad_gone", now_ns)
+            self._deadman.lose()
+        else:
+            self._deadman.update(stick.deadman, stick.events, now_ns)
+        return self._requests.tick(self._held(stick, now_ns))
+
+    def _held(self, stick: Stick | None, now_ns: int) -> Request | None:
+        self._by_gamepad = False
+        keys = self._keys.held(now_ns)
+        if keys and keys[0] in RELEASE:
+            return Request(release=RELEASE[keys[0]])
+        if keys:
+            return Request(twist(deflection(keys), self.gear, self._settings))
+        if stick is None or not self._deadman.is_held:
+            return None
+        push = shaped(stick.push, self._settings.deadzone, self._settings.expo)
+        moves = push != Deflection()
+        self.is_gamepad_silent = moves and self._deadman.is_silent(now_ns)
+        if self.is_gamepad_silent:
+            self.enforce("gamepad_silent", now_ns)
+            return None
+        self._by_gamepad = moves
+        return Request(twist(push, self.gear, self._settings))
+
+
+def deflection(held: Iterable[str]) -> Deflection:
+    """Return the deflection of all held keys; opposite keys cancel out."""
+    pushes = [DIRECTIONS[key] for key in held]
+    return Deflection(
+        clamp(sum(push.linear for push in pushes), 1.0),
+        clamp(sum(push.angular for push in pushes), 1.0),
+    )
+
+
+def shaped(raw: Deflection, deadzone: float, expo: float) -> Deflection:
+    """Return a stick's deflection after deadzone and expo curve; full deflection stays 1."""
+    return Deflection(_shape(raw.linear, deadzone, expo), _shape(raw.angular, deadzone, expo))
+
+
+def twist(push: Deflection, gear: int, settings: Teleop) -> Twist:
+    """Return the twist of a deflection in a gear, 1 to 5."""
+    linear, angular = settings.gears_linear[gear - 1], settings.gears_angular[gear - 1]
+    return Twist(push.linear * linear, push.angular * angular)
+
+
+def _shape(raw: float, deadzone: float, expo: float) -> float:
+    if not codec.finite(raw) or abs(raw) <= deadzone:
+        return 0.0
+    linear = min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone))
+    curved = expo * linear**3 + (1.0 - expo) * linear
+    return curved if raw > 0 else -curved
