@@ -55,27 +55,14 @@ def test_late_joiners_get_no_motion(buses: BusFixture) -> None:
     assert driven == []
 
 
-def test_presence_appears_and_goes(buses: BusFixture) -> None:
-    seen: list[tuple[str, bool]] = []
-    key = keys.live_key(buses.robot, "bridge", "1a")
-    buses.bus(
-        lambda bus: bus.watch_live(
-            keys.live_key(buses.robot, "*", "*"), lambda key, alive: seen.append((key, alive))
-        )
-    )
+def test_presence_appears_and_goes_and_late_watchers_see_it(buses: BusFixture) -> None:
+    early: list[tuple[str, bool]] = []
+    late: list[str] = []
+    key, all_keys = (keys.live_key(buses.robot, *of) for of in (("bridge", "1a"), ("*", "*")))
+    buses.bus(lambda bus: bus.watch_live(all_keys, lambda *what: early.append(what)))
     bus = buses.bus(lambda bus: bus.live(key))
-    wait_until(lambda: (key, True) in seen, "the token")
+    wait_until(lambda: (key, True) in early, "the token")
+    buses.bus(lambda bus: bus.watch_live(all_keys, lambda key, _: late.append(key)))
+    wait_until(lambda: key in late, "the token, late")
     bus.close()
-    wait_until(lambda: (key, False) in seen, "its end")
-
-
-def test_who_watches_late_sees_who_is_there(buses: BusFixture) -> None:
-    key = keys.live_key(buses.robot, "bridge", "1a")
-    buses.bus(lambda bus: bus.live(key))
-    seen: list[str] = []
-    buses.bus(
-        lambda bus: bus.watch_live(
-            keys.live_key(buses.robot, "*", "*"), lambda key, _: seen.append(key)
-        )
-    )
-    wait_until(lambda: key in seen, "the token")
+    wait_until(lambda: (key, False) in early, "its end")
