@@ -18,31 +18,21 @@ REMOVED = 1542
 AXIS, BALL, HAT, DOWN, UP = range(1536, 1541)
 
 
+def event(kind: int, joystick: int = 3) -> SimpleNamespace:
+    return SimpleNamespace(type=kind, instance_id=joystick)
+
+
 class FakeJoystick:
     """One gamepad: six axes, eleven buttons."""
 
     def __init__(self, index: int) -> None:
         self.axes = [0.0, -0.5, 0.0, 0.25, 0.0, 0.0]
-        self.buttons = [False] * 11
-        self.buttons[4] = True
-
-    def get_name(self) -> str:
-        return "Fake Pad"
-
-    def get_instance_id(self) -> int:
-        return 3
-
-    def get_numaxes(self) -> int:
-        return len(self.axes)
-
-    def get_numbuttons(self) -> int:
-        return len(self.buttons)
-
-    def get_axis(self, index: int) -> float:
-        return self.axes[index]
-
-    def get_button(self, index: int) -> bool:
-        return self.buttons[index]
+        self.get_name = lambda: "Fake Pad"
+        self.get_instance_id = lambda: 3
+        self.get_numaxes = lambda: len(self.axes)
+        self.get_numbuttons = lambda: 11
+        self.get_axis = lambda index: self.axes[index]
+        self.get_button = lambda index: index == 4
 
 
 class FakePygame:
@@ -56,7 +46,7 @@ class FakePygame:
     def __init__(self) -> None:
         self.count = 1
         self.events: list[Any] = []
-        self.made = FakeJoystick
+        self.made: Any = FakeJoystick
         self.display = SimpleNamespace(init=lambda: None)
         self.event = SimpleNamespace(get=self._get)
         self.joystick = SimpleNamespace(
@@ -85,43 +75,31 @@ def test_a_lost_gamepad_reads_as_none_and_may_return() -> None:
     pygame = FakePygame()
     pad = gamepad(pygame)
     pad.read()
-    pygame.count, pygame.events = 0, [SimpleNamespace(type=REMOVED, instance_id=3)]
+    pygame.events = [event(REMOVED, joystick=4)]  # another one
+    assert pad.read() is not None
+    pygame.count, pygame.events = 0, [event(REMOVED)]
     assert pad.read() is None
     assert pad.status == "none"
     pygame.count = 1
     assert pad.read() is not None
 
 
-def test_the_loss_of_another_gamepad_is_ignored() -> None:
-    pygame = FakePygame()
-    pad = gamepad(pygame)
-    pad.read()
-    pygame.events = [
-        SimpleNamespace(type=REMOVED, instance_id=4),
-        SimpleNamespace(type=1, instance_id=3),
-    ]
-    assert pad.read() is not None
-
-
 def test_input_events_are_counted() -> None:
     pygame = FakePygame()
-    pad = gamepad(pygame)
-    pygame.events = [SimpleNamespace(type=AXIS, instance_id=3)]  # of one that is not ours yet
-    counts = []
+    pad, counts = gamepad(pygame), []
     for events in (
-        [],
-        [SimpleNamespace(type=AXIS, instance_id=3)],
-        [SimpleNamespace(type=each, instance_id=3) for each in (BALL, HAT, DOWN, UP)],
-        [SimpleNamespace(type=AXIS, instance_id=4)],  # another one's
+        [event(AXIS)],  # of one that is not ours yet
+        [event(AXIS)],
+        [event(each) for each in (BALL, HAT, DOWN, UP)],
+        [event(AXIS, joystick=4)],  # another one's
         [SimpleNamespace(type=1541, guid="")],  # a gamepad was added
-        [SimpleNamespace(type=1616, instance_id=3)],  # its battery
-        [],
+        [event(1616)],  # its battery
     ):
+        pygame.events = list(events)
         stick = pad.read()
         assert stick is not None
         counts.append(stick.events)
-        pygame.events = list(events)
-    assert counts == [0, 0, 1, 5, 5, 5, 5]
+    assert counts == [0, 1, 5, 5, 5, 5]
 
 
 def test_a_gamepad_that_is_gone_before_it_opens_is_none() -> None:
@@ -129,39 +107,34 @@ def test_a_gamepad_that_is_gone_before_it_opens_is_none() -> None:
         raise RuntimeError("Invalid joystick device number")
 
     pygame = FakePygame()
-    pygame.made = gone  # type: ignore[assignment]
+    pygame.made = gone
     assert gamepad(pygame).read() is None
 
 
-def test_a_disabled_gamepad_does_not_import_pygame(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pygame", None)  # importing it would fail
-    pad = find(Teleop(gamepad=False))
-    assert (pad.status, pad.read()) == ("off", None)
+def broken() -> None:
+    raise RuntimeError("no joystick subsystem")
 
 
-def test_missing_pygame_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    assert find(Teleop()).status == "none: pygame-ce is not installed"
-
-
-def test_missing_sdl_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail() -> None:
-        raise RuntimeError("no joystick subsystem")
-
-    pygame = FakePygame()
-    pygame.joystick.init = fail
-    monkeypatch.setitem(sys.modules, "pygame", pygame)
-    assert find(Teleop()).status == "none: no joystick subsystem"
-
-
-def test_sdl_starts_without_display_and_without_output(
-    capfd: pytest.CaptureFixture[str],
+@pytest.mark.parametrize(
+    ("pygame", "enabled", "status"),
+    [
+        (None, False, "off"),  # importing it would fail
+        (None, True, "none: pygame-ce is not installed"),
+        ("broken", True, "none: no joystick subsystem"),
+    ],
+)
+def test_a_missing_gamepad_names_the_reason(
+    monkeypatch: pytest.MonkeyPatch, pygame: Any, enabled: bool, status: str
 ) -> None:
-    pytest.importorskip("pygame")
-    pad = find(Teleop())
-    assert isinstance(pad, SdlGamepad)
-    pad.read()
-    assert capfd.readouterr() == ("", "")
+    if pygame:
+        pygame = FakePygame()
+        pygame.joystick.init = broken
+    monkeypatch.setitem(sys.modules, "pygame", pygame)
+    pad = find(Teleop(gamepad=enabled))
+    assert (pad.status, pad.read()) == (status, None)
+
+
+# --- SDL ------------------------------------------------------------------------------------
 
 
 class VirtualGamepad:
@@ -188,9 +161,12 @@ class VirtualGamepad:
 
 
 @pytest.fixture
-def virtual() -> Iterator[tuple[SdlGamepad, VirtualGamepad]]:
+def virtual(
+    capfd: pytest.CaptureFixture[str],
+) -> Iterator[tuple[SdlGamepad, VirtualGamepad]]:
     pytest.importorskip("pygame")
     pad = find(Teleop())
+    assert capfd.readouterr() == ("", "")  # without a display, and without its banner
     if not (isinstance(pad, SdlGamepad) and MAPS.exists() and "libSDL2-" in MAPS.read_text()):
         pytest.skip("SDL 2 is not available")
     gamepad = VirtualGamepad()
@@ -199,9 +175,7 @@ def virtual() -> Iterator[tuple[SdlGamepad, VirtualGamepad]]:
     assert pad.read() is None
 
 
-def test_sdl_reports_every_change_once(
-    virtual: tuple[SdlGamepad, VirtualGamepad],
-) -> None:
+def test_sdl_reports_every_change_once(virtual: tuple[SdlGamepad, VirtualGamepad]) -> None:
     pad, gamepad = virtual
 
     def events() -> int:
@@ -226,8 +200,7 @@ def test_a_gamepad_of_sdl_that_freezes_while_it_drives_is_released(
     virtual: tuple[SdlGamepad, VirtualGamepad],
 ) -> None:
     pad, gamepad = virtual
-    controls, now_ns = Controls(Teleop()), 0
-    moved = []
+    controls, now_ns, moved = Controls(Teleop()), 0, []
     for tick in range(120):
         if tick == 1:
             gamepad.press(4)

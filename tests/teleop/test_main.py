@@ -1,114 +1,176 @@
-"""The whole program in a pseudo terminal, on a real bus."""
+"""The whole program in a pseudo terminal, near, far or stalled, on a real bus."""
 
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
 
-from common import keys
+from common import clock, keys
 from common.bus.bus import Arrival, Bus
+from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import Drive, Health
+from common.messages import Drive, Event, Health
 from services.teleop import __main__ as teleop
 from verification.harness.bus import bus_on, running
 from verification.harness.ports import free_port
-from verification.harness.teleop_terminal import Terminal, terminal
+from verification.harness.teleop_terminal import STRICT, TELEOP, Terminal, terminal
 from verification.harness.waiting import wait_until
 
+REPEAT_S = 0.033
+FAR_S = 0.21  # each way: 0.42 s there and back
+
+
+class Listener:
+    """Records requested speeds with their times, teleop's events, presence and health."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[int, float]] = []
+        self.events: list[str] = []
+        self.alive: list[str] = []
+        self.health: list[Health] = []
+
+    def declare(self, bus: Bus) -> None:
+        bus.subscribe(keys.DRIVE, self._on_drive, source="teleop", depth=64)
+        bus.subscribe(keys.EVENTS, self._on_event, service="teleop")
+        bus.subscribe(keys.HEALTH, lambda it: self.health.append(it.message), service="teleop")
+        bus.watch_live(keys.live_key("001", "teleop", "*"), lambda key, up: self.alive.append(key))
+
+    def _on_drive(self, arrival: Arrival[Drive]) -> None:
+        self.asked.append((arrival.received_ns, arrival.message.linear))
+
+    def _on_event(self, arrival: Arrival[Event]) -> None:
+        self.events.append(arrival.message.name)
+
+    @property
+    def speeds(self) -> set[float]:
+        return {linear for _, linear in self.asked}
+
+    @property
+    def zeros(self) -> int:
+        """The number of zeros at the end."""
+        moving = [i for i, (_, linear) in enumerate(self.asked) if linear]
+        return len(self.asked) - 1 - moving[-1]
+
+    def moves_after(self, since_ns: int) -> float:
+        """Return how long after a moment the last request to move came; 0 if none came."""
+        return max((at - since_ns for at, linear in self.asked if linear), default=0) / NS_PER_S
+
 
 @pytest.fixture
-def loop() -> Iterator[Loop]:
-    with running(Loop()) as loop:
-        yield loop
+def listener(endpoint: str) -> Iterator[Listener]:
+    listener = Listener()
+    with running(Loop()) as loop, bus_on(endpoint, loop, listener.declare):
+        yield listener
 
 
-@pytest.fixture
-def requests() -> list[Drive]:
-    return []
+def ready(it: Terminal, listener: Listener) -> None:
+    """Wait for the screen and for the connection through the bus."""
 
-
-@pytest.fixture
-def bus(endpoint: str, loop: Loop, requests: list[Drive]) -> Iterator[Bus]:
-    def hear(arrival: Arrival[Drive]) -> None:
-        requests.append(arrival.message)
-
-    with bus_on(
-        endpoint, loop, lambda bus: bus.subscribe(keys.DRIVE, hear, source="teleop", depth=64)
-    ) as bus:
-        yield bus
-
-
-def drive_off(it: Terminal, requests: list[Drive]) -> None:
-    """Hold W until a drive request is sent."""
-
-    def hold(key: str) -> bool:
-        it.type(key)
+    def zero() -> bool:
+        it.type(" ")
         it.read()
-        return any((request.linear > 0) == (key == "w") for request in requests)
+        return bool(listener.asked)
 
     wait_until(lambda: it.shows(b"ESTOP"), "the screen")
-    wait_until(lambda: hold(" "), "a zero: the way through the bus is open")
-    wait_until(lambda: hold("w"), "a request to move")
-    assert {request.linear for request in requests} == {0.0, 0.2}
+    wait_until(zero, "a zero: the way through the bus is open")
 
 
-def zeros(requests: list[Drive]) -> int:
-    """Return the number of zeros at the end."""
-    moving = [i for i, request in enumerate(requests) if request.linear]
-    return len(requests) - 1 - moving[-1]
+def hold(it: Terminal, seconds: float, done: Callable[[], bool] = lambda: False) -> int:
+    """Hold W with a keyboard's repeats; return the time of its release."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and not done():
+        it.type("w")
+        time.sleep(REPEAT_S)
+    return clock.now_ns()
 
 
-def hang_up(it: Terminal) -> None:
-    it.hang_up()
+def drive_off(it: Terminal, listener: Listener) -> None:
+    """Hold W until a request to move is sent; release it for a while before a further try."""
+
+    def moves() -> bool:
+        hold(it, 1.0, lambda: 0.2 in listener.speeds)
+        if 0.2 not in listener.speeds:
+            time.sleep(1.0)
+        return 0.2 in listener.speeds
+
+    ready(it, listener)
+    wait_until(moves, "a request to move")
+    assert listener.speeds == {0.0, 0.2}
 
 
-def terminate(it: Terminal) -> None:
-    it.process.send_signal(signal.SIGTERM)
-
-
-def leave(it: Terminal) -> None:
-    it.type("q")
-
-
-@pytest.mark.usefixtures("bus")
 @pytest.mark.parametrize(
-    ("end", "code"), [(hang_up, teleop.EXIT_HANGUP), (terminate, 0), (leave, 0)]
+    ("end", "code"),
+    [
+        (Terminal.hang_up, teleop.EXIT_HANGUP),
+        (lambda it: it.process.send_signal(signal.SIGTERM), 0),
+        (lambda it: it.type("q"), 0),
+    ],
 )
 def test_every_end_sends_zeros_and_then_nothing(
-    endpoint: str, requests: list[Drive], end: Callable[[Terminal], None], code: int
+    endpoint: str, listener: Listener, end: Callable[[Terminal], None], code: int
 ) -> None:
     with terminal(endpoint) as it:
-        drive_off(it, requests)
+        drive_off(it, listener)
         end(it)
         wait_until(it.ends, "its end")
         assert it.process.returncode == code
-        wait_until(lambda: zeros(requests) >= 3, "zeros")
-    assert 3 <= zeros(requests) <= 5  # a hold that ran out just before adds to them
+        wait_until(lambda: listener.zeros >= 3, "zeros")
+    assert 3 <= listener.zeros <= 5  # a hold that ran out just before adds to them
+    assert listener.alive
+    assert {health.service for health in listener.health} <= {"teleop"}
 
 
-@pytest.mark.usefixtures("bus")
-def test_a_release_sends_zeros_and_then_nothing(endpoint: str, requests: list[Drive]) -> None:
-    with terminal(endpoint) as it:
-        drive_off(it, requests)
-        wait_until(lambda: zeros(requests) >= 3, "zeros")
+def test_a_release_counts_at_once_and_sends_zeros_and_then_nothing(
+    endpoint: str, listener: Listener
+) -> None:
+    with terminal(endpoint, *TELEOP, delay_s=0.05) as it:
+        drive_off(it, listener)
+        released_ns = hold(it, 0.5)
+        wait_until(lambda: listener.zeros >= 3, "zeros")
+        assert listener.moves_after(released_ns) < 0.5
         assert it.process.poll() is None
+        wait_until(lambda: listener.health, "health")
         it.type("q")
         wait_until(it.ends, "its end")
-    assert zeros(requests) == 6  # three for the release, three for the end: silence in between
+    assert listener.zeros == 6  # three for the release, three for the end: silence in between
 
 
-def test_presence_and_health_are_on_the_bus(endpoint: str, loop: Loop) -> None:
-    alive: list[str] = []
-    health: list[Health] = []
+# --- slow terminals -------------------------------------------------------------------------
 
-    def declare(bus: Bus) -> None:
-        bus.subscribe(keys.HEALTH, lambda it: health.append(it.message), service="teleop")
-        bus.watch_live(keys.live_key("001", "teleop", "*"), lambda key, up: alive.append(key))
 
-    with bus_on(endpoint, loop, declare), terminal(endpoint):
-        wait_until(lambda: alive and health, "presence and health")
-    assert health[0].service == "teleop"
+def test_a_far_terminal_does_not_drive_and_its_estop_counts(
+    endpoint: str, listener: Listener
+) -> None:
+    with terminal(endpoint, *STRICT, delay_s=FAR_S) as it:
+        ready(it, listener)
+        hold(it, 1.5)
+        wait_until(lambda: it.shows(b"KEYS OFF: terminal too slow: 0.4"), "the reason")
+        assert listener.speeds == {0.0}
+        it.type("e")
+        wait_until(lambda: "estop" in listener.events, "the emergency stop")
+
+
+def test_keys_that_a_stall_held_up_do_not_drive(endpoint: str, listener: Listener) -> None:
+    with terminal(endpoint, *STRICT, delay_s=0.02) as it:
+        time.sleep(1.5)
+        drive_off(it, listener)
+        it.stall(1.2)
+        released_ns = hold(it, 0.3)
+        time.sleep(2.5)
+    assert listener.moves_after(released_ns) < 0.4
+
+
+def test_a_terminal_that_never_answers_does_not_drive(endpoint: str, listener: Listener) -> None:
+    with terminal(endpoint, *STRICT, answers=False) as it:
+        ready(it, listener)
+        hold(it, 1.0)
+        time.sleep(0.5)
+        assert listener.speeds == {0.0}
+
+
+# --- the start ------------------------------------------------------------------------------
 
 
 def test_a_missing_router_is_shown() -> None:
