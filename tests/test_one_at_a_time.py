@@ -27,7 +27,7 @@ from services.odom.config import OdomConfig
 from services.odom.core.estimator import Estimator
 from services.odom.odometer import Odometer
 from services.safety.config import SafetyConfig
-from services.safety.policy import Policy
+from services.safety.core.policy import Policy
 from services.safety.service import SafetyService
 from verification.harness.bus import bus_on, running
 from verification.harness.fake_board import Board, board

@@ -16,7 +16,7 @@ from cli.inspect.schema import fields_of
 from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
-from services.safety.causes import RULES, SEVERITY, Clears
+from services.safety.core.causes import RULES, SEVERITY, Clears
 from tools import rights_table, sdk, settings_file
 from verification.harness.results import filled, table
 

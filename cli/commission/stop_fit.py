@@ -19,7 +19,7 @@ from statistics import NormalDist, mean, stdev
 from cli.commission.stops import Kind, Stop
 from common.messages import Direction
 from services.safety.config import Safety
-from services.safety.zones import stopping_distance
+from services.safety.core.release import stopping_distance
 
 MEAN, NEXT = 0.9875, 0.975  # quantiles: 97.5 % two-sided, 97.5 % one-sided
 FEWEST = 5  # stops of one kind and direction

@@ -1,20 +1,20 @@
-"""Reports: the motion message, the published state with its text, and transitions as events."""
+"""Reports: the published state with its texts, and transitions as events."""
 
 from collections.abc import Iterator
 
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.messages import Cause, Level, Limits, Motion, Release, SafetyState
+from common.messages import SONAR_NAMES, Cause, Level, Limits, Release, SafetyState
 from common.motion import RUN, Twist
-from services.safety.causes import BARRING, BY_NAME
-from services.safety.inputs import Event as Trigger
-from services.safety.inputs import Inputs, Reset
-from services.safety.latches import GOOD_SAMPLES, latched, ordered
-from services.safety.operator_requests import BUMPER_FREE, BY_HAND, room, spent
-from services.safety.policy import Policy
-from services.safety.state import State
-from services.safety.trajectory import OPPOSITE
+from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched, ordered
+from services.safety.core.inputs import Event as Trigger
+from services.safety.core.inputs import Reset
+from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, spent
+from services.safety.core.policy import Policy
+from services.safety.core.sonars import Sonar
+from services.safety.core.state import State
+from services.safety.trajectory import OPPOSITE, Approach
 
 MOVING = ("run", "slow")
 # Event names that differ from the cause's name.
@@ -37,30 +37,14 @@ class Transition(Struct, frozen=True):
     about: dict[str, str | None]
 
 
-def motion_message(state: State, inputs: Inputs) -> Motion:
-    """Return the motion message of a decision on these inputs."""
-    verdict = state.verdict
-    return Motion(
-        command=verdict.command,
-        linear=verdict.twist.linear,
-        angular=verdict.twist.angular,
-        source=verdict.source,
-        judged=verdict.acked[1],
-        judged_boot=verdict.acked[0],
-        latched=bool(latched(state.latches)),
-        predecessor=inputs.link.value.latched_by if inputs.link else None,
-        estop=state.estop,
-    )
-
-
-def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
+def state_message(policy: Policy, state: State, approach: Approach, now_ns: int) -> SafetyState:
     """Return the published state, with the heartbeat of ``state``."""
     causes = tuple(
         Cause(
             name=name,
             action=BY_NAME[name].action,
             age=(now_ns - state.latches[name].since_ns) / NS_PER_S,
-            text=state.latches[name].text,
+            text=text(state, name),
             id=state.latches[name].id,
         )
         for name in ordered(state.latches)
@@ -73,7 +57,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         limits=_limits(policy, state, now_ns),
         heartbeat=state.heartbeat.number,
         text=sentence(state, by_hand=bool(spent(state, policy.settings))),
-        release=_release(policy, state, now_ns) if "contact" in state.latches else None,
+        release=_release(policy, state, approach, now_ns) if "contact" in state.latches else None,
         release_refusal=state.release.refusal,
         estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
@@ -88,17 +72,17 @@ def sentence(state: State, *, by_hand: bool = False) -> str:
     names = ordered(state.latches)
     if state.verdict.command is RUN:
         control = _source_text(state.verdict.source)
-        slowing = [state.latches[n].text for n in names if BY_NAME[n].action == "slow"]
+        slowing = [text(state, n) for n in names if BY_NAME[n].action == "slow"]
         return " ".join([*slowing[:1], control])
     worst = names[0]
-    text = state.latches[worst].text
+    why = text(state, worst)
     if worst not in latched(state.latches):
-        return text
+        return why
     if state.latches[worst].good >= GOOD_SAMPLES:
-        return f"{text} Reset to go on."
+        return f"{why} Reset to go on."
     if worst == "contact":
-        return f"{text} {_way_off(state, by_hand=by_hand)}"
-    return f"{text} {STILL_PRESENT.get(worst, 'The cause is still present: fix it, then reset.')}"
+        return f"{why} {_way_off(state, by_hand=by_hand)}"
+    return f"{why} {STILL_PRESENT.get(worst, 'The cause is still present: fix it, then reset.')}"
 
 
 def _way_off(state: State, *, by_hand: bool) -> str:
@@ -107,6 +91,64 @@ def _way_off(state: State, *, by_hand: bool) -> str:
         return BY_HAND
     # A reset clears the others, and only then a release is accepted.
     return RESET_OTHERS if len(latched(state.latches)) > 1 else MOVE_OFF
+
+
+def text(state: State, name: str) -> str:
+    """Return the text of a held cause; that of the newest decision for a cause of planning."""
+    verdict, default = state.verdict, state.latches[name].text
+    match name:
+        case "neutral":
+            return _overruled_text(state, verdict.source) or default
+        case "blocked" if verdict.blocked_by is not None:
+            return _blocked_text(state, verdict.blocked_by)
+        case "obstacle" if verdict.slowed_by is not None:
+            return _slowed_text(state, verdict.slowed_by)
+        case "limit" if verdict.limited_by:
+            because = state.speed_limits.channels[verdict.limited_by].because
+            return f"Slowed by {verdict.limited_by}{because}."
+        case "sonar":
+            return f"Sonar not trusted: {_doubts(state.sonar_array.sonars)}."
+        case _:
+            return default
+
+
+def _overruled_text(state: State, source: str | None) -> str:
+    """Return a text when another source overruled the requesting one; otherwise empty."""
+    channel = state.arbiter.channels.get(source or "")
+    if channel is None or not channel.overruled_by:
+        return ""
+    return f"{channel.overruled_by} was in control: {source} needs a neutral request first."
+
+
+def _blocked_text(state: State, sonar: int) -> str:
+    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
+    if not one.fault:
+        return f"No room toward the {name}: {one.distance:.2f} m."
+    past = ""
+    if sonar in state.sonar_array.unseen and "release" not in state.latches:
+        past = " An operator can creep past: release the controls, then drive."
+    return f"No motion toward the {name}: that sonar is {one.fault}.{past}"
+
+
+def _slowed_text(state: State, sonar: int) -> str:
+    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
+    if one.fault:
+        return f"Creeping toward the {name}: that sonar is {one.fault} and sees nothing there."
+    if one.suspect:
+        return (
+            f"Creeping toward the {name}: that sonar still shows {one.same:.2f} m although the "
+            "vehicle moved."
+        )
+    return f"Slowed by an obstacle at {one.distance:.2f} m ({name})."
+
+
+def _doubts(sonars: tuple[Sonar, ...]) -> str:
+    """Return the names of the untrusted sonars with the reason."""
+    doubts = [one.fault or ("suspect" if one.suspect else "") for one in sonars]
+    if doubts[0] and len(set(doubts)) == 1:
+        return f"all {doubts[0]}"
+    pairs = zip(SONAR_NAMES, doubts, strict=True)
+    return ", ".join(f"{name.replace('_', ' ')} {doubt}" for name, doubt in pairs if doubt)
 
 
 def signature(state: State) -> tuple[object, ...]:
@@ -121,8 +163,8 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
     old, new = before.verdict, after.verdict
     tripped = [name for name in latched(after.latches) if _is_new(before, after, name)]
     for name in tripped:
-        text = after.latches[name].text
-        yield Transition(EVENT_NAMES.get(name, name), "error", text, {"cause": name})
+        event = EVENT_NAMES.get(name, name)
+        yield Transition(event, "error", after.latches[name].text, {"cause": name})
     worst = next(iter(ordered(after.latches)), None)
     # A cause that latches, and a release, have events of their own.
     is_stop = old.name in MOVING and new.name not in MOVING and "release" not in before.latches
@@ -136,8 +178,8 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         )
     if ("release" in before.latches) != ("release" in after.latches):
         began = "release" in after.latches
-        text = "Creeping off the bumper." if began else "No longer creeping off the bumper."
-        yield Transition("release" if began else "release_end", "warning", text, {})
+        what = "Creeping off the bumper." if began else "No longer creeping off the bumper."
+        yield Transition("release" if began else "release_end", "warning", what, {})
     yield from _release_events(before.release.refusal, after.release.refusal)
     if isinstance(trigger, Reset) and (reply := new.reply) is not None:
         if reply.done:
@@ -167,10 +209,9 @@ def _source_text(source: str | None) -> str:
     return f"{source} is in control." if source else "No source is in control."
 
 
-def _release(policy: Policy, state: State, now_ns: int) -> Release:
-    """Return the published state of the release."""
-    release = state.release
-    came, free = release.before, None
+def _release(policy: Policy, state: State, approach: Approach, now_ns: int) -> Release:
+    """Return the published state of the release, with the way that is believed free, and why."""
+    release, came, free = state.release, approach.before, None
     if came.direction is not None and OPPOSITE[came.direction] not in release.forbidden:
         free = OPPOSITE[came.direction]
     return Release(

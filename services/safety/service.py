@@ -3,7 +3,7 @@
 All decisions are made by ``Policy``.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 from typing import TypeVar
 
 from msgspec.structs import replace
@@ -11,24 +11,21 @@ from msgspec.structs import replace
 from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.bus.calls import Caller
-from common.errors import MessageError
 from common.freshness import Latest
 from common.heartbeat import Heartbeat
 from common.keys import Topic
 from common.messages import (
     Bumper,
-    Drive,
-    EstopKeepalive,
-    Limit,
     Message,
+    Motion,
     ResetDone,
     ResetRequest,
     SafetyState,
 )
 from common.service import Node
-from services.safety.conditions import LOST_SAMPLES
 from services.safety.config import SafetyConfig
-from services.safety.inputs import (
+from services.safety.core.conditions import LOST_SAMPLES
+from services.safety.core.inputs import (
     DriveRequest,
     Estop,
     Event,
@@ -37,14 +34,10 @@ from services.safety.inputs import (
     LimitRequest,
     Reset,
 )
-from services.safety.policy import Policy, brake_for_contact
-from services.safety.report import (
-    motion_message,
-    signature,
-    state_message,
-    transitions,
-)
-from services.safety.state import Reply
+from services.safety.core.policy import Policy
+from services.safety.core.state import Reply, State
+from services.safety.report import signature, state_message, transitions
+from services.safety.trajectory import Approach
 
 M = TypeVar("M", bound=Message)
 
@@ -67,6 +60,7 @@ class SafetyService:
         start = node.bus.boot % 2**31
         self._state = replace(self._policy.start(), heartbeat=Heartbeat(start), decision=start)
         self._inputs = Inputs(boot=node.bus.boot)
+        self._approach = Approach()
         self._motion_publisher = node.open_drive(listens=False).publisher(keys.MOTION)
         self._state_publisher = node.bus.publisher(keys.SAFETY)
         self._subscribe()
@@ -76,47 +70,42 @@ class SafetyService:
 
     def _subscribe(self) -> None:
         self._subscribe_measurements()
-        bus, robot = self._node.bus, self._node.config.robot.id
-        bus.subscribe(
-            keys.DRIVE,
-            self._on_drive,
-            depth=DRIVE_DEPTH,
-            refused=self._on_bad_drive,
-            known=self._node.config.safety.sources,
-            source="*",
-        )
-        bus.subscribe(
-            keys.LIMIT,
-            self._on_limit,
-            depth=DRIVE_DEPTH,
-            refused=self._on_bad_limit,
-            known=self._node.config.safety.limits,
-            source="*",
-        )
-        self._announce(keys.DRIVE, self._node.config.safety.sources)
-        self._announce(keys.LIMIT, self._node.config.safety.limits)
-        keepalives = self._node.config.safety.estop_keepalive
-        bus.subscribe(
-            keys.ESTOP_KEEPALIVE,
-            self._on_keepalive,
-            depth=DRIVE_DEPTH,
-            refused=self._on_bad_keepalive,
-            known=keepalives,
-            source="*",
-        )
-        self._announce(keys.ESTOP_KEEPALIVE, keepalives)
-        bus.serve(keys.RESET, self._on_reset)
-        self._estop_bus.on_any(keys.estop_key(robot), lambda _: self._decide(Estop()))
+        settings = self._node.config.safety
+        self._subscribe_source(keys.DRIVE, DriveRequest, settings.sources)
+        self._subscribe_source(keys.LIMIT, LimitRequest, settings.limits)
+        self._subscribe_source(keys.ESTOP_KEEPALIVE, KeepaliveRequest, settings.estop_keepalive)
+        self._node.bus.serve(keys.RESET, self._on_reset)
+        estop_key = keys.estop_key(self._node.config.robot.id)
+        self._estop_bus.on_any(estop_key, lambda _: self._decide(Estop()))
         self._estop_bus.subscribe(keys.SAFETY, self._on_estop_path)
 
-    def _announce(self, topic: Topic[M], sources: Iterable[str]) -> None:
-        """Announce the key of each source.
+    def _subscribe_source(
+        self,
+        topic: Topic[M],
+        request: Callable[[str, M | None, int], Event],
+        known: Collection[str],
+    ) -> None:
+        """Decide on each message of a source; on an invalid one, too, which is counted.
 
-        To a client whose rights cover only one source, the router announces only subscribers of
-        exactly its key.
+        The key of each known source is announced: to a client whose rights cover only one source,
+        the router announces only subscribers of exactly its key.
         """
-        for source in sources:
-            self._node.bus.announce(topic.on(self._node.config.robot.id, source=source))
+
+        def accept(arrival: Arrival[M]) -> None:
+            source = source_of(arrival.key)
+            self._decide(request(source, arrival.message, arrival.received_ns))
+
+        bus = self._node.bus
+        bus.subscribe(
+            topic,
+            accept,
+            depth=DRIVE_DEPTH,
+            refused=lambda key, _: self._decide(request(source_of(key), None, 0)),
+            known=known,
+            source="*",
+        )
+        for source in known:
+            bus.announce(topic.on(self._node.config.robot.id, source=source))
 
     def _subscribe_measurements(self) -> None:
         """Subscribe to the bridge's measurements, on the drive link only."""
@@ -150,35 +139,11 @@ class SafetyService:
     def _on_bumper(self, arrival: Arrival[Bumper]) -> None:
         bumper, before = arrival.message, self._inputs.bumper
         self._inputs = replace(self._inputs, bumper=Latest(bumper, arrival.received_ns))
-        brake = brake_for_contact(self._state, self._inputs)
-        if brake is not None:
-            self._motion_publisher.put(brake)
         # Most samples repeat that the bumper is free, and change no verdict. But a decision counts
         # the samples since the last one: too many would look like lost ones.
         due = bumper.seq - self._state.verdict.acked[1] >= LOST_SAMPLES
         if due or bumper.pressed or before is None or differs(bumper, before.value):
             self._decide()
-
-    def _on_drive(self, arrival: Arrival[Drive]) -> None:
-        source, drive = source_of(arrival.key), arrival.message
-        self._decide(DriveRequest(source, drive, arrival.received_ns))
-
-    def _on_bad_drive(self, key: str, _: MessageError) -> None:
-        self._decide(DriveRequest(source_of(key), None))
-
-    def _on_limit(self, arrival: Arrival[Limit]) -> None:
-        source = source_of(arrival.key)
-        self._decide(LimitRequest(source, arrival.message, arrival.received_ns))
-
-    def _on_bad_limit(self, key: str, _: MessageError) -> None:
-        self._decide(LimitRequest(source_of(key), None))
-
-    def _on_keepalive(self, arrival: Arrival[EstopKeepalive]) -> None:
-        source = source_of(arrival.key)
-        self._decide(KeepaliveRequest(source, arrival.message, arrival.received_ns))
-
-    def _on_bad_keepalive(self, key: str, _: MessageError) -> None:
-        self._decide(KeepaliveRequest(source_of(key), None))
 
     def _on_reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         def answer(reply: Reply) -> None:
@@ -199,11 +164,29 @@ class SafetyService:
     ) -> None:
         now_ns = clock.now_ns()
         self._decision_timer.defer(now_ns)
-        inputs = replace(self._inputs, estop_connection=self._estop_bus.connection, event=event)
+        inputs = replace(
+            self._inputs,
+            estop_connection=self._estop_bus.connection,
+            event=event,
+            drove=self._approach.before.direction,
+        )
         before = self._state
-        self._state, verdict = self._policy.decide(before, inputs, now_ns)
-        motion = motion_message(self._state, inputs)
-        self._motion_publisher.put(motion)
+        for output in self._policy.decide(before, inputs, now_ns):
+            if isinstance(output, Motion):
+                self._motion_publisher.put(output)
+            else:
+                self._state = output
+        self._approach = self._approach.follow(inputs.counters, self._state.latches.get("contact"))
+        self._report(before, event, answer, now_ns)
+
+    def _report(
+        self,
+        before: State,
+        event: Event | None,
+        answer: Callable[[Reply], None] | None,
+        now_ns: int,
+    ) -> None:
+        verdict = self._state.verdict
         if verdict.refused:
             self._node.counters[f"refused_{verdict.refused}"] += 1
         if answer and verdict.reply:
@@ -215,7 +198,7 @@ class SafetyService:
 
     def _publish_state(self, now_ns: int) -> None:
         self._state = replace(self._state, heartbeat=self._state.heartbeat.beat(now_ns))
-        self._state_publisher.put(state_message(self._policy, self._state, now_ns))
+        self._state_publisher.put(state_message(self._policy, self._state, self._approach, now_ns))
 
     def _is_stopped(self) -> bool:
         """Stop the vehicle before shutdown; do not wait for an unknown velocity."""
@@ -223,7 +206,7 @@ class SafetyService:
             self._inputs = replace(self._inputs, leaving=True)
             self._decide()
         measured = self._inputs.measured
-        return measured is None or measured.is_standing
+        return measured is None or measured.value.is_standing
 
 
 def differs(bumper: Bumper, before: Bumper) -> bool:

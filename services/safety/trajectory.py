@@ -1,15 +1,22 @@
 """Trajectory: signed travel over the last metre by the board's counter, and its direction.
 
+It informs the operator which way off a pressed bumper is believed free, and why. It decides
+nothing.
+
 One velocity sample is not evidence of a direction, because a vehicle rebounds from a hit. The
 counter is read in steps larger than its noise, and a short run in the other direction does not
-change the result. A turn on the spot, a restart or an implausible jump discards earlier travel.
+change the result. A turn on the spot and a restart of the board or the bridge discard earlier
+travel.
 """
 
 import math
 
 from msgspec import Struct
 
-from common.messages import Direction
+from common.freshness import Latest
+from common.messages import Direction, Mileage
+from common.standstill import comparable
+from services.safety.core.causes import Held
 
 REACH_M = 1.0  # of travel is stored
 STEP_M = 0.005  # smaller changes are resolution or noise of the counter
@@ -19,34 +26,23 @@ TURN_RAD = 0.35  # a larger turn on the spot invalidates earlier travel
 OPPOSITE: dict[Direction, Direction] = {"forward": "backward", "backward": "forward"}
 
 
-class Counter(Struct, frozen=True):
-    """One reading of the board's counters."""
-
-    origin: tuple[
-        int, int
-    ]  # boot of the bridge, epoch of the board; readings of different origins are not comparable
-    distance: float  # m
-    heading: float  # rad
-
-
 class Trajectory(Struct, frozen=True):
     """The last metre as runs, each of one sign."""
 
     runs: tuple[float, ...] = ()  # m, forward positive, the oldest first
-    at: Counter | None = None  # end of the last run
+    at: Mileage | None = None  # end of the last run
     ended_ns: int | None = None  # time of that
 
-    def follow(self, counter: Counter, received_ns: int) -> "Trajectory":
+    def follow(self, counters: Latest[Mileage]) -> "Trajectory":
         """Return the trajectory after a reading of the counters."""
-        if self.at is None or self.at.origin != counter.origin:
-            return Trajectory(at=counter)
-        run = counter.distance - self.at.distance
-        if abs(run) > REACH_M:
-            return Trajectory(at=counter)
+        reading = counters.value
+        if self.at is None or not comparable(self.at, reading):
+            return Trajectory(at=reading)
+        run = reading.distance - self.at.distance
         if abs(run) >= STEP_M:
-            return Trajectory(_joined(self.runs, run), counter, received_ns)
-        turned = math.remainder(counter.heading - self.at.heading, math.tau)
-        return Trajectory(at=counter) if abs(turned) > TURN_RAD else self
+            return Trajectory(_joined(self.runs, run), reading, counters.received_ns)
+        turned = math.remainder(reading.heading - self.at.heading, math.tau)
+        return Trajectory(at=reading) if abs(turned) > TURN_RAD else self
 
     @property
     def net(self) -> float:
@@ -60,6 +56,21 @@ class Trajectory(Struct, frozen=True):
         if last * self.net <= 0:
             return None
         return "forward" if last > 0 else "backward"
+
+
+class Approach(Struct, frozen=True):
+    """The trajectory now, and the one before the newest contact."""
+
+    now: Trajectory = Trajectory()
+    before: Trajectory = Trajectory()
+    contact: int | None = None  # identity of that contact
+
+    def follow(self, counters: Latest[Mileage] | None, contact: Held | None) -> "Approach":
+        """Return the approach after a decision on these counters; ``contact`` as held now."""
+        now = self.now.follow(counters) if counters else self.now
+        if contact is None or contact.id == self.contact:
+            return Approach(now, self.before, self.contact)
+        return Approach(now, now, contact.id)
 
 
 def _joined(runs: tuple[float, ...], run: float) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from common.messages import Level
-from services.safety.causes import RULES, Clears
+from services.safety.core.causes import RULES, Clears
 from services.safety.report import EVENT_NAMES
 from tools.docs import DOCS
 

@@ -11,7 +11,7 @@ from services.dashboard import server
 from services.dashboard.auth import token_page
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.i18n import LANGUAGES, PHRASES, PLACEHOLDER, TEXTS, table
-from services.safety.causes import RULES
+from services.safety.core.causes import RULES
 from tools.docs import DOCS
 
 CODE = Path(server.__file__).parent

@@ -8,7 +8,7 @@ from common.messages import SONAR_NAMES, Cause, RangeStatus, Ultrasonic
 from common.settings import Vehicle
 from services.dashboard.sectors import Protection, Tone, sonars_named, tones, wheel_angles
 from services.safety.config import Safety
-from services.safety.zones import zones
+from services.safety.core.planning import zones
 
 AS_SHIPPED = Protection()
 

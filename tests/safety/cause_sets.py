@@ -14,12 +14,10 @@ from common.freshness import NS_PER_S
 from common.messages import ReleaseRequest
 from common.motion import STILL, Twist
 from common.standstill import Displacement
-from services.safety.arbiter import DriveChannel
-from services.safety.channel import Channel
+from services.safety.core.causes import FaultBudget
 from services.safety.core.motion_watch import Axis, Phase, Standstill
-from services.safety.keepalive import Keepalives
-from services.safety.latches import FaultBudget
-from services.safety.state import State
+from services.safety.core.sources import Channel, DriveChannel, Keepalives
+from services.safety.core.state import State
 from tests.safety.policy_fixture import PolicyFixture
 
 BRAKING = {

@@ -17,6 +17,7 @@ from common.messages import (
     Link,
     Message,
     Mileage,
+    Motion,
     RangeStatus,
     ReleaseRequest,
     SafetyState,
@@ -26,7 +27,8 @@ from common.messages import (
 )
 from common.settings import Vehicle
 from services.safety.config import Safety
-from services.safety.inputs import (
+from services.safety.core.causes import latched
+from services.safety.core.inputs import (
     DriveRequest,
     Estop,
     Event,
@@ -35,10 +37,10 @@ from services.safety.inputs import (
     LimitRequest,
     Reset,
 )
-from services.safety.latches import latched
-from services.safety.policy import Policy
-from services.safety.report import state_message
-from services.safety.state import Verdict
+from services.safety.core.policy import Policy
+from services.safety.core.state import Verdict
+from services.safety.report import state_message, text
+from services.safety.trajectory import Approach
 
 TICK_S = 0.02
 FREE: tuple[float | None, ...] = (None,) * 8
@@ -74,6 +76,8 @@ class PolicyFixture:
         self.now_ns = 10 * NS_PER_S
         self.inputs = Inputs()
         self.verdict = Verdict()
+        self.approach = Approach()
+        self.motions: list[Motion] = []
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
         self.driver_boot, self.driver_seq = 99, 0
@@ -94,7 +98,15 @@ class PolicyFixture:
 
     def decide(self, event: Event | None = None) -> Verdict:
         inputs = replace(self.inputs, estop_connection=self.estop_connection, event=event)
-        self.state, self.verdict = self.policy.decide(self.state, inputs, self.now_ns)
+        inputs = replace(inputs, drove=self.approach.before.direction)
+        self.motions = []
+        for output in self.policy.decide(self.state, inputs, self.now_ns):
+            if isinstance(output, Motion):
+                self.motions.append(output)
+            else:
+                self.state = output
+        self.approach = self.approach.follow(inputs.counters, self.state.latches.get("contact"))
+        self.verdict = self.state.verdict
         return self.verdict
 
     def feed(self) -> None:
@@ -241,7 +253,11 @@ class PolicyFixture:
 
     def published(self) -> SafetyState:
         """Return the published state."""
-        return state_message(self.policy, self.state, self.now_ns)
+        return state_message(self.policy, self.state, self.approach, self.now_ns)
+
+    def text(self, name: str) -> str:
+        """Return the published text of a held cause."""
+        return text(self.state, name)
 
     def estop(self) -> Verdict:
         return self.decide(Estop())

@@ -11,10 +11,9 @@ from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive
 from common.motion import Twist
-from services.safety.arbiter import Arbiter, DriveChannel
-from services.safety.channel import CONFLICT_NS, Admission
 from services.safety.config import Safety
-from services.safety.inputs import DriveRequest
+from services.safety.core.inputs import DriveRequest
+from services.safety.core.sources import CONFLICT_NS, Admission, Arbiter, DriveChannel
 
 SOURCES = Safety().sources
 AGE_NS = 400_000_000

@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Action
-from services.safety.causes import RULES, Clears, bars_motion, severity, wants_neutral
+from services.safety.core.causes import RULES, Clears, bars_motion, severity, wants_neutral
 
 RESET, SETTLED, NEUTRAL, AT_ONCE = Clears.RESET, Clears.SETTLED, Clears.NEUTRAL, Clears.AT_ONCE
 TABLE: list[tuple[str, Action, Clears]] = [

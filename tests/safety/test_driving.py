@@ -8,7 +8,7 @@ from msgspec.structs import replace as with_fields
 from common.freshness import NS_PER_S
 from common.messages import Drive, Switches
 from services.safety.config import Safety
-from services.safety.inputs import DriveRequest
+from services.safety.core.inputs import DriveRequest
 from tests.safety.policy_fixture import PolicyFixture
 
 
@@ -84,7 +84,7 @@ def test_the_higher_priority_drives_and_letting_go_hands_over_after_a_neutral_re
     assert fixture.verdict.source == "nav"
     assert fixture.verdict.name == "inhibited"
     text = "teleop was in control: nav needs a neutral request first."
-    assert fixture.state.latches["neutral"].text == text
+    assert fixture.text("neutral") == text
     fixture.request(0.0, source="nav")
     assert fixture.drive(0.2, source="nav").command == "run"
 

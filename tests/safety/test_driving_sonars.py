@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from services.safety.report import state_message
 from tests.safety.policy_fixture import TICK_S, PolicyFixture
 
 # --- zones ----------------------------------------------------------------------------------
@@ -39,7 +38,7 @@ def test_a_faulty_sonar_closes_its_sector_only() -> None:
     fixture = PolicyFixture().ready()
     fixture.sonar(front=None)
     assert fixture.drive(0.5).command == "stop"
-    assert "faulty" in fixture.state.latches["blocked"].text
+    assert "faulty" in fixture.text("blocked")
     assert fixture.drive(-0.5).command == "run"
 
 
@@ -97,8 +96,8 @@ def test_a_frozen_front_sonar_creeps_before_the_wall(frozen_m: float) -> None:
         assert speed <= 0.151 or speed * 0.25 + speed**2 / (2 * 0.6) < room_m
     assert fixture.verdict.twist.linear == pytest.approx(0.15)
     assert "sonar" in fixture.state.latches
-    assert "front suspect" in fixture.state.latches["sonar"].text
-    assert "Creeping toward the front" in fixture.state.latches["obstacle"].text
+    assert "front suspect" in fixture.text("sonar")
+    assert "Creeping toward the front" in fixture.text("obstacle")
     assert fixture.drive(-0.5, seconds=2.0).twist.linear == pytest.approx(-0.5)
     fixture.ranges = tuple(1.0 if one else None for one in fixture.ranges)
     fixture.drive(0.2, seconds=1.0)
@@ -109,12 +108,12 @@ def test_the_limits_tell_of_a_creep() -> None:
     fixture = PolicyFixture().ready()
     fixture.sonar(front=2.0)
     fixture.drive(0.5, seconds=3.0)
-    limits = state_message(fixture.policy, fixture.state, fixture.now_ns).limits
+    limits = fixture.published().limits
     assert limits.forward == pytest.approx(0.15)
     assert limits.backward == 1.0
     fixture.lost = 3
     fixture.drive(0.5, seconds=0.1)
-    limits = state_message(fixture.policy, fixture.state, fixture.now_ns).limits
+    limits = fixture.published().limits
     assert limits.backward == pytest.approx(0.15)
     assert limits.angular == pytest.approx(0.15 / math.hypot(0.55, 0.35))
 
@@ -123,11 +122,11 @@ def test_an_operator_creeps_past_a_faulty_sonar_after_a_neutral_request() -> Non
     fixture = PolicyFixture().running()
     fixture.sonar(front=None)
     assert fixture.drive(0.5, seconds=3.0).command == "stop"  # held on: nothing moves
-    assert "release the controls" in fixture.state.latches["blocked"].text
+    assert "release the controls" in fixture.text("blocked")
     fixture.drive()
     assert fixture.drive(0.5, seconds=1.0).name == "slow"
     assert fixture.verdict.twist.linear == pytest.approx(0.15)
-    assert "sees nothing there" in fixture.state.latches["obstacle"].text
+    assert "sees nothing there" in fixture.text("obstacle")
     assert fixture.drive(-0.5, seconds=1.0).twist.linear < -0.3  # away from it as ever
     fixture.sonar(front=0.1)
     assert fixture.drive(0.1, seconds=1.0).command == "stop"
@@ -140,7 +139,7 @@ def test_no_operator_creeps_while_all_ultrasonic_samples_are_missing() -> None:
     fixture.muted = {"ultrasonic"}
     fixture.drive(seconds=2.0)
     assert fixture.drive(0.5, seconds=1.0).command == "stop"
-    text = fixture.state.latches["blocked"].text
+    text = fixture.text("blocked")
     assert text.startswith("No motion toward the ")
     assert text.endswith(" is silent.")
 

@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import EstopKeepalive, KeepaliveState
-from services.safety.channel import CONFLICT_NS, Admission
 from services.safety.config import Safety
-from services.safety.inputs import KeepaliveRequest
-from services.safety.keepalive import Keepalives
+from services.safety.core.inputs import KeepaliveRequest
+from services.safety.core.sources import CONFLICT_NS, Admission, Keepalives
 from tests.safety.policy_fixture import PolicyFixture
 
 MS = 1_000_000

@@ -3,10 +3,10 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from services.safety.causes import RULES, severity, wants_neutral
-from services.safety.latches import (
+from services.safety.core.causes import (
     FAILURES,
     GOOD_SAMPLES,
+    RULES,
     FaultBudget,
     Held,
     Latches,
@@ -17,7 +17,9 @@ from services.safety.latches import (
     observe,
     ordered,
     reset,
+    severity,
     still_present,
+    wants_neutral,
 )
 
 SETTLE_NS = 500

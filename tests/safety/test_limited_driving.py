@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S
 from common.motion import ROUNDED_MPS, STILL
 from services.safety.config import LimitSource, Safety
-from services.safety.inputs import LimitRequest
-from services.safety.operator_requests import LET_GO
+from services.safety.core.inputs import LimitRequest
+from services.safety.core.operator_requests import LET_GO
 from tests.safety.policy_fixture import PolicyFixture
 
 LEASE_S, LEASE_NS = 0.5, 500_000_000
@@ -35,7 +35,7 @@ def test_a_cap_that_falls_is_reached_at_the_normal_deceleration() -> None:
         assert speed <= max(0.2, 1.0 - 0.6 * 0.02 * (n - 1)) + 1e-9
     assert speeds[-1] == pytest.approx(0.2)
     assert fixture.verdict.name == "slow"
-    assert fixture.state.latches["limit"].text == "Slowed by lidar: person at 2 m."
+    assert fixture.text("limit") == "Slowed by lidar: person at 2 m."
     assert fixture.published().limits.forward == pytest.approx(0.2)
     (source,) = fixture.published().limit_sources
     assert (source.effect, source.linear, source.reason) == ("slow", 0.2, "person at 2 m")

@@ -11,10 +11,15 @@ from common.errors import MessageError
 from common.heartbeat import Heartbeat
 from common.messages import Limit, LimitState
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
-from services.safety.channel import CONFLICT_NS, Admission
 from services.safety.config import LimitSource
-from services.safety.inputs import LimitRequest
-from services.safety.limits import LimitChannel, SpeedLimits, printable
+from services.safety.core.inputs import LimitRequest
+from services.safety.core.sources import (
+    CONFLICT_NS,
+    Admission,
+    LimitChannel,
+    SpeedLimits,
+    printable,
+)
 
 LEASE_S, LEASE_NS, AGE_NS = 0.5, 500_000_000, 400_000_000
 SOURCES = {
@@ -132,7 +137,7 @@ def test_a_reason_shows_no_control_characters() -> None:
     assert printable("person\tat\x1b[2J 2 m\u202e\n") == "person at [2J 2 m"
     limits = with_limit(0.2, reason="a\x07b.")
     assert limits.channels["lidar"].reason == "a b."
-    assert limits.slowed_text("lidar") == "Slowed by lidar: a b."
+    assert limits.channels["lidar"].because == ": a b"
 
 
 # --- caps -----------------------------------------------------------------------------------
@@ -143,8 +148,7 @@ def test_a_cap_keeps_the_curve() -> None:
     assert limits.limited(Twist(-1.0, 0.4), 0) == (Twist(-0.25, 0.1), "lidar")
     assert with_limit(None, 0.1).limited(Twist(1.0, 0.4), 0) == (Twist(0.25, 0.1), "lidar")
     assert limits.limited(Twist(0.25, 2.0), 0) == (Twist(0.25, 2.0), None)
-    assert limits.slowed_text("lidar") == "Slowed by lidar."
-    assert limits.slowed_text(None) == ""
+    assert limits.channels["lidar"].because == ""
 
 
 def test_the_tightest_source_is_named() -> None:

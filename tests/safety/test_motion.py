@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.motion import STILL, Twist
-from services.safety.motion import ramp, ramp_start
+from services.safety.core.planning import ramp, ramp_start
 
 UP, DOWN = Twist(0.5, 1.5), Twist(0.6, 1.0)
 speeds = st.floats(-2.0, 2.0)

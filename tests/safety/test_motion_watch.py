@@ -65,9 +65,13 @@ def test_bad_time_is_forgiven_half_as_fast_and_is_capped() -> None:
 
 @pytest.mark.parametrize("axes", [(Axis(bad_s=0.3), Axis()), (Axis(), Axis(bad_s=0.3))])
 def test_each_axis_runs_away(axes: tuple[Axis, Axis]) -> None:
-    supervisor = Supervisor(SETTINGS)
-    assert supervisor.runs_away(MotionWatch(*axes))
-    assert not supervisor.runs_away(MotionWatch(Axis(bad_s=0.29), Axis(bad_s=0.29)))
+    runaway, patient = MotionWatch(*axes), MotionWatch(Axis(bad_s=0.29), Axis(bad_s=0.29))
+    fast = Latest(Twist(2.0), 1)
+    for before, velocity, runs_away in (
+        (runaway, fast, True), (patient, fast, False), (patient, None, False)
+    ):  # fmt: skip
+        after = Supervisor(SETTINGS).follow(before, STILL, velocity, None, step_s=0.0, now_ns=1)
+        assert after.runs_away is runs_away
 
 
 # --- standstill -----------------------------------------------------------------------------
@@ -173,7 +177,6 @@ def test_an_unknown_velocity_counts_as_the_fastest() -> None:
     board.run(2 * TICK_S, None)
     assert board.late()
     assert not board.state.rolls
-    assert board.state.text == "Standstill is not confirmed: no velocity is received."
 
 
 def test_the_first_known_velocity_shortens_the_limit_once() -> None:
@@ -195,7 +198,6 @@ def test_at_start_the_limit_counts_from_the_first_velocity() -> None:
     assert not board.late()
     board.run(2 * TICK_S, 0.3)
     assert board.late()
-    assert board.state.text == "The vehicle does not stop: 0.30 m/s, 0.00 rad/s."
 
 
 def dither(board: Board, seconds: float, linear: float | None) -> float | None:
@@ -257,9 +259,9 @@ def test_a_motion_between_begins_the_confirmation_anew() -> None:
     board.run(0.1, 0.4)
     board.run(0.1, 0.0)
     board.run(0.1, -0.1)  # the rebound of a contact
-    assert board.state.still_ns is None
+    stood_ns = [board.state.still_ns]
     board.run(0.18)
-    assert board.state.still_ns is not None
+    assert [*stood_ns, board.state.phase] == [None, Phase.STOPPING]
     board.run(0.1)
     assert board.state.phase is Phase.STANDING
     assert board.state.displacement.integrated == STILL

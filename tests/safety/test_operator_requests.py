@@ -3,11 +3,11 @@
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from services.safety import operator_requests
 from services.safety.config import Safety
-from services.safety.inputs import Event, Inputs, Reset
-from services.safety.latches import FaultBudget, Held, latched
-from services.safety.state import Reply, State
+from services.safety.core import operator_requests
+from services.safety.core.causes import FaultBudget, Held, latched
+from services.safety.core.inputs import Event, Inputs, Reset
+from services.safety.core.state import Reply, State
 from tests.safety.policy_fixture import PolicyFixture, hit
 
 SETTINGS = Safety()

@@ -8,11 +8,9 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import Drive, Limits, SafetyState, Switches
-from services.safety.causes import BY_NAME, Clears
 from services.safety.config import Safety
-from services.safety.inputs import DriveRequest
-from services.safety.latches import FAILURES, latched
-from services.safety.report import motion_message
+from services.safety.core.causes import BY_NAME, FAILURES, Clears, latched
+from services.safety.core.inputs import DriveRequest
 from tests.safety.policy_fixture import TICK_S, PolicyFixture, link
 
 
@@ -282,12 +280,12 @@ def test_an_emergency_stop_that_only_the_bridge_received_latches_and_is_acknowle
     fixture.link = replace(fixture.link, estop=77)
     assert fixture.tick().command == "brake"
     assert latched(fixture.state.latches) == ("estop",)
-    assert motion_message(fixture.state, fixture.inputs).estop == 77
+    assert fixture.motions[-1].estop == 77
     fixture.linear = 0.0
     fixture.tick(60)
     assert fixture.reset() == ""  # also before the bridge has received the acknowledgement
     fixture.tick()
-    assert motion_message(fixture.state, fixture.inputs).estop == 77
+    assert fixture.motions[-1].estop == 77
     fixture.link = replace(fixture.link, estop=78)
     assert fixture.tick().command == "brake"
 

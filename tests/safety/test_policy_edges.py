@@ -6,9 +6,8 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES
 from common.motion import STILL
-from services.safety.causes import RULES
 from services.safety.config import Safety
-from services.safety.latches import FAILURES, Held
+from services.safety.core.causes import FAILURES, RULES, Held
 from tests.safety.policy_fixture import TICK_S, PolicyFixture, hit
 
 

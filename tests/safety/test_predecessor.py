@@ -5,8 +5,7 @@ from msgspec.structs import replace
 from msgspec.structs import replace as with_fields
 
 from common.messages import Direction
-from services.safety.latches import latched
-from services.safety.report import motion_message
+from services.safety.core.causes import latched
 from tests.safety.policy_fixture import PolicyFixture
 
 OLD, OWN = 5, 6
@@ -26,13 +25,12 @@ def successor(latched_by: int | None) -> PolicyFixture:
 
 
 def test_a_latch_is_reported_until_it_is_reset() -> None:
-    fixture = PolicyFixture().running()
-    assert not motion_message(fixture.state, fixture.inputs).latched
-    fixture.estop()
-    assert motion_message(fixture.state, fixture.inputs).latched
-    fixture.drive(0.0, seconds=1.0)
+    fixture, told = PolicyFixture().running(), []
+    for step in (fixture.tick, fixture.estop, lambda: fixture.drive(0.0, seconds=1.0)):
+        step()
+        told.append(fixture.motions[-1].latched)
     assert fixture.reset() == ""
-    assert not motion_message(fixture.state, fixture.inputs).latched
+    assert [*told, fixture.motions[-1].latched] == [False, True, True, False]
 
 
 def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
@@ -41,7 +39,7 @@ def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
     fixture.drive(0.0)
     assert fixture.drive(0.5, seconds=1.0).command == "brake"
     assert latched(fixture.state.latches) == ("predecessor",)
-    motion = motion_message(fixture.state, fixture.inputs)
+    motion = fixture.motions[-1]
     assert (motion.latched, motion.predecessor) == (True, OLD)
     assert fixture.reset() == "Still present: Safety restarted while a reset was due."
     fixture.link = with_fields(fixture.link, latched_by=OWN)  # the bridge has received our latch
@@ -69,7 +67,7 @@ def test_a_successor_without_a_link_sample_names_no_predecessor() -> None:
     fixture.muted = {"link"}
     fixture.tick()
     fixture.estop()
-    motion = motion_message(fixture.state, fixture.inputs)
+    motion = fixture.motions[-1]
     assert (motion.latched, motion.predecessor) == (True, None)
 
 

@@ -8,9 +8,8 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Direction, Mileage
-from services.safety.causes import BY_NAME
-from services.safety.latches import latched
-from services.safety.operator_requests import BUMPER_FREE, LET_GO, room
+from services.safety.core.causes import BY_NAME, latched
+from services.safety.core.operator_requests import BUMPER_FREE, LET_GO, room
 from tests.safety.policy_fixture import (
     DIRECTIONS,
     HOLD_TEXT,
@@ -285,7 +284,7 @@ def test_a_release_obeys_the_sonars(rear: float | None) -> None:
         0.1: "No room toward the rear: 0.10 m.",
         None: "No motion toward the rear: that sonar is faulty.",
     }
-    assert fixture.state.latches["blocked"].text == texts[rear]
+    assert fixture.text("blocked") == texts[rear]
 
 
 # --- how far, and where --------------------------------------------------------------------------

@@ -3,27 +3,26 @@
 import pytest
 from msgspec.structs import replace
 
+from common.messages import Mileage
 from common.motion import STILL, Twist
-from services.safety.latches import Held
-from services.safety.release import COAST_NS, Release, sweep
-from services.safety.trajectory import Counter, Trajectory
+from services.safety.core.causes import Held
+from services.safety.core.release import COAST_NS, Release, sweep
 
 REACH = 0.65
 BACK = Twist(-0.1)
 BACKWARD = Release(direction="backward")
-CAME = Trajectory(runs=(0.4,), ended_ns=5)
 TOUCHED = Held(1, 1, 0, (1, 1), "hit", 40)
 
 
-def at(distance: float, epoch: int = 0) -> Counter:
-    return Counter((7, epoch), distance, 0.0)
+def at(distance: float, epoch: int = 0) -> Mileage:
+    return Mileage(distance=distance, heading=0.0, epoch=epoch, boot=7)
 
 
 def moving(
     release: Release,
     sent: Twist | None = BACK,
     known: Twist | None = STILL,
-    counter: Counter | None = None,
+    counter: Mileage | None = None,
     *,
     dt_s: float = 0.02,
     now_ns: int = 0,
@@ -93,7 +92,7 @@ def test_coasting_ends_at_standstill(known: Twist | None, moves: bool) -> None:
 
 def test_a_new_contact_has_everything_anew() -> None:
     used = Release(integrated=0.1, forbidden=frozenset({"forward"}), direction="backward")
-    assert used.after(None, TOUCHED, CAME, 9) == Release(before=CAME, barred_ns=9)
+    assert used.after(None, TOUCHED, 9) == Release(barred_ns=9)
 
 
 def held(good: int, occurrence: int = 40) -> Held:
@@ -102,9 +101,9 @@ def held(good: int, occurrence: int = 40) -> Held:
 
 def test_the_same_press_and_a_clear_bumper_change_nothing() -> None:
     used = moving(BACKWARD)
-    assert used.after(held(0), TOUCHED, CAME, 9) is used
-    assert used.after(held(0), held(1), CAME, 9) is used
-    assert used.after(held(1), held(2), CAME, 9) is used
+    assert used.after(held(0), TOUCHED, 9) is used
+    assert used.after(held(0), held(1), 9) is used
+    assert used.after(held(1), held(2), 9) is used
 
 
 @pytest.mark.parametrize(
@@ -112,38 +111,32 @@ def test_the_same_press_and_a_clear_bumper_change_nothing() -> None:
 )
 def test_a_press_during_a_release_forbids_its_direction(later_ns: int, forbidden: set[str]) -> None:
     used = moving(BACKWARD)
-    after = used.after(held(1), TOUCHED, CAME, later_ns)
+    after = used.after(held(1), TOUCHED, later_ns)
     assert after.forbidden == forbidden
     assert (after.direction, after.barred_ns) == (None, later_ns)
     assert after.travelled == used.travelled
 
 
 def test_a_press_without_any_release_forbids_nothing() -> None:
-    assert Release().after(held(1), TOUCHED, CAME, 0).forbidden == frozenset()
+    assert Release().after(held(1), TOUCHED, 0).forbidden == frozenset()
     never_chosen = Release(moved_ns=0)
-    assert never_chosen.after(held(1), TOUCHED, CAME, 0).forbidden == frozenset()
+    assert never_chosen.after(held(1), TOUCHED, 0).forbidden == frozenset()
 
 
 def test_the_direction_that_moved_is_forbidden() -> None:
     moved = replace(moving(BACKWARD), direction="forward")
     still = moving(moved, sent=None)
-    assert still.after(held(1), TOUCHED, CAME, 0).forbidden == {"backward"}
+    assert still.after(held(1), TOUCHED, 0).forbidden == {"backward"}
     ramp = moving(moved, sent=STILL)  # a RUN of zero has not moved it forward
-    assert ramp.after(held(1), TOUCHED, CAME, 0).forbidden == {"backward"}
+    assert ramp.after(held(1), TOUCHED, 0).forbidden == {"backward"}
     forward = moving(moved, sent=Twist(0.01))
-    assert forward.after(held(1), TOUCHED, CAME, 0).forbidden == {"forward"}
+    assert forward.after(held(1), TOUCHED, 0).forbidden == {"forward"}
 
 
 def test_both_directions_can_be_forbidden() -> None:
-    one = moving(BACKWARD).after(held(1), TOUCHED, CAME, 0)
-    both = moving(replace(one, direction="forward")).after(held(1), TOUCHED, CAME, 0)
+    one = moving(BACKWARD).after(held(1), TOUCHED, 0)
+    both = moving(replace(one, direction="forward")).after(held(1), TOUCHED, 0)
     assert both.forbidden == {"forward", "backward"}
-
-
-def test_only_a_new_occurrence_looks_at_the_travel_again() -> None:
-    before = Trajectory(runs=(-0.2,))
-    assert Release(before=before).after(held(1), TOUCHED, CAME, 0).before == before
-    assert Release(before=before).after(held(3, 8), TOUCHED, CAME, 0).before == CAME
 
 
 def test_a_restart_of_safety_leaves_nothing_to_travel() -> None:

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from services.safety.latches import FaultBudget, latched
+from services.safety.core.causes import FaultBudget, latched
 from tests.safety.policy_fixture import HOLD_TEXT, PolicyFixture, hit
 
 

@@ -8,13 +8,11 @@ from common.codec import decode, encode
 from common.messages import MAX_REASON, Direction, Limits, SafetyState
 from common.verdict import MAX_TEXT
 from services.safety.config import LimitSource, Safety, Source
-from services.safety.inputs import Estop, Event, Reset
-from services.safety.operator_requests import BUMPER_FREE
+from services.safety.core.inputs import Estop, Event, Reset
+from services.safety.core.operator_requests import BUMPER_FREE
 from services.safety.report import (
-    motion_message,
     sentence,
     signature,
-    state_message,
     transitions,
 )
 from tests.safety.policy_fixture import PolicyFixture, hit
@@ -44,7 +42,8 @@ def test_the_state_tells_verdict_causes_and_limits() -> None:
     fixture.sonar(front=1.0)
     fixture.linear = 0.0
     fixture.drive(1.0)
-    state = state_message(fixture.policy, fixture.state, fixture.now_ns + 500_000_000)
+    fixture.now_ns += 500_000_000
+    state = fixture.published()
     assert (state.verdict, state.source, state.latched) == ("slow", "teleop", ())
     assert [cause.name for cause in state.causes] == ["obstacle"]
     assert state.causes[0].age >= 0.5
@@ -65,7 +64,7 @@ def test_nothing_is_allowed_while_a_cause_is_latched() -> None:
 
 def test_the_motion_tells_what_was_judged() -> None:
     fixture = PolicyFixture().running()
-    motion = motion_message(fixture.state, fixture.inputs)
+    motion = fixture.motions[-1]
     assert (motion.command, motion.source) == ("run", "teleop")
     assert motion.linear == pytest.approx(fixture.verdict.twist.linear)
     assert (motion.judged_boot, motion.judged) == (fixture.boot, fixture.seq)

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
-from services.safety.inputs import Reset
-from services.safety.latches import latched
-from services.safety.state import Reply
+from services.safety.core.causes import latched
+from services.safety.core.inputs import Reset
+from services.safety.core.state import Reply
 from tests.safety.policy_fixture import NO_ECHO_TEXT, PolicyFixture, hit
 
 UNKNOWN = "Standstill is not confirmed: no velocity is received."

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.messages import RangeStatus
-from services.safety.sonar import Moved, Rules, Sonar, read
+from services.safety.core.sonars import Moved, Rules, Sonar, read
 
 RULES = Rules(hysteresis=0.05, stuck_travel=0.5)
 GOOD = Sonar(distance=1.0, fault="")

@@ -8,20 +8,20 @@ from common.freshness import NS_PER_S, Latest
 from common.messages import SONAR_NAMES, Ultrasonic
 from common.motion import Twist
 from common.settings import Vehicle
-from services.safety.config import Safety
-from services.safety.sonar import Rules
-from services.safety.sonar_array import (
+from services.safety.core.sonars import (
     SHARED_SAMPLES,
     SHOWN_NS,
+    Rules,
     Saturation,
     SonarArray,
     SonarFilter,
     SonarOverrides,
+    axes,
 )
-from services.safety.zones import zones
+from services.safety.report import _doubts
 from tests.safety.policy_fixture import FREE, NO_ECHO
 
-FILTER = SonarFilter(zones(Vehicle(), Safety()), Rules(0.05, 0.5), age_s=0.3, creep_room=0.26)
+FILTER = SonarFilter(axes(Vehicle()), Rules(0.05, 0.5), age_s=0.3, creep_room=0.26)
 STEP_NS = NS_PER_S // 20
 
 
@@ -33,6 +33,13 @@ def sample(seq: int, front: float | None = None, boot: int = 1) -> Latest[Ultras
     return Latest(message, seq * STEP_NS)
 
 
+def doubts(array: SonarArray) -> str:
+    """Return the doubts as an operator reads them; empty without any."""
+    text = _doubts(array.sonars)
+    assert bool(text) == array.is_doubted
+    return text
+
+
 def updated(count: int, front: float | None = None, linear: float = 0.0) -> SonarArray:
     array = SonarArray()
     for seq in range(1, count + 1):
@@ -41,8 +48,8 @@ def updated(count: int, front: float | None = None, linear: float = 0.0) -> Sona
 
 
 def test_three_samples_open_all_sectors() -> None:
-    assert updated(2).faults == "all silent"
-    assert updated(3).faults == ""
+    assert doubts(updated(2)) == "all silent"
+    assert doubts(updated(3)) == ""
     assert updated(3, 1.0).distances[2] == 1.0
 
 
@@ -50,13 +57,13 @@ def test_one_sample_is_taken_once() -> None:
     array = updated(2)
     for _ in range(3):
         array = FILTER.update(array, sample(2), Twist(), 2 * STEP_NS)
-    assert array.faults == "all silent"
+    assert doubts(array) == "all silent"
 
 
 def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> None:
     array, old = updated(3), sample(3)
     limit_ns = 3 * STEP_NS + round(0.3 * NS_PER_S)
-    assert FILTER.update(array, old, Twist(), limit_ns).faults == ""
+    assert doubts(FILTER.update(array, old, Twist(), limit_ns)) == ""
     array = FILTER.update(array, old, Twist(), limit_ns + 1)
     assert array.distances == (0.0,) * 8
     assert FILTER.update(array, old, Twist(), 3 * STEP_NS).distances == (0.0,) * 8
@@ -64,8 +71,8 @@ def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> Non
 
 
 def test_a_constant_sonar_is_suspect_by_the_way_along_its_axis() -> None:
-    assert updated(13, 2.0, linear=1.0).faults == "front suspect"
-    assert updated(13, 2.0, linear=0.5).faults == ""
+    assert doubts(updated(13, 2.0, linear=1.0)) == "front suspect"
+    assert doubts(updated(13, 2.0, linear=0.5)) == ""
     array = updated(13, 2.0, linear=1.0)
     assert [math.isinf(one) for one in array.distances].count(True) == 7
     assert array.distances[2] == 2.0
@@ -77,7 +84,7 @@ def test_a_constant_sonar_is_suspect_by_the_way_along_its_axis() -> None:
 def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
     assert SonarArray().unseen == frozenset()
     array = FILTER.update(updated(2), sample(2), Twist(), NS_PER_S)
-    assert array.faults == "all silent"
+    assert doubts(array) == "all silent"
     assert array.unseen == frozenset()
 
 
@@ -120,7 +127,7 @@ AHEAD, BACK = Twist(0.5), Twist(-0.5)
     ],
 )
 def test_what_each_mount_predicts(twist: Twist, readings: dict[str, float], faults: str) -> None:
-    assert drive(31, twist, **readings).faults == faults
+    assert doubts(drive(31, twist, **readings)) == faults
 
 
 def test_the_sensors_greatest_reading_is_no_disagreement() -> None:
@@ -128,26 +135,26 @@ def test_the_sensors_greatest_reading_is_no_disagreement() -> None:
     fronts = {"front_left": 4.5, "front": 4.5, "front_right": 4.5}
     array = drive(60, AHEAD, **near, **fronts)
     assert array.saturation.reading == 4.5
-    assert "front" not in array.faults
+    assert "front" not in doubts(array)
     assert drive(60, AHEAD, **fronts).saturation.reading is None  # others see farther
 
 
 def test_no_number_is_no_wall_alongside() -> None:
-    assert drive(31, AHEAD, front_left=0.8, left=math.nan).faults == (
+    assert doubts(drive(31, AHEAD, front_left=0.8, left=math.nan)) == (
         "left faulty, front left suspect"
     )
 
 
 @pytest.mark.parametrize("twist", [Twist(0.019), Twist(-0.019, 0.049), Twist(0.0, 0.049)])
 def test_a_parked_vehicle_makes_no_sonar_suspect(twist: Twist) -> None:
-    assert drive(20 * 120, twist, front=1.0, left=0.8).faults == ""
+    assert doubts(drive(20 * 120, twist, front=1.0, left=0.8)) == ""
 
 
 def test_an_unknown_speed_is_no_motion() -> None:
     array = SonarArray()
     for seq in range(1, 30):
         array = FILTER.update(array, sample(seq, 2.0), None, seq * STEP_NS)
-    assert array.faults == ""
+    assert doubts(array) == ""
 
 
 # --- greatest range of the sensors ------------------------------------------------------------

@@ -6,21 +6,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.safety.trajectory import OPPOSITE, REACH_M, STEP_M, Counter, Trajectory
+from common.freshness import Latest
+from common.messages import Mileage
+from services.safety.core.causes import Held
+from services.safety.trajectory import OPPOSITE, REACH_M, STEP_M, Approach, Trajectory
 
-BRIDGE = (7, 0)
+
+def at(distance: float, heading: float = 0.0, boot: int = 7, epoch: int = 0) -> Mileage:
+    return Mileage(distance=distance, heading=heading, boot=boot, epoch=epoch)
 
 
 def travel(*positions: float, heading: float = 0.0) -> Trajectory:
     """Follow counters that read these distances, one second apart."""
     trajectory = Trajectory()
     for second, distance in enumerate(positions):
-        trajectory = trajectory.follow(Counter(BRIDGE, distance, heading), second)
+        trajectory = trajectory.follow(Latest(at(distance, heading), second))
     return trajectory
 
 
 def test_the_first_reading_is_no_travel() -> None:
-    assert travel(50.0) == Trajectory(at=Counter(BRIDGE, 50.0, 0.0))
+    assert travel(50.0) == Trajectory(at=at(50.0, 0.0))
     assert Trajectory().direction is None
     assert Trajectory().net == 0
 
@@ -45,44 +50,56 @@ def test_runs_of_one_sign(positions: tuple[float, ...], runs: tuple[float, ...])
     assert travel(*positions).runs == pytest.approx(runs)
 
 
-def test_a_jump_is_no_travel() -> None:
-    assert travel(0.0, 0.5, 1.6) == Trajectory(at=Counter(BRIDGE, 1.6, 0.0))
-    assert travel(0.0, 0.5, -0.6).runs == ()
-    assert travel(0.0, 0.5, 1.5).net == pytest.approx(1.0)
+@pytest.mark.parametrize(("boot", "epoch"), [(8, 0), (7, 1)])
+def test_another_bridge_or_a_restarted_board_begins_anew(boot: int, epoch: int) -> None:
+    other = at(0.6, boot=boot, epoch=epoch)
+    assert travel(0.0, 0.5).follow(Latest(other, 9)) == Trajectory(at=other)
 
 
-def test_another_bridge_or_a_restarted_board_begins_anew() -> None:
-    for origin in ((8, 0), (7, 1)):
-        other = Counter(origin, 0.6, 0.0)
-        assert travel(0.0, 0.5).follow(other, 9) == Trajectory(at=other)
+def contact(identity: int) -> Held:
+    return Held(1, 1, 0, (1, 1), "hit", identity)
+
+
+def test_only_a_new_contact_takes_the_trajectory() -> None:
+    approach = Approach()
+    for distance, held, direction in [
+        (0.0, None, None),
+        (0.4, contact(3), "forward"),  # the reading of the contact counts
+        (-0.4, contact(3), "forward"),
+        (-0.4, None, "forward"),
+        (-0.4, contact(9), "backward"),
+    ]:
+        approach = approach.follow(Latest(at(distance), 5), held)
+        assert approach.before.direction == direction
+    assert approach.follow(None, contact(9)) == approach
 
 
 @pytest.mark.parametrize(("turned", "stays"), [(0.35, True), (-0.35, True), (0.36, False)])
 def test_a_turn_on_the_spot_forgets_earlier_travel(turned: float, stays: bool) -> None:
     begun = travel(0.0, 0.5)
-    after = begun.follow(Counter(BRIDGE, 0.5, turned), 9)
+    after = begun.follow(Latest(at(0.5, turned), 9))
     assert (after == begun) == stays
-    assert (after == Trajectory(at=Counter(BRIDGE, 0.5, turned))) != stays
+    assert (after == Trajectory(at=at(0.5, turned))) != stays
 
 
 def test_the_heading_wraps() -> None:
     begun = travel(0.0, 0.5, heading=3.1)
-    assert begun.follow(Counter(BRIDGE, 0.5, -3.1), 9) == begun
+    assert begun.follow(Latest(at(0.5, -3.1), 9)) == begun
     begun = travel(0.0, 0.5, heading=1.0)
-    assert begun.follow(Counter(BRIDGE, 0.5, 1.1), 9) == begun
+    assert begun.follow(Latest(at(0.5, 1.1), 9)) == begun
 
 
 def test_a_turn_while_it_travels_is_a_curve() -> None:
-    trajectory = travel(0.0, 0.5).follow(Counter(BRIDGE, 0.51, 2.0), 9)
+    trajectory = travel(0.0, 0.5).follow(Latest(at(0.51, 2.0), 9))
     assert trajectory.net == pytest.approx(0.51)
-    assert trajectory.at == Counter(BRIDGE, 0.51, 2.0)
+    assert trajectory.at == at(0.51, 2.0)
 
 
 def test_the_end_is_when_the_counters_moved_last() -> None:
     trajectory = travel(0.0, 0.5)
     assert trajectory.ended_ns == 1
-    assert trajectory.follow(Counter(BRIDGE, 0.501, 0.0), 9).ended_ns == 1
-    assert trajectory.follow(Counter(BRIDGE, 0.505, 0.0), 9).ended_ns == 9
+    assert trajectory.follow(Latest(at(0.501, 0.0), 9)).ended_ns == 1
+    assert trajectory.follow(Latest(at(0.505, 0.0), 9)).ended_ns == 9
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,11 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Direction, ReleaseRequest
 from common.motion import STILL, Command, Twist
-from services.safety.causes import RULES, Clears
+from services.safety.core.causes import RULES, Clears, FaultBudget, Held, latched, ordered
+from services.safety.core.inputs import Estop, Event, Reset
 from services.safety.core.motion_watch import MotionWatch
-from services.safety.inputs import Estop, Event, Reset
-from services.safety.latches import FaultBudget, Held, latched, ordered
-from services.safety.release import Release
-from services.safety.state import State, Verdict
+from services.safety.core.release import Release
+from services.safety.core.state import State, Verdict
 from tests.safety.cause_sets import (
     AHEAD,
     BRAKING,

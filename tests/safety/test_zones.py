@@ -11,7 +11,8 @@ from common.messages import SONAR_NAMES
 from common.motion import Twist
 from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
-from services.safety.zones import GRAZING_MPS, Zones, stopping_distance, zones
+from services.safety.core.planning import GRAZING_MPS, Zones, zones
+from services.safety.core.release import stopping_distance
 
 FREE = (math.inf,) * 8
 ALLOWED_AT_1M = math.sqrt(0.15**2 + 2 * 0.6 * 0.8) - 0.15
@@ -42,7 +43,7 @@ def test_a_sonar_closes_in_as_its_place_moves_along_the_way_it_looks(
         along = place[0] * math.cos(mount.yaw) + place[1] * math.sin(mount.yaw)
         swings = abs(angular) * Vehicle().length / 2 if mount.name in ("left", "right") else along
         expected = pytest.approx(max(along, swings), abs=1e-12)
-        assert field.approach(sonar, Twist(linear, angular)) == expected
+        assert field.axes[sonar].approach(Twist(linear, angular)) == expected
 
 
 def only(name: str, distance: float) -> tuple[float, ...]:
@@ -81,7 +82,9 @@ def test_the_room_of_a_speed_is_where_it_is_allowed(
     [("left", 0.0), ("front", 0.3), ("front_left", 0.54 * math.sqrt(0.5)), ("rear", -0.3)],
 )
 def test_a_flank_does_not_move_along_its_axis(field: Zones, name: str, along: float) -> None:
-    assert field.along(SONAR_NAMES.index(name), Twist(0.3, 1.2)) == pytest.approx(along, abs=1e-12)
+    assert field.axes[SONAR_NAMES.index(name)].along(Twist(0.3, 1.2)) == pytest.approx(
+        along, abs=1e-12
+    )
 
 
 @given(st.floats(0.0, 6.0), st.floats(0.0, 6.0))
@@ -107,7 +110,8 @@ def test_nearer_is_never_faster(field: Zones, one: float, other: float) -> None:
     ],
 )
 def test_how_fast_a_sonar_closes_in(field: Zones, name: str, twist: Twist, approach: float) -> None:
-    assert field.approach(SONAR_NAMES.index(name), twist) == pytest.approx(approach, abs=1e-12)
+    axis = field.axes[SONAR_NAMES.index(name)]
+    assert axis.approach(twist) == pytest.approx(approach, abs=1e-12)
 
 
 def test_a_wall_at_the_flank_lets_the_vehicle_pass_but_not_turn(field: Zones) -> None:
@@ -146,7 +150,7 @@ def test_a_limited_twist_is_allowed_toward_every_sonar(
 ) -> None:
     limited = twist.scaled(field.limit(twist, ranges).factor)
     for sonar, distance in enumerate(ranges):
-        assert field.approach(sonar, limited) <= field.allowed(distance) + 1e-5
+        assert field.axes[sonar].approach(limited) <= field.allowed(distance) + 1e-5
 
 
 @given(twists, distances)

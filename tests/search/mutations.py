@@ -21,16 +21,16 @@ from common.wire.framing import Framing
 from common.wire.reports import BumperBrakeReport, BumperReport
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
-from services.safety import arbiter, causes, conditions, latches, operator_requests, policy
-from services.safety.arbiter import Arbiter
 from services.safety.config import LimitSource, Safety
+from services.safety.core import causes, conditions, operator_requests, policy, sources
+from services.safety.core.causes import Held, Observation
+from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import Standstill
-from services.safety.inputs import Inputs
-from services.safety.latches import Held, Observation
-from services.safety.release import Release
+from services.safety.core.release import Release
+from services.safety.core.sonars import SonarOverrides
+from services.safety.core.sources import Arbiter
+from services.safety.core.state import State
 from services.safety.service import SafetyService
-from services.safety.sonar_array import SonarOverrides
-from services.safety.state import State
 from tests.search.scripted_stack import FAULT_MM
 from tests.search.scripted_stack import ScriptedStack as Stack
 from verification.search import bus
@@ -382,7 +382,7 @@ MUTATIONS: dict[str, Mutation] = {
         "safety knows of contact",
     ),
     "a reset clears what it does not name": (
-        (latches, "named", lambda held, _: latches.latched(held)),
+        (causes, "named", lambda held, _: causes.latched(held)),
         (*STAND, reset_of_what_was_seen, *GO), "safety knows of contact",
     ),
     "each press has its full distance again": (
@@ -394,14 +394,14 @@ MUTATIONS: dict[str, Mutation] = {
          lambda s: s.creep()), "in which the bumper was pressed",
     ),
     "latches clear by time": (
-        (latches, "_is_over", lambda *_: True),
+        (causes, "_is_over", lambda *_: True),
         (lambda s: s.stop(700), lambda s: s.request(0.0, 700), *GO), "safety knows of estop",
     ),
     "no neutral after a return": (
         (Arbiter, "disarmed", unchanged), (lambda s: s.freeze(400),), "was not neutral",
     ),
     "a reset clears what is not gone": (
-        (latches, "GOOD_SAMPLES", 0),
+        (causes, "GOOD_SAMPLES", 0),
         (*STAND, lambda s: s.driver(1, 20), lambda s: s.driver(0, 600), *RESET, *GO),
         "safety knows of driver",
     ),
@@ -469,7 +469,7 @@ MUTATIONS: dict[str, Mutation] = {
         "safety knows of estop_reader",
     ),
     "a suspended program drives on": (
-        (arbiter, "LAPSE_S", 1e9), (*LET_GO, *GO), "was not neutral",
+        (sources, "LAPSE_S", 1e9), (*LET_GO, *GO), "was not neutral",
     ),
     "an override does not hold": (
         (Arbiter, "overruled", unchanged),

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
-from services.safety.zones import Limit, Zones
+from services.safety.core.planning import Limit, Zones
 from sim.config import Config
 from sim.geometry import Pose, Rectangle
 from sim.trace import Truth

@@ -103,14 +103,6 @@ class Standstill(Struct, frozen=True):
         overdue = self.due_ns is not None and now_ns > self.due_ns
         return self.phase is Phase.STOPPING and overdue and not self.displacement.is_standing
 
-    @property
-    def text(self) -> str:
-        """Text for the operator about a vehicle that does not stop."""
-        twist = self.displacement.steady
-        if twist is None:
-            return "Standstill is not confirmed: no velocity is received."
-        return f"The vehicle does not stop: {twist.linear:.2f} m/s, {twist.angular:.2f} rad/s."
-
     def moving(self, now_ns: int) -> "Standstill":
         """Return the state of a motion; the time limit is kept until the vehicle stands."""
         began_ns = self.began_ns if self.phase is Phase.MOVING else now_ns
@@ -139,6 +131,7 @@ class MotionWatch(Struct, frozen=True):
     linear: Axis = Axis()
     angular: Axis = Axis()
     standstill: Standstill = Standstill()
+    runs_away: bool = False  # whether it did not move as commanded for too long
 
 
 class Supervisor:
@@ -169,15 +162,14 @@ class Supervisor:
     ) -> MotionWatch:
         """Return the state ``step_s`` after the twist was sent; None is an unknown measurement."""
         measured = velocity.value if velocity else STILL
+        linear = before.linear.follow(sent.linear, measured.linear, step_s, self._linear)
+        angular = before.angular.follow(sent.angular, measured.angular, step_s, self._angular)
         return MotionWatch(
-            before.linear.follow(sent.linear, measured.linear, step_s, self._linear),
-            before.angular.follow(sent.angular, measured.angular, step_s, self._angular),
+            linear,
+            angular,
             self._standstill(before.standstill, sent.rounds_to_zero, velocity, mileage, now_ns),
+            runs_away=max(linear.bad_s, angular.bad_s) >= self._linear.patience_s,
         )
-
-    def runs_away(self, watch: MotionWatch) -> bool:
-        """Return whether the vehicle did not move as commanded for too long."""
-        return max(watch.linear.bad_s, watch.angular.bad_s) >= self._linear.patience_s
 
     def _standstill(
         self,

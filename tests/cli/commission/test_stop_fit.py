@@ -21,7 +21,7 @@ from cli.commission.stop_fit import (
 from cli.commission.stops import Stop, find_stops
 from common.motion import Command
 from services.safety.config import Safety
-from services.safety.zones import stopping_distance
+from services.safety.core.release import stopping_distance
 from tests.cli.commission.stops_fixture import SPEEDS, StopMaker, stop, stops
 
 

@@ -10,7 +10,7 @@ from cli.inspect.diagnosis import Finding, Observation
 from cli.inspect.vehicle import STREAMS, diagnose_vehicle, drivers, driving, link, safety, switches
 from common import messages as m
 from common.messages import FaultName
-from services.safety.causes import RULES
+from services.safety.core.causes import RULES
 from tests.cli.inspect.tool import health
 
 CLEAR: Any = ("ok",) * 8

@@ -26,8 +26,8 @@ def _in_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_tests_of_a_core_are_those_of_its_folder_without_processes() -> None:
     found = cores()
-    assert "tests/safety/test_zones.py" in found["services/safety/zones.py"]
-    by_fixture = found["services/safety/policy.py"]
+    assert "tests/safety/test_zones.py" in found["services/safety/core/planning.py"]
+    by_fixture = found["services/safety/core/policy.py"]
     assert "tests/safety/test_driving.py" in by_fixture
     assert "tests/safety/test_service.py" not in by_fixture
     assert found["common/wire/frame.py"] == sorted(
@@ -37,11 +37,11 @@ def test_the_tests_of_a_core_are_those_of_its_folder_without_processes() -> None
 
 def test_only_changed_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     def git(*words: str) -> str:
-        return "services/safety/zones.py\ndocs/x.md" if words[0] == "diff" else "abc"
+        return "services/safety/core/planning.py\ndocs/x.md" if words[0] == "diff" else "abc"
 
     monkeypatch.setattr("verification.mutation.selection._git", git)
-    both = {"services/safety/zones.py": ["a"], "services/relay/core.py": ["b"]}
-    assert changed(both) == {"services/safety/zones.py": ["a"]}
+    both = {"services/safety/core/planning.py": ["a"], "services/relay/core.py": ["b"]}
+    assert changed(both) == {"services/safety/core/planning.py": ["a"]}
 
 
 def test_as_many_survive_as_the_mark_gives() -> None:

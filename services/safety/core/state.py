@@ -5,14 +5,11 @@ from msgspec import Struct
 from common.heartbeat import Heartbeat
 from common.messages import Verdict as VerdictName
 from common.motion import STILL, STOP, Command, Twist
-from services.safety.arbiter import Arbiter
+from services.safety.core.causes import FaultBudget, Latches, Token
 from services.safety.core.motion_watch import MotionWatch
-from services.safety.keepalive import Keepalives
-from services.safety.latches import FaultBudget, Latches, Token
-from services.safety.limits import SpeedLimits
-from services.safety.release import Release
-from services.safety.sonar_array import SonarArray, SonarOverrides
-from services.safety.trajectory import Trajectory
+from services.safety.core.release import Release
+from services.safety.core.sonars import SonarArray, SonarOverrides
+from services.safety.core.sources import Arbiter, Keepalives, SpeedLimits
 
 
 class Reply(Struct, frozen=True):
@@ -33,8 +30,10 @@ class Verdict(Struct, frozen=True):
     control: str | None = None  # the source, unless a cause forbids every motion
     acked: Token = (0, 0)  # boot and seq of the newest bumper sample taken into account
     reply: Reply | None = None  # to a reset
-    refused: str = ""  # reason of a refused message, by the names in ``channel.py``
+    refused: str = ""  # reason of a refused message, by the names in ``sources.py``
     limited_by: str | None = None  # the limit source that slows the requested twist
+    slowed_by: int | None = None  # the sonar that does
+    blocked_by: int | None = None  # the sonar without room for any motion
 
 
 class State(Struct, frozen=True):
@@ -50,7 +49,6 @@ class State(Struct, frozen=True):
     motion: MotionWatch = MotionWatch()
     fault_budget: FaultBudget = FaultBudget()
     release: Release = Release()
-    trajectory: Trajectory = Trajectory()
     decision: int = 0  # number of the newest decision; starts at random, see ``Held.id``
     estop_connection: int = 0  # the newest one
     estop: int | None = None  # the newest ``Link.estop``

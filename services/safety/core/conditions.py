@@ -6,9 +6,10 @@ from typing import Any, TypeVar
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Driver
 from services.safety.config import Safety
-from services.safety.inputs import Estop, Inputs
-from services.safety.latches import Observation, Token
-from services.safety.state import State
+from services.safety.core.causes import Observation, Token
+from services.safety.core.inputs import Estop, Inputs
+from services.safety.core.motion_watch import MotionWatch
+from services.safety.core.state import State
 
 T = TypeVar("T")
 
@@ -43,6 +44,11 @@ def observe_inputs(
     yield _bumper(inputs, settings, acked, now_ns)
     yield _bumper_lossy(inputs, "bumper_lossy" in state.latches, tick)
     yield _silent(inputs, settings, state, now_ns)
+    yield from _motion(state.motion, now_ns)
+    yield from state.speed_limits.observations(now_ns)
+    conflicts = ", ".join(state.arbiter.conflict(now_ns) + state.speed_limits.conflicts(now_ns))
+    text = f"Two publishers use {conflicts}."
+    yield Observation("two_publishers", bool(conflicts), tick, text)
 
 
 def _contact(inputs: Inputs, tick: Token) -> Observation:
@@ -167,6 +173,18 @@ def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Obse
     }
     old = [name for name, is_old in too_old.items() if is_old]
     return Observation("silent", bool(old), (0, now_ns), f"No recent data: {', '.join(old)}.")
+
+
+def _motion(motion: MotionWatch, now_ns: int) -> Iterator[Observation]:
+    standstill, tick = motion.standstill, (0, now_ns)
+    twist = standstill.displacement.steady
+    text = "Standstill is not confirmed: no velocity is received."
+    if twist is not None:
+        text = f"The vehicle does not stop: {twist.linear:.2f} m/s, {twist.angular:.2f} rad/s."
+    yield Observation("runaway", motion.runs_away, tick)
+    yield Observation("uncommanded_motion", standstill.left, tick)
+    # 1 equivalent mutant: this cause clears by time, without a token.
+    yield Observation("not_stopping", standstill.is_late(now_ns), tick, text)
 
 
 def _is_old(latest: Latest[T] | None, age_s: float, now_ns: int) -> bool:

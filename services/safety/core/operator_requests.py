@@ -10,11 +10,10 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.messages import Direction
-from services.safety.causes import bars_motion
 from services.safety.config import Safety
-from services.safety.inputs import Inputs, Reset
-from services.safety.latches import (
+from services.safety.core.causes import (
     FaultBudget,
+    bars_motion,
     begun,
     latched,
     named,
@@ -22,9 +21,9 @@ from services.safety.latches import (
     reset,
     still_present,
 )
-from services.safety.release import Release
-from services.safety.state import Reply, State
-from services.safety.trajectory import OPPOSITE
+from services.safety.core.inputs import Inputs, Reset
+from services.safety.core.release import SIGN, Release, stopping_distance
+from services.safety.core.state import Reply, State
 
 BY_HAND = "Push the vehicle off by hand, then reset."
 BUMPER_FREE = "The bumper is free. Next: reset."
@@ -43,8 +42,7 @@ def handle(
 
 def room(state: State, settings: Safety) -> float:
     """Return the remaining travel of a release in metres, less the stopping distance."""
-    speed = settings.release_speed
-    stopping = speed * settings.react + speed * speed / (2 * settings.deceleration)
+    stopping = stopping_distance(settings.release_speed, settings.react, settings.deceleration)
     return state.release.left(settings.release_distance - stopping)
 
 
@@ -112,18 +110,18 @@ def _remaining(state: State, inputs: Inputs, settings: Safety) -> str:
 
 def _pressed(state: State, inputs: Inputs, settings: Safety) -> str:
     """Return the text of a pressed bumper with the remedy."""
-    what = _no_release(state, inputs, settings) or _way_off(state.release)
+    what = _no_release(state, inputs, settings) or _way_off(state.release, inputs.drove)
     return f"{state.latches['contact'].text} {what}"
 
 
-def _way_off(release: Release) -> str:
+def _way_off(release: Release, drove: Direction | None) -> str:
     """Return the remedy, by the directions that are not forbidden."""
-    free = OPPOSITE.keys() - release.forbidden
-    if len(free) == len(OPPOSITE):
+    free = SIGN.keys() - release.forbidden
+    if len(free) == len(SIGN):
         return "Hold release to move off, forward or backward."
     (only,) = free
     advice = f"Hold release {only} to move off."
-    if only != release.before.direction:
+    if only != drove:
         return advice
     return f"{advice} The vehicle drove {only} into the contact: check that direction first."
 
@@ -195,4 +193,4 @@ def _not_standing(inputs: Inputs, settings: Safety, now_ns: int) -> str:
     velocity = inputs.known_velocity(now_ns, settings.velocity_age)
     if velocity is None:
         return "Standstill is not confirmed: no velocity is received."
-    return "" if velocity.is_standing else "The vehicle still moves."
+    return "" if velocity.value.is_standing else "The vehicle still moves."

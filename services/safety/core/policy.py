@@ -1,60 +1,55 @@
-"""Policy: one decision, from inputs and state to the verdict for the bridge.
+"""Policy: one decision, from inputs and state to the motion for the bridge.
 
 Each decision takes these steps, always in this order, so that a trip wins over an event that
 arrives with it:
 
-1. accept    accept or refuse a message of a source (``arbiter.py``, ``limits.py``,
-             ``keepalive.py``)
-2. sense     update sonars, runaway, standstill, trajectory and the travel of a release
+1. accept    accept or refuse a message of a source (``sources.py``)
+2. sense     update sonars, runaway, standstill and the travel of a release
 3. observe   observe every cause that does not depend on a request (``conditions.py``)
 4. handle    carry out a reset (``operator_requests.py``)
 5. arm       arm the sources that are neutral, disarm those that are overruled; begin, continue or
              end a release
-6. conclude  plan the requested motion (``motion.py``), then apply the worst action (``causes.py``)
+6. conclude  plan the requested motion (``planning.py``), then apply the worst action
+             (``causes.py``)
 
 RUN has one origin: the end of ``_conclude``, when no held cause demands STOP or BRAKE and a fresh
-request exists. A sample that shows a new contact needs none of this: ``brake_for_contact`` answers
-it first, and the decision that follows on the same inputs latches the contact.
+request exists. A new contact yields BRAKE before all these steps, which latch it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from msgspec.structs import replace
 
-from common.freshness import NS_PER_S, Latest
+from common.freshness import NS_PER_S
 from common.messages import Motion
 from common.messages import Verdict as VerdictName
-from common.motion import BRAKE, RUN, STILL, STOP, Command, Twist
+from common.motion import BRAKE, RUN, STILL, STOP, Command
 from common.settings import Vehicle
-from services.safety.arbiter import Arbiter
-from services.safety.causes import BARRING, BY_NAME, Clears, bars_motion, clears, wants_neutral
-from services.safety.channel import Admission
-from services.safety.conditions import observe_inputs
 from services.safety.config import Safety
-from services.safety.core.motion_watch import MotionWatch, Supervisor
-from services.safety.inputs import (
-    DriveRequest,
-    Inputs,
-    KeepaliveRequest,
-    LimitRequest,
+from services.safety.core.causes import (
+    BARRING,
+    BY_NAME,
+    Clears,
+    Latches,
+    Observation,
+    clears,
+    latched,
+    observe,
+    ordered,
+    wants_neutral,
 )
-from services.safety.keepalive import Keepalives
-from services.safety.latches import Latches, Observation, latched, observe, ordered
-from services.safety.limits import SpeedLimits
-from services.safety.motion import Plan, Planner, observations
-from services.safety.operator_requests import answered, handle
-from services.safety.sonar import Rules
-from services.safety.sonar_array import SonarFilter
-from services.safety.state import State, Verdict
+from services.safety.core.conditions import observe_inputs
+from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, LimitRequest
+from services.safety.core.motion_watch import Supervisor
+from services.safety.core.operator_requests import answered, handle
+from services.safety.core.planning import Plan, Planner, observations
+from services.safety.core.sonars import Rules, SonarFilter
+from services.safety.core.sources import Admission, Arbiter, Keepalives, SpeedLimits
+from services.safety.core.state import State, Verdict
 
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not skip ahead
 
-COMMANDS: dict[VerdictName, Command] = {
-    "run": RUN,
-    "slow": RUN,
-    "stop": STOP,
-    "brake": BRAKE,
-}
+COMMANDS: dict[VerdictName, Command] = {"run": RUN, "slow": RUN, "stop": STOP, "brake": BRAKE}
 
 
 class Policy:
@@ -63,9 +58,11 @@ class Policy:
     def __init__(self, settings: Safety, vehicle: Vehicle) -> None:
         self.settings = settings
         self.planner = Planner(settings, vehicle)
-        rules = Rules(settings.hysteresis, settings.stuck_travel)
         self._sonar_filter = SonarFilter(
-            self.planner.zones, rules, settings.ultrasonic_age, self.planner.creep_room
+            self.planner.zones.axes,
+            Rules(settings.hysteresis, settings.stuck_travel),
+            settings.ultrasonic_age,
+            self.planner.creep_room,
         )
         self._supervisor = Supervisor(settings)
 
@@ -78,8 +75,12 @@ class Policy:
             Keepalives(settings.estop_keepalive, settings.estop_keepalive_timeout),
         )
 
-    def decide(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, Verdict]:
-        """Return the new state and the verdict; the event in the inputs is handled once."""
+    def decide(self, state: State, inputs: Inputs, now_ns: int) -> Iterator[Motion | State]:
+        """Yield what to send, urgent first, then the new state; an event is handled once."""
+        bumper = inputs.bumper
+        if bumper is not None and bumper.value.pressed and "contact" not in state.latches:
+            hit = Verdict(command=BRAKE, acked=_acked(inputs))
+            yield _motion(hit, inputs, state.estop, is_latched=True)
         step_s = min((now_ns - (state.decided_ns or now_ns)) / NS_PER_S, LONGEST_STEP_S)
         state = replace(state, decision=state.decision + 1)
         state, refused = self._accept(state, inputs, now_ns)
@@ -89,132 +90,104 @@ class Policy:
         state = self._arm(state, now_ns)
         state = replace(state, release=answered(state, inputs, self.settings, now_ns))
         state, verdict = self._conclude(state, inputs, step_s, now_ns)
-        verdict = replace(verdict, refused=refused, reply=reply)
         state = replace(
             state,
             decided_ns=now_ns,
-            verdict=verdict,
+            verdict=replace(verdict, refused=refused, reply=reply),
             estop_connection=inputs.estop_connection or state.estop_connection,
             estop=inputs.link.value.estop if inputs.link else None,
         )
-        return state, verdict
+        yield _motion(verdict, inputs, state.estop, is_latched=bool(latched(state.latches)))
+        yield state
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
         event, settings = inputs.event, self.settings
-        if event is None:
-            return state, ""
-        is_keepalive = isinstance(event, KeepaliveRequest)
-        max_age_s = settings.estop_keepalive_timeout if is_keepalive else settings.max_echo_age
-        admission = Admission(state.heartbeat, round(max_age_s * NS_PER_S), now_ns)
+        max_age_ns = round(settings.max_echo_age * NS_PER_S)
         match event:
             case DriveRequest():
+                admission = Admission(state.heartbeat, max_age_ns, now_ns)
                 arbiter, refused = state.arbiter.accept(event, admission)
                 return replace(state, arbiter=arbiter), refused
             case LimitRequest():
+                admission = Admission(state.heartbeat, max_age_ns, now_ns)
                 limits, refused = state.speed_limits.accept(event, admission)
                 return replace(state, speed_limits=limits), refused and f"limit_{refused}"
             case KeepaliveRequest():
+                max_age_ns = round(settings.estop_keepalive_timeout * NS_PER_S)
+                admission = Admission(state.heartbeat, max_age_ns, now_ns)
                 keepalives, refused = state.keepalives.accept(event, admission)
                 return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
             case _:
                 return state, ""
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
-        settings, sent = self.settings, state.verdict
-        known = inputs.known_velocity(now_ns, settings.velocity_age)
-        sonar_array = self._sonar_filter.update(state.sonar_array, inputs.ultrasonic, known, now_ns)
-        trajectory, counter = state.trajectory, inputs.counter
-        if inputs.mileage and counter:
-            trajectory = trajectory.follow(counter, inputs.mileage.received_ns)
+        sent, counters = state.verdict, inputs.counters
+        velocity = inputs.known_velocity(now_ns, self.settings.velocity_age)
+        known = velocity.value if velocity else None
         release = state.release
         if "contact" in state.latches:
-            moved = sent.twist if sent.command is RUN else None  # only a release runs then
-            reach = self.planner.reach
-            release = release.moving(moved, known, counter, reach=reach, dt_s=step_s, now_ns=now_ns)
+            release = release.moving(
+                sent.twist if sent.command is RUN else None,  # only a release runs then
+                known,
+                counters.value if counters else None,
+                reach=self.planner.reach,
+                dt_s=step_s,
+                now_ns=now_ns,
+            )
         return replace(
             state,
-            sonar_array=sonar_array,
-            motion=self._watch(state, inputs, known, step_s, now_ns),
+            sonar_array=self._sonar_filter.update(
+                state.sonar_array, inputs.ultrasonic, known, now_ns
+            ),
+            motion=self._supervisor.follow(
+                state.motion, sent.twist, velocity, counters, step_s=step_s, now_ns=now_ns
+            ),
             release=release,
-            trajectory=trajectory,
-        )
-
-    def _watch(
-        self, state: State, inputs: Inputs, known: Twist | None, step_s: float, now_ns: int
-    ) -> MotionWatch:
-        velocity = inputs.velocity
-        return self._supervisor.follow(
-            state.motion,
-            state.verdict.twist,
-            Latest(known, velocity.received_ns) if known and velocity else None,
-            inputs.mileage if inputs.counter else None,
-            step_s=step_s,
-            now_ns=now_ns,
         )
 
     def _observe(self, state: State, inputs: Inputs, now_ns: int) -> State:
         settle_ns = round(self.settings.settle * NS_PER_S)
-        tick = (0, now_ns)
-        standstill = state.motion.standstill
-        names = state.arbiter.conflict(now_ns) + state.speed_limits.conflicts(now_ns)
-        conflicts = ", ".join(names)
-        seen = [
-            *observe_inputs(inputs, self.settings, state, now_ns),
-            *state.speed_limits.observations(now_ns),
-            Observation("runaway", self._supervisor.runs_away(state.motion), tick),
-            Observation("uncommanded_motion", standstill.left, tick),
-            Observation(
-                "not_stopping",
-                standstill.is_late(now_ns),
-                # 1 equivalent mutant: this cause clears by time, without a token.
-                tick,
-                standstill.text,
-            ),
-            Observation(
-                "two_publishers", bool(conflicts), tick, f"Two publishers use {conflicts}."
-            ),
-        ]
+        seen = observe_inputs(inputs, self.settings, state, now_ns)
         held = observe(state.latches, seen, now_ns, settle_ns, state.decision)
         was_good, is_good = not _failing(state.latches), not _failing(held)
         budget = state.fault_budget.updated(now_ns, was_good and not is_good, is_good)
-        flapping = Observation("flapping", budget.is_spent, tick)
+        flapping = Observation("flapping", budget.is_spent, (0, now_ns))
         held = observe(held, [flapping], now_ns, decision=state.decision)
         release = state.release
         if "contact" in held:
-            old = state.latches.get("contact")
-            release = release.after(old, held["contact"], state.trajectory, now_ns)
+            release = release.after(state.latches.get("contact"), held["contact"], now_ns)
             release = replace(release, unknown=release.unknown or "predecessor" in held)
         return replace(state, latches=held, fault_budget=budget, release=release)
 
     def _arm(self, state: State, now_ns: int) -> State:
-        arbiter = state.arbiter
-        if state.sonar_array.unseen or state.overrides.since:
+        arbiter, overrides = state.arbiter, state.overrides
+        if state.sonar_array.unseen or overrides.since:
             operators = self.settings.operators & arbiter.requesting_zero(now_ns)
-            overrides = state.overrides.updated(state.sonar_array.unseen, operators, now_ns)
-            state = replace(state, overrides=overrides)
+            overrides = overrides.updated(state.sonar_array.unseen, operators, now_ns)
         disarm = any(wants_neutral(name) for name in state.latches)
         arbiter = arbiter.disarmed() if disarm else arbiter.armed(now_ns)
-        return replace(state, arbiter=arbiter.overruled(now_ns))
+        return replace(state, arbiter=arbiter.overruled(now_ns), overrides=overrides)
 
     def _conclude(
         self, state: State, inputs: Inputs, step_s: float, now_ns: int
     ) -> tuple[State, Verdict]:
+        # While a release moves the vehicle, it creeps although the contact is latched.
         suspended = {"contact"} if state.release.direction else set()
         requested = self.planner.requested(state, now_ns)
-        barred = _worst(_barring(state.latches) - suspended) != "run"
+        barred = _worst((BARRING & state.latches.keys()) - suspended) != "run"
         plan = Plan()
         if requested and not barred:
-            measured = inputs.known_velocity(now_ns, self.settings.velocity_age) or STILL
+            known = inputs.known_velocity(now_ns, self.settings.velocity_age)
+            measured = known.value if known else STILL
             plan = self.planner.plan(state, measured, requested, step_s)
         seen = observations(state, requested, plan, now_ns)
         held = observe(state.latches, seen, now_ns, decision=state.decision)
-        state = replace(state, latches=held)
-        worst = _worst(set(held) - suspended)
+        worst = _worst(held.keys() - suspended)
         command = COMMANDS[worst]
         if command is STOP and state.motion.standstill.rolls:
             command = BRAKE
         source = requested.source if requested else None
-        verdict = Verdict(
+        return replace(state, latches=held), Verdict(
             name=_name(worst, held),
             command=command,
             twist=plan.twist if command is RUN else STILL,
@@ -222,21 +195,23 @@ class Policy:
             control=source if source and BARRING.isdisjoint(held) else None,
             acked=_acked(inputs),
             limited_by=requested.limited_by if requested else None,
+            slowed_by=plan.slowed_by,
+            blocked_by=plan.blocked_by,
         )
-        return state, verdict
 
 
-def brake_for_contact(state: State, inputs: Inputs) -> Motion | None:
-    """Return BRAKE when the bumper sample shows a contact that is not held yet."""
-    bumper = inputs.bumper
-    if bumper is None or not bumper.value.pressed or "contact" in state.latches:
-        return None
+def _motion(verdict: Verdict, inputs: Inputs, estop: int | None, *, is_latched: bool) -> Motion:
+    """Return the message of a verdict on these inputs."""
     return Motion(
-        command=BRAKE,
-        judged=bumper.value.seq,
-        judged_boot=bumper.value.boot,
-        latched=True,
+        command=verdict.command,
+        linear=verdict.twist.linear,
+        angular=verdict.twist.angular,
+        source=verdict.source,
+        judged=verdict.acked[1],
+        judged_boot=verdict.acked[0],
+        latched=is_latched,
         predecessor=inputs.link.value.latched_by if inputs.link else None,
+        estop=estop,
     )
 
 
@@ -251,11 +226,6 @@ def _name(worst: VerdictName, held: Latches) -> VerdictName:
     if worst != "stop" or latched(held):
         return worst
     return "inhibited" if _settling(held) or "neutral" in held else "stop"
-
-
-def _barring(held: Latches) -> set[str]:
-    """Return the causes that forbid every motion."""
-    return {name for name in held if bars_motion(name)}
 
 
 def _settling(held: Iterable[str]) -> bool:

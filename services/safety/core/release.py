@@ -18,10 +18,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Direction
+from common.messages import Direction, Mileage
 from common.motion import STILL, Twist
-from services.safety.latches import Held
-from services.safety.trajectory import Counter, Trajectory
+from common.standstill import comparable
+from services.safety.core.causes import Held
 
 COAST_NS = (
     NS_PER_S // 2
@@ -30,12 +30,11 @@ SIGN: dict[Direction, float] = {"forward": 1.0, "backward": -1.0}
 
 
 class Release(Struct, frozen=True):
-    """One latched contact: the trajectory before it, and the travel of its releases."""
+    """One latched contact, and the travel of its releases."""
 
-    before: Trajectory = Trajectory()  # at the newest contact
     integrated: float = 0.0  # m, by the larger of commanded and measured speed
     counted: float = 0.0  # m, by the board's counter
-    counter: Counter | None = None  # the newest reading while a release moves the vehicle
+    counter: Mileage | None = None  # the newest reading while a release moves the vehicle
     direction: Direction | None = None  # in which the vehicle may move now
     moved: Direction | None = None  # in which a release last moved the vehicle
     moved_ns: int | None = None  # when
@@ -59,7 +58,7 @@ class Release(Struct, frozen=True):
         return STILL if self.direction is None else Twist(speed * SIGN[self.direction])
 
     def moving(
-        self, sent: Twist | None, known: Twist | None, counter: Counter | None,
+        self, sent: Twist | None, known: Twist | None, counter: Mileage | None,
         *, reach: float, dt_s: float, now_ns: int,
     ) -> "Release":  # fmt: skip
         """Return the release ``dt_s`` seconds later.
@@ -80,22 +79,24 @@ class Release(Struct, frozen=True):
             moved_ns=now_ns if moves else self.moved_ns,
         )
 
-    def after(
-        self, old: Held | None, contact: Held, trajectory: Trajectory, now_ns: int
-    ) -> "Release":
+    def after(self, old: Held | None, contact: Held, now_ns: int) -> "Release":
         """Return the release after a bumper sample: ``contact`` as held now, ``old`` before."""
         if old is None:
-            return Release(before=trajectory, barred_ns=now_ns)
+            return Release(barred_ns=now_ns)
         if contact.good or not old.good:
             return self  # a clear bumper, or the same press
-        before = self.before if contact.id == old.id else trajectory
         forbidden = self.forbidden
         if self.moved is not None and self._is_coasting(now_ns):
             forbidden = forbidden | {self.moved}
-        return replace(self, before=before, forbidden=forbidden, direction=None, barred_ns=now_ns)
+        return replace(self, forbidden=forbidden, direction=None, barred_ns=now_ns)
 
     def _is_coasting(self, now_ns: int) -> bool:
         return self.moved_ns is not None and now_ns - self.moved_ns <= COAST_NS
+
+
+def stopping_distance(speed: float, react: float, deceleration: float) -> float:
+    """Return the distance (m) from the command to standstill that safety reckons with."""
+    return speed * react + speed * speed / (2 * deceleration)
 
 
 def sweep(twist: Twist, reach: float) -> float:
@@ -103,8 +104,8 @@ def sweep(twist: Twist, reach: float) -> float:
     return abs(twist.linear) + abs(twist.angular) * reach
 
 
-def _between(old: Counter | None, new: Counter | None) -> float:
+def _between(old: Mileage | None, new: Mileage | None) -> float:
     """Return the travel (m) between two readings; 0 when they are not comparable."""
-    if old is None or new is None or old.origin != new.origin:
+    if old is None or new is None or not comparable(old, new):
         return 0.0
     return abs(new.distance - old.distance)

@@ -6,6 +6,7 @@ from common import codec
 from common.freshness import Latest, fresh
 from common.messages import (
     Bumper,
+    Direction,
     Drive,
     Driver,
     EstopKeepalive,
@@ -18,7 +19,6 @@ from common.messages import (
     Velocity,
 )
 from common.motion import Twist
-from services.safety.trajectory import Counter
 
 
 class DriveRequest(Struct, frozen=True):
@@ -76,27 +76,27 @@ class Inputs(Struct, frozen=True):
     leaving: bool = False  # whether this service is shutting down
     event: Event | None = None
     boot: int = 0  # this service's own
+    # In which the vehicle drove into the newest contact, for the operator; None when unknown.
+    drove: Direction | None = None
 
-    def known_velocity(self, now_ns: int, age_s: float) -> Twist | None:
+    def known_velocity(self, now_ns: int, age_s: float) -> Latest[Twist] | None:
         """Return the measured velocity; None when not finite or older than ``age_s``."""
         return self.measured if fresh(self.velocity, now_ns, age_s) else None
 
     @property
-    def measured(self) -> Twist | None:
+    def measured(self) -> Latest[Twist] | None:
         """The newest measured velocity of any age; None when not finite."""
         if self.velocity is None:
             return None
         velocity = self.velocity.value
         if not codec.finite(velocity.linear, velocity.angular):
             return None
-        return Twist(velocity.linear, velocity.angular)
+        return Latest(Twist(velocity.linear, velocity.angular), self.velocity.received_ns)
 
     @property
-    def counter(self) -> Counter | None:
+    def counters(self) -> Latest[Mileage] | None:
         """The newest reading of the board's counters; None when not finite."""
-        if self.mileage is None:
+        latest = self.mileage
+        if latest is None or not codec.finite(latest.value.distance, latest.value.heading):
             return None
-        mileage = self.mileage.value
-        if not codec.finite(mileage.distance, mileage.heading):
-            return None
-        return Counter((mileage.boot, mileage.epoch), mileage.distance, mileage.heading)
+        return latest

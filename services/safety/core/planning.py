@@ -1,19 +1,84 @@
-"""Motion planning: limits, zones and ramp turn a requested twist into the twist to command."""
+"""Planning: limits, zones and ramp turn a requested twist into the twist to command.
+
+Toward a reading d the vehicle may move at the v whose reaction and stopping distance fits:
+
+    v * t_react + v^2 / (2 a) = d - margin
+
+``Axis`` gives the speed of approach to what a sonar sees. A twist that is too fast for one sonar is
+scaled as a whole, which keeps its curve. A sonar without approach sets no limit, so motion away
+from an obstacle stays possible.
+"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from msgspec import Struct
 
-from common.messages import SONAR_NAMES
 from common.motion import RUN, STILL, Twist, clamp
 from common.settings import Vehicle
-from services.safety.causes import wants_neutral
 from services.safety.config import Safety
-from services.safety.latches import Latches, Observation
-from services.safety.release import sweep
-from services.safety.state import State
-from services.safety.zones import zones
+from services.safety.core.causes import Latches, Observation, wants_neutral
+from services.safety.core.release import stopping_distance, sweep
+from services.safety.core.sonars import Axis, axes
+from services.safety.core.state import State
+
+GRAZING_MPS = 1e-6  # below this is rounding: cos(90 deg) is not exactly 0
+MEASURED_EXCESS_MPS = 0.2  # tolerance over the allowed speed, for lag and noise
+MEASURED_CREEP_MPS = 0.05  # inside the margin
+
+
+class Limit(Struct, frozen=True):
+    """Tightest limit on a twist, and the sonar that sets it (None without a limit)."""
+
+    factor: float  # 0..1, to scale the twist by
+    sonar: int | None = None
+
+
+class Zones(Struct, frozen=True):
+    """Zones of one vehicle; distances are in the manual's order of sonars."""
+
+    axes: tuple[Axis, ...]
+    margin: float  # m
+    react: float  # s
+    deceleration: float  # m/s^2
+
+    def allowed(self, distance: float) -> float:
+        """Return the speed (m/s) at which the vehicle can stop before the margin."""
+        room = max(0.0, distance - self.margin)
+        lag = self.deceleration * self.react
+        return math.sqrt(lag * lag + 2 * self.deceleration * room) - lag
+
+    def room(self, speed: float) -> float:
+        """Return the distance (m) at which this speed is allowed."""
+        return self.margin + stopping_distance(speed, self.react, self.deceleration)
+
+    def limit(self, twist: Twist, distances: Sequence[float]) -> Limit:
+        """Return the limit on a twist; a factor of 0 means blocked."""
+        tightest = Limit(1.0)
+        for sonar, axis in enumerate(self.axes):
+            speed = axis.approach(twist)
+            if speed <= GRAZING_MPS:
+                continue
+            factor = self.allowed(distances[sonar]) / speed
+            if factor < tightest.factor:
+                tightest = Limit(factor, sonar)
+        return tightest
+
+    def too_fast(self, measured: Twist, distances: Sequence[float]) -> int | None:
+        """Return the sonar toward which the measured speed is too high, if any."""
+        for sonar, axis in enumerate(self.axes):
+            speed = axis.approach(measured)
+            if speed <= MEASURED_CREEP_MPS:
+                continue
+            allowed = self.allowed(distances[sonar])
+            if not allowed or speed > allowed + MEASURED_EXCESS_MPS:
+                return sonar
+        return None
+
+
+def zones(vehicle: Vehicle, settings: Safety) -> Zones:
+    """Return the zones of this vehicle with these settings."""
+    return Zones(axes(vehicle), settings.margin, settings.react, settings.deceleration)
 
 
 class RequestedTwist(Struct, frozen=True):
@@ -84,7 +149,8 @@ class Planner:
         sent = state.verdict
         current = sent.twist if sent.command is RUN else ramp_start(measured, target)
         ramped = ramp(current, target, self._up, self._down, step_s)
-        here = self.zones.limit(ramped, distances)
+        # On the ramp the curve differs from the requested one.
+        here = Limit(1.0) if ramped == target else self.zones.limit(ramped, distances)
         for tightest in (limit, here):
             if tightest.factor == 0:
                 return Plan(blocked_by=tightest.sonar)
@@ -131,21 +197,17 @@ def observations(
     state: State, requested: RequestedTwist | None, plan: Plan, now_ns: int
 ) -> Iterator[Observation]:
     """Yield the causes that depend on a request, present or not."""
-    tick = (0, now_ns)
-    faults = state.sonar_array.faults
-    creeping = requested is not None and requested.is_release
-    overruled = _overruled_text(state, requested)
-    yield Observation("no_request", requested is None, tick)
-    yield Observation("neutral", _neutral_is_due(state, requested), tick, overruled)
-    yield Observation("release", creeping, tick)
-    blocked, slowed = plan.blocked_by, plan.slowed_by
-    yield Observation("blocked", blocked is not None, tick, _blocked_text(state, blocked, creeping))
-    if state.speed_limits.sources:
-        limited_by = requested.limited_by if requested else None
-        slowed_text = state.speed_limits.slowed_text(limited_by)
-        yield Observation("limit", limited_by is not None, tick, slowed_text)
-    yield Observation("obstacle", slowed is not None, tick, _slowed_text(state, slowed))
-    yield Observation("sonar", bool(faults), tick, f"Sonar not trusted: {faults}.")
+    present = {
+        "no_request": requested is None,
+        "neutral": _neutral_is_due(state, requested),
+        "release": requested is not None and requested.is_release,
+        "blocked": plan.blocked_by is not None,
+        "limit": requested is not None and requested.limited_by is not None,
+        "obstacle": plan.slowed_by is not None,
+        "sonar": state.sonar_array.is_doubted,
+    }
+    for name, is_present in present.items():
+        yield Observation(name, is_present, (0, now_ns))
 
 
 def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:
@@ -155,39 +217,3 @@ def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:
     if any(wants_neutral(name) for name in state.latches):
         return False
     return not state.arbiter.channels[requested.source].neutral
-
-
-def _overruled_text(state: State, requested: RequestedTwist | None) -> str:
-    """Return a text when another source overruled the requesting one; otherwise empty."""
-    channel = state.arbiter.channels.get(requested.source) if requested else None
-    if requested is None or channel is None or not channel.overruled_by:
-        return ""
-    return (
-        f"{channel.overruled_by} was in control: {requested.source} needs a neutral request first."
-    )
-
-
-def _blocked_text(state: State, sonar: int | None, creeping: bool) -> str:
-    if sonar is None:
-        return ""
-    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
-    if sonar in state.sonar_array.unseen and not creeping:
-        past = "An operator can creep past: release the controls, then drive."
-        return f"No motion toward the {name}: that sonar is {one.fault}. {past}"
-    if one.fault:
-        return f"No motion toward the {name}: that sonar is {one.fault}."
-    return f"No room toward the {name}: {one.distance:.2f} m."
-
-
-def _slowed_text(state: State, sonar: int | None) -> str:
-    if sonar is None:
-        return ""
-    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
-    if one.fault:
-        return f"Creeping toward the {name}: that sonar is {one.fault} and sees nothing there."
-    if one.suspect:
-        return (
-            f"Creeping toward the {name}: that sonar still shows {one.same:.2f} m although the "
-            "vehicle moved."
-        )
-    return f"Slowed by an obstacle at {one.distance:.2f} m ({name})."

@@ -1,0 +1,338 @@
+"""Sonars: geometry and plausibility of the eight ultrasonic sensors.
+
+**One sonar.** A nearer reading counts at once. A farther one counts after three consecutive samples
+that are farther by the hysteresis; then the nearest of the three counts. A sample that is faulty,
+too near to measure or not finite counts as distance zero, so the same rule accepts a sonar again
+after three good samples. ``no_echo`` is free space, at infinity.
+
+**Suspicion.** A reading that is constant to the millimetre is not a fault by itself: a wall
+alongside, or a surface beyond the sensor's range, gives the same. It contradicts odometry when the
+vehicle moved along the sonar's axis or turned, and nothing else explains it:
+
+- from the start, the reading is reduced by the distance that the vehicle came nearer
+- after ``stuck_travel`` along the axis, or half a radian of turning, the sonar is *suspect*
+- three consecutive samples with another reading end the suspicion
+
+Suspicion never blocks. It limits the speed toward the sonar's sector (``Sonar.cautious``). A
+constant reading is plausible when one of these explains it:
+
+- It is the greatest range of the sensors, which another sonar gives as well (``Saturation``).
+- A wall runs alongside: a corner sonar keeps its reading while the flank sonar on its side sees a
+  surface at the matching distance.
+
+The sonars on the flanks look across the driving direction, so driving straight predicts no change.
+A measured velocity below the standstill threshold is noise or bias and does not add up to motion.
+
+**Overrides.** A faulty sonar blocks its sector. An operator can override that: creep into the
+sector while holding the controls, after a neutral request made once the fault was shown for a
+second (``SonarOverrides``). A hold that began before the fault does not continue without the sonar.
+While ultrasonic samples are too old, all sectors are blocked, and the acknowledgements end.
+"""
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from common.freshness import NS_PER_S, Latest, fresh
+from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
+from common.motion import STILL, Twist
+from common.settings import Mount, Vehicle, sonar_mounts
+from services.safety.core.causes import Token
+
+FARTHER_SAMPLES = 3
+CHANGED_SAMPLES = 3
+SAME_M = 0.0015  # the board counts millimetres
+STUCK_TURN = 0.5  # rad; a flat surface does not keep its distance over such a turn
+LONGEST_STEP_S = 0.3  # between two samples; over longer gaps the motion is unknown
+SHARED_SAMPLES = 20  # a second
+SHOWN_NS = NS_PER_S  # time for an operator to read the fault
+FLANK_OF = {
+    "front_left": "left",
+    "rear_left": "left",
+    "front_right": "right",
+    "rear_right": "right",
+}
+# Flank reading over corner reading of a wall alongside: cos(45 deg) for a narrow cone, more for a
+# wide one, and somewhat less for a wall that is not quite parallel.
+ALONGSIDE = (0.5, 1.1)
+UNSEEN = ("faulty", "silent")  # faults without a reading; "too near" is an obstacle
+
+
+class Axis(Struct, frozen=True):
+    """Axis of a sonar: speed along it (m/s), for each m/s and each rad/s of a twist.
+
+    A sonar sits at (x, y) and looks along its yaw. Under a twist (v, w) that point moves with
+    (v - w*y, w*x); the component along the axis is the speed of approach. The sonars on the flanks
+    move across their axis, but the corners swing out to both sides when the vehicle turns. So these
+    sonars also limit |w| * length / 2.
+    """
+
+    linear: float
+    angular: float
+    swing: float = 0.0  # m from the middle to the corner that swings out to its side; 0 without one
+
+    def along(self, twist: Twist) -> float:
+        """Return the speed (m/s) of the sonar along its axis."""
+        return twist.linear * self.linear + twist.angular * self.angular
+
+    def approach(self, twist: Twist) -> float:
+        """Return the speed (m/s) of approach to what the sonar sees."""
+        along = self.along(twist)
+        return max(along, abs(twist.angular) * self.swing) if self.swing else along
+
+
+def axes(vehicle: Vehicle) -> tuple[Axis, ...]:
+    """Return the axes of a vehicle's sonars, in the manual's order."""
+    return tuple(_axis(mount, vehicle.length / 2) for mount in sonar_mounts(vehicle))
+
+
+def _axis(mount: Mount, corner: float) -> Axis:
+    along, across = math.cos(mount.yaw), math.sin(mount.yaw)
+    flank = mount.name in ("left", "right")
+    return Axis(along, mount.x * across - mount.y * along, corner if flank else 0.0)
+
+
+class Sonar(Struct, frozen=True):
+    """State of one sonar; ``fault`` is empty when it gives a distance."""
+
+    distance: float = 0.0  # m; 0 while it has a fault, infinity for no echo
+    fault: str = "silent"
+    farther: tuple[float, ...] = ()  # farther readings, not yet accepted
+    same: float = math.inf  # m, the constant reading
+    nearer: float = 0.0  # m that the vehicle came nearer since, from the farthest place
+    travel: float = 0.0  # m along the axis since, between the extremes
+    turned: float = 0.0  # rad since
+    suspect: bool = False
+    changed: int = 0  # samples in a row that contradict the suspicion
+
+    @property
+    def is_unseen(self) -> bool:
+        """Whether it has no reading."""
+        return self.fault in UNSEEN
+
+    def cautious(self, creep_room: float) -> float:
+        """Return the distance to plan with; ``creep_room`` is the distance for the creep speed."""
+        doubted = 0.0 if self.suspect else self.same - self.nearer
+        return min(self.distance, max(doubted, creep_room))
+
+
+class Moved(Struct, frozen=True):
+    """Motion since the last sample, and what explains a constant reading."""
+
+    along: float = 0.0  # m along the axis, toward the sector
+    turn: float = 0.0  # rad
+    beyond: bool = False  # whether the reading is the sensor's greatest range
+    alongside: bool = False  # whether a surface alongside explains it
+
+
+class Rules(Struct, frozen=True):
+    """Thresholds in metres."""
+
+    hysteresis: float
+    stuck_travel: float  # along the axis without a change, until the sonar is suspect
+
+
+def read(
+    sonar: Sonar, reading: float | None, status: RangeStatus, moved: Moved, rules: Rules
+) -> Sonar:
+    """Return the sonar after one sample."""
+    distance, fault = _trust(reading, status)
+    if fault:
+        return Sonar(fault=fault)
+    return _accept(_watch(sonar, distance, moved, rules.stuck_travel), distance, rules.hysteresis)
+
+
+def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
+    """Return the distance of one sample, or the reason why it has none."""
+    if status == "no_echo":
+        return math.inf, ""
+    if status != "ok":
+        return 0.0, {"fault": "faulty", "too_near": "too near to measure"}[status]
+    if reading is None or not math.isfinite(reading) or reading < 0:
+        return 0.0, "faulty"
+    return reading, ""
+
+
+def _accept(sonar: Sonar, distance: float, hysteresis: float) -> Sonar:
+    # A faulty sonar has no distance to compare with: any good readings end the fault. A near one
+    # that did not would leave the obstacle unseen, and an operator may creep toward that.
+    if not sonar.fault:
+        if distance <= sonar.distance:
+            return replace(sonar, distance=distance, farther=())
+        if distance < sonar.distance + hysteresis:
+            return replace(sonar, farther=())
+    farther = (*sonar.farther, distance)
+    if len(farther) < FARTHER_SAMPLES:
+        return replace(sonar, farther=farther)
+    return replace(sonar, distance=min(farther), fault="", farther=())
+
+
+def _watch(sonar: Sonar, distance: float, moved: Moved, stuck_travel: float) -> Sonar:
+    """Compare the reading with the previous one and with the motion."""
+    if math.isinf(distance) or abs(distance - sonar.same) >= SAME_M:
+        changed = sonar.changed + 1
+        if sonar.suspect and changed < CHANGED_SAMPLES:
+            return replace(sonar, changed=changed)
+        return _begin(sonar, distance)
+    if moved.beyond:
+        return _begin(sonar, sonar.same)
+    turned = sonar.turned + moved.turn
+    nearer, travel = (0.0, 0.0) if moved.alongside else _span(sonar, moved.along)
+    against = travel >= stuck_travel or abs(turned) >= STUCK_TURN
+    suspect = against or (sonar.suspect and not moved.alongside)
+    return replace(sonar, nearer=nearer, travel=travel, turned=turned, suspect=suspect, changed=0)
+
+
+def _begin(sonar: Sonar, same: float) -> Sonar:
+    return replace(sonar, same=same, nearer=0.0, travel=0.0, turned=0.0, suspect=False, changed=0)
+
+
+def _span(sonar: Sonar, along: float) -> tuple[float, float]:
+    """Return how much nearer the vehicle came, and its travel along the axis."""
+    nearer = sonar.nearer + along
+    farther = max(0.0, -nearer)  # beyond the farthest place so far
+    return nearer + farther, max(sonar.travel + farther, nearer + farther)
+
+
+SILENT = (Sonar(),) * len(SONAR_NAMES)
+
+
+class Saturation(Struct, frozen=True):
+    """The greatest range of the sensors, when they report one instead of "no echo".
+
+    What the real sensors report with nothing in range is unknown. A range counts as the greatest
+    one when two sonars share it to the millimetre for a second and none exceeds it. A single frozen
+    sonar cannot establish one. An echo of a real surface seldom does; then only that exact value
+    counts as explained.
+    """
+
+    reading: float | None = None  # m
+    candidate: float = 0.0  # m, shared by at least two sonars now
+    samples: int = 0  # in a row with that candidate
+
+    def updated(self, readings: Sequence[float]) -> "Saturation":
+        """Return the state after one sample of all sonars; infinity: no echo, 0: no reading."""
+        top = max(readings)
+        known = None if self.reading is not None and top > self.reading + SAME_M else self.reading
+        sharing = sum(top - one < SAME_M for one in readings)
+        if math.isinf(top) or sharing < 2:
+            return Saturation(known)
+        if abs(top - self.candidate) >= SAME_M:
+            return Saturation(known, top, 1)
+        samples = self.samples + 1
+        reached = samples >= SHARED_SAMPLES
+        return Saturation(self.candidate if reached else known, self.candidate, samples)
+
+    def explains(self, reading: float) -> bool:
+        """Return whether a reading is the greatest one."""
+        return self.reading is not None and abs(reading - self.reading) < SAME_M
+
+
+class SonarOverrides(Struct, frozen=True):
+    """Sonars without a reading, and the sources that may creep into their sectors."""
+
+    since: Mapping[int, int] = {}  # sonar: start of its fault, ns
+    acknowledged: Mapping[str, frozenset[int]] = {}  # source: sonars that its operator overrides
+
+    def updated(
+        self, unseen: Collection[int], neutral: Collection[str], now_ns: int
+    ) -> "SonarOverrides":
+        """Return the state now; ``neutral``: the operators' sources that request zero now."""
+        since = {sonar: self.since.get(sonar, now_ns) for sonar in unseen}
+        shown = frozenset(sonar for sonar, at_ns in since.items() if now_ns - at_ns >= SHOWN_NS)
+        acknowledged = {name: sonars & since.keys() for name, sonars in self.acknowledged.items()}
+        for source in neutral:
+            acknowledged[source] = acknowledged.get(source, frozenset()) | shown
+        return SonarOverrides(since, acknowledged)
+
+    def acknowledged_by(self, source: str | None) -> frozenset[int]:
+        """Return the sonars toward which this source may creep without a reading."""
+        return self.acknowledged.get(source or "", frozenset())
+
+
+class SonarArray(Struct, frozen=True):
+    """The sonars in the manual's order, and the newest sample processed."""
+
+    sonars: tuple[Sonar, ...] = SILENT
+    token: Token | None = None
+    at_ns: int = 0
+    saturation: Saturation = Saturation()
+    distances: tuple[float, ...] = (0.0,) * len(SONAR_NAMES)  # m that are shown to be free
+    cautious: tuple[float, ...] = (0.0,) * len(SONAR_NAMES)  # m to plan with, less where in doubt
+    unseen: frozenset[int] = frozenset()  # sonars without a reading while samples are fresh
+
+    @property
+    def is_doubted(self) -> bool:
+        """Whether a sonar is not trusted."""
+        return any(sonar.fault or sonar.suspect for sonar in self.sonars)
+
+
+class SonarFilter(Struct, frozen=True):
+    """Settings and geometry with which samples are processed; holds no state."""
+
+    axes: tuple[Axis, ...]
+    rules: Rules
+    age_s: float  # limit of a sample's age
+    creep_room: float  # m that the creep speed needs
+
+    def update(
+        self,
+        array: SonarArray,
+        latest: Latest[Ultrasonic] | None,
+        measured: Twist | None,
+        now_ns: int,
+    ) -> SonarArray:
+        """Return the array with the newest sample; each sample is processed once."""
+        if latest is None or not fresh(latest, now_ns, self.age_s):
+            return SonarArray(SILENT, array.token, array.at_ns, array.saturation)
+        sample = latest.value
+        token = (sample.boot, sample.seq)
+        if token == array.token:
+            return array
+        moved = STILL if measured is None or measured.is_standing else measured
+        step_s = min((latest.received_ns - array.at_ns) / NS_PER_S, LONGEST_STEP_S)
+        readings = tuple(map(_shown, sample.ranges, sample.status))
+        saturation = array.saturation.updated(readings)
+        sonars = tuple(
+            read(
+                sonar,
+                sample.ranges[n],
+                sample.status[n],
+                Moved(
+                    along=self.axes[n].along(moved) * step_s,
+                    turn=moved.angular * step_s,
+                    beyond=saturation.explains(readings[n]),
+                    alongside=_is_alongside(n, readings),
+                ),
+                self.rules,
+            )
+            for n, sonar in enumerate(array.sonars)
+        )
+        return SonarArray(
+            sonars,
+            token,
+            latest.received_ns,
+            saturation,
+            distances=tuple(sonar.distance for sonar in sonars),
+            cautious=tuple(sonar.cautious(self.creep_room) for sonar in sonars),
+            unseen=frozenset(n for n, sonar in enumerate(sonars) if sonar.is_unseen),
+        )
+
+
+def _shown(reading: float | None, status: str) -> float:
+    """Return the range of a sample; infinity for no echo, 0 for no reading."""
+    if status == "no_echo":
+        return math.inf
+    good = status == "ok" and reading is not None and math.isfinite(reading)
+    return reading if good and reading is not None else 0.0
+
+
+def _is_alongside(sonar: int, readings: tuple[float, ...]) -> bool:
+    """Return whether the flank on its side sees the wall that a corner sonar sees."""
+    flank = FLANK_OF.get(SONAR_NAMES[sonar])
+    if flank is None:
+        return False
+    low, high = (share * readings[sonar] for share in ALONGSIDE)
+    return low <= readings[SONAR_NAMES.index(flank)] <= high
