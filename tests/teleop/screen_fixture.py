@@ -16,7 +16,8 @@ from services.teleop.app import Panel, TeleopApp
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from tests.factories import contact_state
-from tests.teleop.support import FakeNode, answer
+from tests.teleop.inputs import answer
+from tests.teleop.support import FakeNode
 from verification.harness.waiting import PATIENCE_S
 
 

@@ -10,15 +10,13 @@ from common.motion import Twist
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
-from services.teleop.core.controls import Deflection, Stick
+from services.teleop.core.controls import Stick
 from services.teleop.core.hold import Press
-from services.teleop.core.round_trip import RoundTrip
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import EventLog, View
 from tests.factories import contact_state, safety_state
 from tests.fake_bus import FakeBus
-
-PERIOD_NS = NS_PER_S // 20
+from tests.teleop.inputs import PERIOD_NS, answer
 
 
 class FakeNode(Node[TeleopConfig]):
@@ -58,17 +56,6 @@ def view(**fields: Any) -> View:
         "top": Twist(0.2, 0.3),
     }
     return View(**usual | fields)
-
-
-def answer(terminal: RoundTrip, now_ns: int, took_s: float = 0.001) -> None:
-    """Simulate a terminal that answers now."""
-    terminal.sent(0, now_ns - round(took_s * NS_PER_S))
-    terminal.answered(0, now_ns)
-
-
-def stick(linear: float = 1.0, *, deadman: bool = True, events: int = 0) -> Stick:
-    """Return the state of a gamepad."""
-    return Stick(Deflection(linear, 0), deadman, events)
 
 
 class FakeGamepad(Gamepad):

@@ -10,7 +10,8 @@ from common.motion import Twist
 from common.operator import ESTOP_TICKS, OVERRULED_TICKS, no_answer, not_allowed
 from common.source import DENIED_AFTER
 from tests.factories import link, safety_state
-from tests.teleop.support import FakeGamepad, Operator, answer, stick
+from tests.teleop.inputs import answer, stick
+from tests.teleop.support import FakeGamepad, Operator
 
 DONE = ResetDone(text="Reset.", boot=5, heartbeat=8, cleared=(42,))
 

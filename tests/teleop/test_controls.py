@@ -21,7 +21,7 @@ from services.teleop.core.controls import (
     twist,
 )
 from services.teleop.core.hold import Press
-from tests.teleop.support import PERIOD_NS, answer, stick
+from tests.teleop.inputs import PERIOD_NS, answer, stick
 
 SETTINGS = Teleop()
 FIRST_GEAR = Request(Twist(0.2, 0.0))
