@@ -139,7 +139,8 @@ class Hold(RuleBasedStateMachine):
         self.counts_ns = 0  # when keys count again
         self.stick: Stick | None = None
         self.was_up = False  # the deadman, since the last rule
-        self.moved_ns = 0  # the last event of the gamepad
+        self.events = 0  # of the gamepad
+        self.moved_ns = 0  # the last one
         self.zeros = ZEROS  # sent since the last motion
         self.was_held = False
 
@@ -167,8 +168,8 @@ class Hold(RuleBasedStateMachine):
 
     @rule(push=st.sampled_from((-1.0, 0.0, 0.05, 0.5)), deadman=st.booleans())
     def move_stick(self, push: float, deadman: bool) -> None:
-        events = self.stick.events + 1 if self.stick else 0
-        self.stick = Stick(Deflection(push, 0.0), deadman, events)
+        self.events += 1
+        self.stick = Stick(Deflection(push, 0.0), deadman, self.events)
         self.moved_ns = self.now_ns
 
     @precondition(lambda self: self.stick is not None)
