@@ -1,29 +1,35 @@
-"""A consumer with T2's packages: print the nearest obstacle.
+"""Print the pose and the nearest obstacle, twice a second.
 
-python -m examples.nearest_obstacle
+python nearest_obstacle.py [tcp/127.0.0.1:7447]
 """
 
 import math
+import signal
 import sys
+import time
 
-from common import keys
-from common.bus.bus import Arrival
-from common.messages import SONAR_NAMES, Ultrasonic
-from common.service import Node, run
-from common.settings import Shared
+import t2
 
 
-def print_nearest(arrival: Arrival[Ultrasonic]) -> None:
-    """Print the shortest range, in m, and its sonar; one that cannot measure counts as 0."""
-    named = zip(arrival.message.ranges, arrival.message.status, SONAR_NAMES, strict=True)
-    near, name = min(({"ok": r or 0.0, "no_echo": math.inf}.get(s, 0.0), n) for r, s, n in named)
-    print(f"{near:.2f} m {name}" if near < math.inf else "nothing near", flush=True)
+def nearest(sonars: t2.messages.Ultrasonic) -> float:
+    """Return the distance to the nearest obstacle; a sonar that cannot measure counts as 0."""
+    measured = zip(sonars.ranges, sonars.status, strict=True)
+    return min({"ok": r or 0.0, "no_echo": math.inf}.get(s, 0.0) for r, s in measured)
 
 
-def build(node: Node[Shared]) -> None:
-    """Subscribe; ``run`` does the rest."""
-    node.bus.subscribe(keys.ULTRASONIC, print_nearest)
+def main(endpoint: str) -> None:
+    """Print until Ctrl-C, or until no data arrives: ``t2.NoData``."""
+    with t2.connect("001", endpoint=endpoint) as robot:
+        while True:
+            pose, sonars = robot.odometry.latest(), robot.ultrasonic.latest()
+            print(
+                f"x {pose.x:.2f} m  y {pose.y:.2f} m"
+                f"  heading {pose.heading:.2f} rad  nearest {nearest(sonars):.2f} m",
+                flush=True,
+            )
+            time.sleep(0.5)
 
 
 if __name__ == "__main__":
-    sys.exit(run("nearest", Shared, build))
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it without a traceback
+    main("".join(sys.argv[1:]))

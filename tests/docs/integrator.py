@@ -1,9 +1,10 @@
-"""An integrator: a folder with the files of docs/integrate.md, and a stack for its programs."""
+"""An integrator: a folder with the examples of docs/integrate.md, and a stack for them."""
 
 import contextlib
 import math
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -30,12 +31,13 @@ LEASES = (
 )
 
 
-def save_files(page: Path, folder: Path) -> None:
-    """Write each block of a page that has a file name to a folder."""
-    for block in NAMED.finditer(page.read_text(encoding="utf-8")):
-        file = folder / block["name"]
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(block["text"], encoding="utf-8")
+def save_files(folder: Path) -> None:
+    """Write the blocks of the page that have a file name to a folder; copy the examples to it."""
+    for block in NAMED.finditer(PAGE.read_text(encoding="utf-8")):
+        (folder / block["name"]).write_text(block["text"], encoding="utf-8")
+    shutil.copytree(ROOT / "examples" / "plain", folder / "plain")
+    for file in (ROOT / "examples").glob("*.py"):
+        shutil.copy(file, folder)
 
 
 class Integrator:
@@ -47,7 +49,7 @@ class Integrator:
         self.robot = robot
 
     def start(self, program: str, router: str = "") -> "subprocess.Popen[str]":
-        """Start a program, a Python file of the page or an executable, as the page does."""
+        """Start a program, a Python file or an executable, as the page does."""
         python = [sys.executable] if program.endswith(".py") else []
         return subprocess.Popen(
             [*python, program, router or self.stack.endpoint], cwd=self.folder, env=ENVIRONMENT,
@@ -117,7 +119,7 @@ def running_integrator(
     folder: Path, *, sets: Sequence[str] = (), listen: str = "tcp/127.0.0.1:{port}"
 ) -> Iterator[Integrator]:
     """Run a stack with the settings of the page, in an empty world; see ``running_stack``."""
-    save_files(PAGE, folder)
+    save_files(folder)
     settings = [(folder / name).read_text("utf-8") for name in ("robot.toml", "limit.toml")]
     (folder / SETTINGS_FILE).write_text("\n".join(settings), encoding="utf-8")
     with (

@@ -1,4 +1,4 @@
-"""The programs of docs/integrate.md and docs/bus.md, as they stand there, on the real stack."""
+"""The programs of docs/integrate.md, copied as it says, on the real stack."""
 
 import os
 import re
@@ -38,10 +38,13 @@ def it(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Integrator]:
 def programs(request: pytest.FixtureRequest) -> Programs:
     """Return the three programs in one language."""
     names = ("read", "drive", "limit")
+    if request.param == "sdk":
+        library = "nearest_obstacle.py", "patrol.py", "limit_speed.py"
+        return dict(zip(names, library, strict=True))
     if request.param == "rust":
         compile_rust()
         return {name: str(TARGET / "debug" / name) for name in names}
-    return {name: f"{request.param}/{name}.py" for name in names}
+    return {name: f"plain/{name}.py" for name in names}
 
 
 def compile_rust() -> None:

@@ -85,7 +85,7 @@ def test_the_package_reports_a_certificate_that_may_not_limit(it: Integrator) ->
 
 def test_the_test_file_of_the_page(tmp_path: Path) -> None:
     """It drives the simulated vehicle, with settings for the stalls of this host."""
-    save_files(PAGE, tmp_path)
+    save_files(tmp_path)
     stalls = host_stalls.settings(max(host_stalls.measured(), 0.3))
     relaxed = {"bridge.unsafe_overrides", *(one.partition("=")[0] for one in stalls)}
     own = [one for one in ports() if one.partition("=")[0] not in relaxed]

@@ -5,7 +5,6 @@ import csv
 import json
 import math
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -22,10 +21,9 @@ from mcp import Client, StdioServerParameters
 from nbclient import NotebookClient
 
 import t2
-from common.bus.bus import Arrival
-from common.messages import Ultrasonic
 from examples import limit_speed, nearest_obstacle, wall_follower
 from sim.requests import Bumper, Sonar
+from t2.messages import Ultrasonic
 from tests.sdk.library_robot import blocked, ready
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -35,10 +33,7 @@ pytestmark = pytest.mark.timed
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "sdk")}
-SETS = (
-    "safety.sources.agent={priority=1, lease=0.3, operator=false}",
-    'safety.limits.lidar={lease=1.0, silence="ignore"}',
-)
+SETS = ("safety.sources.agent={priority=1, lease=0.3, operator=false}",)
 
 
 @pytest.fixture(scope="module")
@@ -54,25 +49,17 @@ def robot(stack: RunningStack) -> Iterator[t2.Robot]:
 
 
 @contextmanager
-def example(*words: str, code: int = 0) -> Iterator["subprocess.Popen[str]"]:
-    """Run an example; stop it like Ctrl-C, and expect an exit code."""
+def example(*words: str) -> Iterator["subprocess.Popen[str]"]:
+    """Run an example; stop it like Ctrl-C, and expect a good end."""
     with subprocess.Popen(
         [sys.executable, *words], cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True
     ) as process:
         try:
             yield process
             process.send_signal(signal.SIGINT)
-            assert process.wait(PATIENCE_S) == code
+            assert process.wait(PATIENCE_S) == 0
         finally:
             process.kill()
-
-
-def test_the_consumers_print_what_they_receive(robot: t2.Robot) -> None:
-    connect = f"bus.connect={robot.endpoint}"
-    with example("-m", "examples.nearest_obstacle", "--set", connect) as process:
-        assert re.fullmatch(r"\d\.\d\d m \w+\n", line_of(process))
-    with example("examples/watch_plain.py", robot.endpoint, code=-signal.SIGINT) as process:
-        assert re.fullmatch(r"x +-?\d+\.\d\d m  y +-?\d+\.\d\d m +.*\n", line_of(process))
 
 
 def line_of(process: "subprocess.Popen[str]") -> str:
@@ -80,19 +67,12 @@ def line_of(process: "subprocess.Popen[str]") -> str:
     return process.stdout.readline()
 
 
-def test_the_limit_slows_before_an_obstacle(robot: t2.Robot, stack: RunningStack) -> None:
-    with example("-m", "examples.limit_speed", "--set", f"bus.connect={robot.endpoint}"):
-        stack.control.do(Sonar(name="front", range=0.62))
-        wait_until(lambda: limited(robot) == (0.2, "something at 0.62 m"), "the limit")
-        stack.control.do(Sonar(name="front"))
-
-
 @pytest.mark.parametrize(
     ("range_m", "status", "distance"),
     [(1.5, "ok", 1.5), (None, "no_echo", math.inf), (None, "too_near", 0.0), (None, "fault", 0.0)],
 )
 def test_a_sonar_that_cannot_measure_counts_as_0(
-    range_m: float | None, status: Any, distance: float, capsys: pytest.CaptureFixture[str]
+    range_m: float | None, status: Any, distance: float
 ) -> None:
     """What a program that somebody copies does at 0.02 m, or with a faulty sonar."""
     clear: list[Any] = ["no_echo"] * 8
@@ -101,14 +81,7 @@ def test_a_sonar_that_cannot_measure_counts_as_0(
     sample: Any = Ultrasonic(ranges=tuple(ranges), status=tuple(clear))
     assert limit_speed.front(sample) == distance
     assert wall_follower.distance(sample, wall_follower.FRONT) == distance
-    nearest_obstacle.print_nearest(Arrival(sample, "", 0, b""))
-    shown = "nothing near\n" if distance == math.inf else f"{distance:.2f} m front\n"
-    assert capsys.readouterr().out == shown
-
-
-def limited(robot: t2.Robot) -> tuple[float | None, str]:
-    (limit,) = robot.safety.latest().limit_sources
-    return limit.linear, limit.reason
+    assert nearest_obstacle.nearest(sample) == distance
 
 
 def test_the_logger_writes_poses(robot: t2.Robot, tmp_path: Path) -> None:

@@ -1,0 +1,24 @@
+"""Drive 0.4 m forward, turn left and turn back, as the source "patrol".
+
+python patrol.py [tcp/127.0.0.1:7447], with [safety.sources] patrol in safety's settings
+"""
+
+import math
+import sys
+
+import t2
+
+
+def patrol(endpoint: str) -> None:
+    """Drive; raises ``t2.Latched``, ``t2.Blocked``, ``t2.Overruled``, ``t2.NotAllowed``, ..."""
+    with t2.connect("001", endpoint=endpoint) as robot, robot.drive("patrol") as drive:
+        drive.forward(0.4)
+        drive.turn(math.pi / 2)
+        drive.turn(-math.pi / 2)
+
+
+if __name__ == "__main__":
+    try:
+        patrol("".join(sys.argv[1:]))
+    except t2.T2Error as error:
+        sys.exit(f"{type(error).__name__}: {error}")
