@@ -47,6 +47,23 @@ def finite(*values: float) -> bool:
     return all(math.isfinite(value) for value in values)
 
 
+class Sample(Struct, frozen=True):
+    """A message that is not decoded, or anything else on the bus."""
+
+    key: str
+    payload: bytes
+    encoding: str
+    deleted: bool  # a DELETE, not a PUT
+    raw: bytes | None  # attachment: the board's raw frame, on the bridge's streams
+    received_ns: int  # on the monotonic clock
+    wall_ns: int  # received, on the wall clock
+
+    @property
+    def size(self) -> int:
+        """Size in bytes, without network overhead."""
+        return len(self.payload) + len(self.raw or b"")
+
+
 @cache
 def _decoder(kind: type[Struct]) -> msgspec.msgpack.Decoder[Any]:
     return msgspec.msgpack.Decoder(kind)

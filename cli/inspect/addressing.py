@@ -5,9 +5,9 @@ import re
 
 from common import codec, keys
 from common.bus.probe import valid
+from common.codec import Sample
 from common.errors import MessageError
 from common.messages import Health, Message
-from common.sample import Sample
 
 # `**` does not match a chunk that begins with "@" (verbatim in Zenoh): both are needed for all.
 EVERYTHING = ("**", "@cmd/**")

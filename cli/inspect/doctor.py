@@ -27,9 +27,9 @@ from common import keys
 from common.bus.probe import Probe, probe
 from common.bus.publisher import host_id
 from common.cli_args import VERSION
+from common.codec import Sample
 from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
-from common.sample import Sample
 from common.settings import BusSettings, Shared
 from common.text import printable
 from services.ros2 import names

@@ -9,10 +9,10 @@ from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
 from cli.inspect.session import BusSession, add_end, add_options, open_session, until_interrupt
+from common.codec import Sample
 from common.errors import MessageError, RobotError
 from common.freshness import NS_PER_S
 from common.messages import Event
-from common.sample import Sample
 from common.text import printable
 
 FIRST_S = 2.0  # the slowest streams have 1 Hz

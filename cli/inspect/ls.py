@@ -16,8 +16,8 @@ from cli.inspect.session import BusSession, add_duration, add_options, open_sess
 from cli.inspect.stream_stats import StreamStats
 from common import codec
 from common.bus.probe import intersects
+from common.codec import Sample
 from common.errors import RobotError
-from common.sample import Sample
 
 LISTEN_S = 2.0  # two periods of the slowest streams
 NO_STREAMS = ("live/", "info/", "srv/")  # tokens and calls

@@ -22,9 +22,9 @@ from cli.inspect.session import (
 )
 from cli.inspect.stream_stats import StreamSample, StreamStats
 from common.bus.publisher import host_id
+from common.codec import Sample
 from common.errors import RobotError
 from common.freshness import NS_PER_S
-from common.sample import Sample
 
 REPORT_S = 1.0
 WINDOW = 10_000

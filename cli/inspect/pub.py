@@ -29,10 +29,10 @@ from cli.inspect.session import (
 )
 from common import cli_codec, codec, keys
 from common.bus.probe import Probe
+from common.codec import Sample
 from common.errors import MessageError, RobotError
 from common.keys import Topic
 from common.messages import Link, Message, SafetyState, SourceMessage
-from common.sample import Sample
 from common.settings import is_encrypted
 
 FIRST_S = 2.0  # wait for safety's first heartbeat, which has 20 Hz

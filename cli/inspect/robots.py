@@ -14,9 +14,9 @@ from cli.inspect.estop import MOVES
 from cli.inspect.session import add_options, open_session, until_interrupt
 from common import codec, keys
 from common.bus.probe import Probe
+from common.codec import Sample
 from common.errors import MessageError, RobotError
 from common.messages import SafetyState, Velocity
-from common.sample import Sample
 
 LISTEN_S = 1.5  # at most; over a thin uplink a stream may have 1 Hz
 HEAD = ("robot", "services", "verdict", "m/s", "driver", "")

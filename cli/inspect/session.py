@@ -11,10 +11,10 @@ from cli.inspect.addressing import EVERY_ROBOT, parse_site
 from common import codec
 from common.bus.probe import Answer, Probe, probe
 from common.cli_args import add_sources, sources
+from common.codec import Sample
 from common.config import load
 from common.errors import MessageError
 from common.loop import Loop
-from common.sample import Sample
 from common.settings import Shared
 
 

@@ -17,12 +17,12 @@ from common.bus.calls import Caller, is_timeout, refusal_of
 from common.bus.overwriting_queue import OverwritingQueue
 from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
 from common.bus.session import Session, client
+from common.codec import Sample
 from common.errors import MessageError
 from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
 from common.loop import Post
 from common.messages import Message
 from common.operator import no_answer
-from common.sample import Sample
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)

@@ -19,9 +19,9 @@ from common.bus.bus import copied
 from common.bus.calls import is_timeout, refusal_of
 from common.bus.publisher import QUERY_CONGESTION, qos
 from common.bus.session import check_files, client_config
+from common.codec import Sample
 from common.errors import LinkError
 from common.keys import ClassOfService
-from common.sample import Sample
 from common.settings import BusSettings
 
 MATCH_TIMEOUT_S = 1.0  # until the router has reported matching declarations

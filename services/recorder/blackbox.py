@@ -12,9 +12,9 @@ from itertools import islice
 from math import inf
 from typing import TYPE_CHECKING
 
+from common.codec import Sample
 from common.freshness import NS_PER_S
 from common.messages import SafetyState
-from common.sample import Sample
 from services.recorder.config import MB, Recorder
 
 if TYPE_CHECKING:

@@ -17,9 +17,9 @@ from typing import Any
 import msgspec
 
 from common import codec, keys
+from common.codec import Sample
 from common.errors import MessageError
 from common.messages import Message
-from common.sample import Sample
 from common.settings import Vehicle
 from services.recorder.foxglove_views import FoxgloveViews, Schema, schema_of
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from common import clock, codec, keys
 from common.cli_args import VERSION
+from common.codec import Sample
 from common.errors import MessageError
 from common.messages import SafetyState
-from common.sample import Sample
 from common.service import Node
 from services.recorder.blackbox import BlackBox, LatchDetector
 from services.recorder.config import MB, RecorderConfig

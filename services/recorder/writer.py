@@ -11,8 +11,8 @@ from pathlib import Path
 
 from mcap.writer import Writer
 
+from common.codec import Sample
 from common.freshness import NS_PER_S
-from common.sample import Sample
 from services.recorder.blackbox import CloseRecording, OpenRecording
 from services.recorder.config import MB, Recorder
 from services.recorder.mcap_codec import Channel, Encoder, Entry

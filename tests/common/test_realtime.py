@@ -63,8 +63,8 @@ def test_other_systems_go_on_as_ordinary() -> None:
 
 
 @needs_right
-def test_all_threads_that_may_hold_the_loops_lock_have_one_priority(endpoint: str) -> None:
-    """Otherwise an ordinary thread that holds it, and is not scheduled, delays a SCHED_FIFO one."""
+def test_all_threads_of_a_service_have_one_priority(endpoint: str) -> None:
+    """Otherwise an ordinary thread that holds Python's lock and does not run delays the others."""
     sets = "--set", f"bus.connect={endpoint}", "--set", "robot.realtime=true"
     command = [sys.executable, "-m", "services.safety", *sets]
     environ = {name: value for name, value in os.environ.items() if name != "T2__ROBOT__REALTIME"}

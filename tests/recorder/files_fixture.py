@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from common.codec import Sample
 from common.freshness import NS_PER_S
-from common.sample import Sample
 from common.settings import Vehicle
 from services.recorder.config import MB, Recorder
 from services.recorder.mcap_codec import Encoder

@@ -2,8 +2,8 @@
 
 from common import codec
 from common import messages as m
+from common.codec import Sample
 from common.freshness import NS_PER_S
-from common.sample import Sample
 
 ROOT = "t2/v1/001"
 BEGIN_NS = 1_700_000_000 * NS_PER_S  # on the wall clock

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common import codec
+from common.codec import Sample
 from common.errors import MessageError
 from common.messages import Velocity
-from common.sample import Sample
 from common.settings import Vehicle
 from services.recorder.mcap_codec import JSON, Channel, Encoder, Entry, decode_sample
 from tests.recorder import samples

@@ -14,9 +14,9 @@ from cli.inspect.session import BusSession
 from cli.recordings.replay.plan import refusal
 from common import clock, codec, keys
 from common.bus.publisher import host_id
+from common.codec import Sample
 from common.errors import LinkError, MessageError, RobotError
 from common.messages import Drive, SafetyState
-from common.sample import Sample
 from common.settings import Board
 
 

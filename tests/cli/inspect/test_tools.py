@@ -16,10 +16,10 @@ from cli.inspect.echo import clock
 from cli.inspect.payload import Reading
 from common import codec, keys
 from common.bus.bus import Bus
+from common.codec import Sample
 from common.freshness import NS_PER_S
 from common.messages import Bumper, Event
 from common.motion import Command
-from common.sample import Sample
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, t2
 from tests.common.bus_fixture import BusFixture

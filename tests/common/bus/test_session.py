@@ -118,7 +118,7 @@ def test_a_router_that_comes_later_or_again_finds_all_as_it_was(buses: BusFixtur
         wait_until(lambda: not (receiver.connected or sender.connected), "the router's end")
         bumper.put(Bumper(pressed=True))  # harmless
         for some in (received, seen, replies, late):
-            some.clear()  # type: ignore[attr-defined]
+            some.clear()
     receiver.close()
     sender.close()
 

@@ -10,8 +10,8 @@ from playwright.sync_api import ViewportSize, sync_playwright
 from cli.__main__ import main
 from cli.recordings.report.page import clock
 from common import codec
+from common.codec import Sample
 from common.keys import ROOT
-from common.sample import Sample
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
