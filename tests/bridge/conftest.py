@@ -1,4 +1,4 @@
-"""A bridge of its own for each test, one router for all of a file, and a core without either."""
+"""A bridge of its own for each test, one router for all of a file."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,6 @@ import pytest
 
 from common.loop import Loop
 from tests.bridge.bridge_fixture import BridgeFixture, bridge_process
-from tests.bridge.core_fixture import Bench
 from verification.harness.bus import bus_on, router_process, running
 from verification.harness.fake_board import board
 from verification.harness.ports import free_port
@@ -30,8 +29,3 @@ def bridge(endpoint: str) -> Iterator[BridgeFixture]:
         bridge = BridgeFixture(made, endpoint, loop, process)
         with bus_on(endpoint, loop, bridge.declare):
             yield bridge
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()

@@ -35,6 +35,11 @@ from tests.bridge.core_fixture import (
 from tests.factories import safety_state
 
 
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
 def test_the_first_frame_is_a_stop(bench: Bench) -> None:
     assert motions(bench.outputs) == [MotionKind.STOP]
 

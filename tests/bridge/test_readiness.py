@@ -29,6 +29,11 @@ CONFIGURED = "board.relay_port=4010"
 WITHOUT_ECHOES = "bridge.require_switches=false", "bridge.unsafe_overrides=require_switches"
 
 
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
 # --- the link -------------------------------------------------------------------------------------
 
 
