@@ -49,6 +49,7 @@ class MotionOutput:
         self._boot = boot
         self._framing = framing
         self._translator = translator
+        self._packed = {order: framing.pack(translator.command(order)) for order in (STOP, BRAKE)}
         self._counters = counters
         self._velocity: Latest[Twist] | None = None
         self._hit_ns = 0  # when the hit was read that the lease waits for
@@ -157,7 +158,9 @@ class MotionOutput:
 
     def order(self, order: Command, motion: Motion | None = None) -> Send:
         """Return the frame of an order, from the command port."""
-        datagram = self._framing.pack(self._translator.command(order, motion))
+        datagram = self._packed.get(order)
+        if datagram is None:
+            datagram = self._framing.pack(self._translator.command(order, motion))
         return Send(datagram, self.port, order)
 
     def _is_at_standstill(self, now_ns: int) -> bool:
