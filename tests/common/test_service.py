@@ -26,25 +26,24 @@ from verification.harness.waiting import wait_until
 # --- settings -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--set", "bus.lease=99"],
+         "--set bus.lease=99: bus.lease = 99: Expected `float` <= 10.0; allowed is 0.2..10.0"),
+        (["--config", "none.toml"], "none.toml: cannot be read: No such file or directory"),
+    ],
+)  # fmt: skip
 def test_a_wrong_setting_ends_it_before_anything_is_built(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], words: list[str], text: str
 ) -> None:
     built: list[Node[Shared]] = []
-    code = run("odom", Shared, built.append, ["--set", "bus.lease=99"])
-    assert code == EXIT_CONFIG == 78
+    assert run("odom", Shared, built.append, words) == EXIT_CONFIG == 78
     assert built == []
-    said = capsys.readouterr().err
-    assert said == (
-        "odom: --set bus.lease=99: bus.lease = 99: Expected `float` <= 10.0; allowed is 0.2..10.0\n"
-    )
+    assert capsys.readouterr().err == f"odom: {text}\n"
 
 
-def test_a_file_that_is_not_there_ends_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("odom", Shared, lambda _: None, ["--config", "none.toml"]) == EXIT_CONFIG
-    assert capsys.readouterr().err == "odom: none.toml: cannot be read: No such file or directory\n"
-
-
-def test_options_that_nobody_knows_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_options_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         run("odom", Shared, lambda _: None, ["--speed", "9"])
     assert caught.value.code == 2
@@ -159,21 +158,13 @@ def test_its_token_carries_its_boot(lived: Lived) -> None:
     assert alive
 
 
-def test_it_tells_its_schemas(lived: Lived) -> None:
-    made = info(lived[0], "schema")
-    assert set(made) == {"tel/bridge/bumper", "tel/{service}/health", "evt/{service}"}
-    assert "pressed" in json.dumps(made["tel/bridge/bumper"])
-
-
-def test_it_tells_its_settings_and_where_they_came_from(lived: Lived) -> None:
+def test_its_schemas_settings_and_last_values_are_looked_up(lived: Lived) -> None:
     buses, _, _ = lived
-    settings = info(buses, "config")
+    schemas, settings = info(buses, "schema"), info(buses, "config")
+    assert set(schemas) == {"tel/bridge/bumper", "tel/{service}/health", "evt/{service}"}
+    assert "pressed" in json.dumps(schemas["tel/bridge/bumper"])
     assert settings["robot.id"] == {"value": buses.robot, "origin": f"--set robot.id={buses.robot}"}
     assert settings["bus.lease"] == {"value": 1.0, "origin": "default"}
-
-
-def test_it_tells_its_last_values(lived: Lived) -> None:
-    buses, _, _ = lived
     last = msgspec.convert(info(buses, "last"), dict[str, dict[str, object]])
     assert last[keys.BUMPER.on(buses.robot)]["pressed"] is True
     assert last[keys.HEALTH.on(buses.robot, service="specimen")]["service"] == "specimen"
@@ -182,10 +173,8 @@ def test_it_tells_its_last_values(lived: Lived) -> None:
 def test_its_logs_are_json_lines(lived: Lived) -> None:
     it = lived[1]
     it.wait_for("started")
-    for line in it.lines:
-        entry = json.loads(line)
-        assert entry["service"] == "specimen"
-        assert entry["level"] == "info"
+    entries = [json.loads(line) for line in it.lines]
+    assert {(entry["service"], entry["level"]) for entry in entries} == {("specimen", "info")}
 
 
 def test_sigterm_lets_it_come_to_rest_and_its_token_goes(lived: Lived) -> None:
