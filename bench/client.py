@@ -14,9 +14,9 @@ from functools import partial
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
+from common.client import reset_request
 from common.config import Sources, load
 from common.loop import Loop
-from common.operator import reset_request
 from common.settings import BusSettings, Shared
 from common.source import DriveSource
 

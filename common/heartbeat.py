@@ -9,7 +9,10 @@ start at random, so that echoes of an earlier start are unknown.
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
+from common.messages import SafetyState
 
+MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
+AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
 CAPACITY = 256  # at 20 states a second plus immediate ones: over 10 s, more than any limit
 
 
@@ -53,3 +56,26 @@ class Heartbeat(Struct, frozen=True):
             if number == echo:
                 return now_ns - sent_ns
         return None
+
+
+class Echoes(Struct, frozen=True):
+    """Heartbeats of the running safety service, as another service received them."""
+
+    boot: int = 0
+    heartbeat: Heartbeat = Heartbeat()
+
+    def received(self, state: SafetyState, now_ns: int) -> "Echoes":
+        """Return the echoes with a state; those of an earlier start of safety are discarded."""
+        heartbeat = self.heartbeat if state.boot == self.boot else Heartbeat()
+        return Echoes(state.boot, heartbeat.noted(state.heartbeat, now_ns))
+
+    def refusal(self, echo: int | None, now_ns: int) -> str:
+        """Return why a call with this echo is refused, as text; empty if it is accepted.
+
+        A state may reach the operator's program before it comes here: an echo slightly ahead
+        counts as the newest number, and has its age.
+        """
+        newest = self.heartbeat.number
+        if echo is not None and echo <= newest + AHEAD:
+            echo = min(echo, newest)
+        return self.heartbeat.refusal(echo, now_ns, MAX_CALL_AGE_NS)

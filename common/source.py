@@ -7,28 +7,24 @@ from msgspec.structs import replace
 
 from common import codec, keys
 from common.bus.bus import Arrival, Bus
+from common.client import Access, request
 from common.keys import Topic
 from common.messages import (
     MAX_REASON,
     Drive,
     EstopKeepalive,
     Limit,
-    ReleaseRequest,
     SafetyState,
     SourceMessage,
 )
 
 M = TypeVar("M", bound=SourceMessage)
 
-DENIED_AFTER = 10  # states of safety; a router needs a moment to announce its subscribers
-
 
 class Source(Generic[M]):
     """Publisher of a source's messages to safety, with the echo of safety's heartbeat.
 
-    The echo bounds the age of a message without synchronized clocks. No method blocks: without a
-    bus a message is dropped. A router whose access rules forbid it drops messages without an
-    error, and does not announce safety's subscription either.
+    No method blocks: without a bus a message is dropped.
     """
 
     def __init__(
@@ -36,23 +32,22 @@ class Source(Generic[M]):
     ) -> None:
         self.name = source
         self._publisher = bus.publisher(topic, source=source)
-        self._echo = 0  # before the first state of safety; safety refuses 0
-        self._unmatched = 0  # states of safety in a row without a subscriber for our messages
+        self._access = Access()
         self._on_denied = on_denied
         bus.subscribe(keys.SAFETY, self._on_safety)
 
     @property
     def denied(self) -> bool:
         """Whether safety's state arrives but our messages would not: watching only."""
-        return self._unmatched >= DENIED_AFTER
+        return self._access.is_denied
 
     def _put(self, message: M, echo: int | None = None) -> M:
-        return self._publisher.put(replace(message, echo=self._echo if echo is None else echo))
+        return self._publisher.put(
+            replace(message, echo=self._access.echo if echo is None else echo)
+        )
 
     def _on_safety(self, arrival: Arrival[SafetyState]) -> None:
-        self._echo = arrival.message.heartbeat
-        self._unmatched = self._unmatched + 1 if self._publisher.passed_on is False else 0
-        if self._unmatched == DENIED_AFTER:
+        if self._access.received(arrival.message, self._publisher.passed_on):
             self._on_denied()
 
 
@@ -62,11 +57,15 @@ class DriveSource(Source[Drive]):
     def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
         super().__init__(bus, keys.DRIVE, source, on_denied)
 
-    def request(self, linear: float, angular: float, release: ReleaseRequest = "none") -> Drive:
+    def request(self, linear: float, angular: float) -> Drive:
         """Request a motion (m/s, rad/s, in ``base_link``) until the source's lease expires."""
-        if not codec.finite(linear, angular):
-            raise ValueError(f"non-finite request: {linear} m/s, {angular} rad/s")
-        return self._put(Drive(linear=linear, angular=angular, release=release, echo=0))
+        return self.put(request(linear, angular))
+
+    def put(self, drive: Drive) -> Drive:
+        """Put a request with its header and echo."""
+        if not codec.finite(drive.linear, drive.angular):
+            raise ValueError(f"non-finite request: {drive.linear} m/s, {drive.angular} rad/s")
+        return self._put(drive)
 
 
 class LimitPublisher(Source[Limit]):

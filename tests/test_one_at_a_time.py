@@ -14,9 +14,9 @@ import pytest
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
+from common.client import reset_request
 from common.config import Sources, load
 from common.loop import Loop
-from common.operator import reset_request
 from common.service import Node
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig

@@ -1,10 +1,10 @@
-"""The generated modules of the client library ``sdk/``: message types, and the table of keys."""
+"""The generated modules of the client library ``sdk/``: message types, client, table of keys."""
 
 import ast
 from pathlib import Path
 from types import ModuleType
 
-from common import keys, messages, verdict
+from common import client, keys, messages, verdict
 
 SDK = Path(__file__).parent.parent / "sdk" / "t2"
 PARTS = (verdict,)
@@ -29,6 +29,7 @@ from msgspec import Meta, Struct
 {imports}
 Command = Literal["run", "stop", "brake"]
 '''
+CLIENT_HEAD = "# Generated from the stack's own by ``make docs``, do not edit.\n"
 KEYS_HEAD = '''"""Keys on the bus; generated from the stack's own by ``make docs``, do not edit."""
 
 from t2 import messages as m
@@ -50,6 +51,7 @@ def generated() -> dict[Path, str]:
     return {
         SDK / "parts.py": _joined(PARTS_HEAD, *map(_body, PARTS)),
         SDK / "messages.py": _joined(HEAD.format(imports=imports), _body(messages)),
+        SDK / "client.py": CLIENT_HEAD + _text(client).replace("common.messages", "t2.messages"),
         SDK / "keys.py": KEYS_HEAD + _keys(),
     }
 
@@ -58,9 +60,13 @@ def _joined(*parts: str) -> str:
     return "\n".join(parts).rstrip() + "\n"
 
 
+def _text(module: ModuleType) -> str:
+    return Path(str(module.__file__)).read_text("utf-8")
+
+
 def _body(module: ModuleType) -> str:
     """Return a module without its docstring and its imports."""
-    text = Path(str(module.__file__)).read_text("utf-8")
+    text = _text(module)
     lines = text.splitlines(keepends=True)
     for node in reversed(ast.parse(text).body):
         is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)

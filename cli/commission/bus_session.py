@@ -16,6 +16,7 @@ from cli.commission.motion import too_fast
 from cli.commission.operator import confirm
 from common import clock, keys
 from common.bus.bus import Arrival, Bus
+from common.client import reset_request
 from common.config import Setting
 from common.errors import LinkError
 from common.freshness import NS_PER_S, Latest
@@ -23,7 +24,6 @@ from common.keys import Call, Topic
 from common.loop import Loop
 from common.messages import Message
 from common.motion import STILL, Twist, is_standing
-from common.operator import reset_request
 from common.settings import Shared
 from common.source import DriveSource
 

@@ -15,11 +15,12 @@ from cli.inspect.payload import read
 from cli.inspect.pub import json_object
 from cli.inspect.session import BusSession, add_options, decoded, open_session, positive
 from common import codec, keys
+from common.bus.calls import no_answer, not_allowed
 from common.bus.probe import Answer, Probe
+from common.client import CONFIRM_S, confirms, reset_request
 from common.errors import MessageError, RobotError
 from common.keys import CALLS, Call
 from common.messages import ResetDone, SafetyState
-from common.operator import CONFIRM_S, confirms, no_answer, not_allowed, reset_request
 
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
 HEAD = ("key", "request", "reply", "does")

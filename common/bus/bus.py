@@ -13,7 +13,7 @@ import zenoh.ext
 from msgspec import Struct
 
 from common import clock, codec, settings
-from common.bus.calls import Caller, is_timeout, refusal_of
+from common.bus.calls import Caller, is_timeout, no_answer, refusal_of
 from common.bus.overwriting_queue import OverwritingQueue
 from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
 from common.bus.session import Session, client
@@ -22,7 +22,6 @@ from common.errors import MessageError
 from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
 from common.loop import Post
 from common.messages import Message
-from common.operator import no_answer
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)

@@ -43,3 +43,16 @@ def refusal_of(reply: zenoh.Reply) -> str:
     """Return the reason of a refusal."""
     reason = reply.err.payload.to_bytes() if reply.err else b""
     return reason.decode(errors="replace") or "refused without a reason"
+
+
+def no_answer(server: str) -> str:
+    """Return the text of a call without any answer."""
+    return f"{server} does not answer; run `t2 doctor`"
+
+
+def not_allowed(server: str) -> str:
+    """Return the text of a call without any answer from a service whose messages arrive.
+
+    A router whose access rules forbid a call drops it without an error.
+    """
+    return f"no reply, though {server} runs: this certificate may not call it (see `t2 keys list`)"

@@ -9,21 +9,18 @@ from typing import TYPE_CHECKING
 
 import zenoh
 
+from t2.client import Contest, request
 from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, Stopped, T2Error
-from t2.messages import Drive as DriveMessage
 from t2.messages import Odometry, SafetyState
 from t2.motion import STILL, Straight, Target, Turn, finite
-from t2.publisher import FRESH_S, SourcePublisher
+from t2.publisher import FRESH_S, PERIOD_S, DrivePublisher
 from t2.stream import check_process
 
 if TYPE_CHECKING:
     from t2.robot import Robot
 
-PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the first one
-ZEROS = 3  # requests after a drive: one may be lost
 READY_S = 2.0  # from the first neutral request until we are in control
-OVERRULED_TICKS = 10  # our requests may be on their way for that long
 PATIENCE_S = 3.0  # without progress
 STANDING = 0.02  # m/s and rad/s
 CLOSED = "this drive is closed, or not entered yet: use `with robot.drive(...) as drive`"
@@ -45,13 +42,11 @@ class Drive:
     def __init__(self, session: zenoh.Session, key: str, source: str, robot: "Robot") -> None:
         self.source = source
         self._robot = robot
-        self._publisher: SourcePublisher[DriveMessage] = SourcePublisher(
-            session, key, "Drive", robot.safety
-        )
+        self._publisher = DrivePublisher(session, key, robot.safety)
         self._key = (self._publisher.boot, key)
         self._target = STILL
         self._sent = 0  # requests
-        self._contested = 0  # ticks with a request while another source drives
+        self._contest = Contest(source)
         self._error: T2Error | None = None  # for good, see the class
         self._reported = False  # whether it was raised
         self._cancelled = False
@@ -268,9 +263,7 @@ class Drive:
         try:
             while not self._ended.wait(PERIOD_S):
                 self._tick()
-            for _ in range(ZEROS):
-                self._put(0.0, 0.0)
-                time.sleep(PERIOD_S)
+            self._publisher.stop()
         except Exception as error:  # the session was closed, for example
             ended = T2Error(f"the drive has ended: {error!r}")
             self._error = self._error or ended.with_traceback(error.__traceback__)
@@ -285,10 +278,7 @@ class Drive:
         self._error = self._error or self._trouble(target)
         if self._error is not None:
             target = STILL
-        self._put(target.linear, target.angular)
-
-    def _put(self, linear: float, angular: float) -> None:
-        self._publisher.put(DriveMessage(linear=linear, angular=angular, echo=0))
+        self._publisher.tick(request(target.linear, target.angular))
         self._sent += 1
 
     def _trouble(self, target: Target) -> "T2Error | None":
@@ -303,12 +293,11 @@ class Drive:
                 f"the router drops the requests of {self.source!r}: this certificate may not drive "
                 f"robot {self._robot.name} as this source; see `t2 keys list`"
             )
-        other = state.source not in (None, self.source)
-        if target.moves and not other and is_stopped(state):
+        self._contest.tick(state, requests=target.moves)
+        if target.moves and not self._contest.other and is_stopped(state):
             return Stopped(f"{state.text} Open another drive to go on.", state.causes)
-        self._contested = self._contested + 1 if other and target.moves else 0
-        if self._contested >= OVERRULED_TICKS:
-            return Overruled(str(state.source))
+        if self._contest.is_lost:
+            return Overruled(str(self._contest.other))
         return None
 
 

@@ -10,12 +10,13 @@ from typing import Any, Generic, TypeVar
 import msgspec
 import zenoh
 
-from t2.messages import SafetyState, SourceMessage
+from t2.client import Access, DriveRequests
+from t2.messages import Drive, SafetyState, SourceMessage
 from t2.stream import Stream
 
 M = TypeVar("M", bound=SourceMessage)
 
-UNMATCHED_MAX = 10  # messages in a row without a receiver, while safety's state arrives
+PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 # A program is one publisher at a router: safety would take the next drive of a source for a second
 # one. Made on first use: forks that connect afterwards are publishers of their own.
 BOOTS: defaultdict[str, int] = defaultdict(lambda: randbits(56))  # by router
@@ -40,7 +41,8 @@ class SourcePublisher(Generic[M]):
         self._safety = safety
         self.boot = BOOTS[str(session.info.routers_zid())]
         self._seqs = SEQS[key]
-        self._unmatched = 0
+        self._access = Access()
+        self._seen: SafetyState | None = None
         self._encoder = msgspec.msgpack.Encoder()
         encoding = f"application/msgpack;t2.v1.{kind}"
         self._publisher: Any = session.declare_publisher(key, encoding=encoding, **QOS)
@@ -48,24 +50,45 @@ class SourcePublisher(Generic[M]):
     @property
     def denied(self) -> bool:
         """Whether safety is there, but the router does not pass our messages on to it."""
-        return self._unmatched >= UNMATCHED_MAX
+        return self._access.is_denied
 
     def put(self, message: M) -> None:
         """Send a message; its header and echo are filled in."""
         state = self._safety.newest
-        is_fresh = self._safety.age <= FRESH_S
-        matched = bool(self._publisher.matching_status.matching)
-        self._unmatched = 0 if matched or not is_fresh else self._unmatched + 1
+        if state is not None and state is not self._seen:
+            self._seen = state
+            self._access.received(state, bool(self._publisher.matching_status.matching))
         filled = msgspec.structs.replace(
             message,
             seq=next(self._seqs),
             boot=self.boot,
             t_ns=time.time_ns(),
             mono_ns=time.monotonic_ns(),
-            echo=state.heartbeat if state else 0,
+            echo=self._access.echo,
         )
         self._publisher.put(self._encoder.encode(filled))
 
     def close(self) -> None:
         """Send no more."""
         self._publisher.undeclare()
+
+
+class DrivePublisher(SourcePublisher[Drive]):
+    """Sends drive requests, each drive between zeros."""
+
+    def __init__(self, session: zenoh.Session, key: str, safety: Stream[SafetyState]) -> None:
+        super().__init__(session, key, "Drive", safety)
+        self._requests = DriveRequests()
+
+    def tick(self, requested: Drive | None) -> bool:
+        """Send the request of this tick; return whether there is one."""
+        request = self._requests.tick(requested)
+        if request is not None:
+            self.put(request)
+        return request is not None
+
+    def stop(self) -> None:
+        """Send the final zeros."""
+        self._requests.stop()
+        while self.tick(None):
+            time.sleep(PERIOD_S)

@@ -7,22 +7,27 @@ import msgspec
 import zenoh
 
 from t2 import messages as m
-from t2.drive import NEUTRAL, PERIOD_S, ZEROS, Drive
+from t2.client import (
+    ESTOP_TICKS,
+    EstopRepetition,
+    EstopStep,
+    ResetCheck,
+    request,
+    reset_request,
+)
+from t2.drive import Drive
 from t2.errors import NoData, NotAllowed, NotConfirmed, Refused
 from t2.keys import CALLS, ROOT, TOPICS
 from t2.limit import SpeedLimit
 from t2.motion import finite
-from t2.publisher import SourcePublisher
+from t2.publisher import PERIOD_S, DrivePublisher
 from t2.stream import Stream, check_process
 
 A = TypeVar("A", bound=msgspec.Struct)
 
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
-CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
 STANDSTILL_S = 1.0  # a release is refused until the vehicle stands
-ESTOP_S = 3.0
-ESTOP_PERIOD_S = 0.05
 SWITCH = "use the vehicle's own switch"
 
 
@@ -123,18 +128,20 @@ class Robot:
         >>> _ = robot.reset()
         """
         self.put_estop()  # before anything else
-        begin_s = time.monotonic()
+        begin_s, repetition = time.monotonic(), EstopRepetition()
+        repetition.start()
         self.safety.open()
-        while (passed_s := time.monotonic() - begin_s) < ESTOP_S:
-            state = self.safety.newest
+        while repetition.is_pending:
+            time.sleep(PERIOD_S)
             # An older state may show the latch of an earlier stop.
-            if state and "estop" in state.latched and self.safety.age < passed_s:
+            is_newer = self.safety.age < time.monotonic() - begin_s
+            if repetition.tick(self.safety.newest if is_newer else None) is EstopStep.NONE:
                 return
-            time.sleep(ESTOP_PERIOD_S)
             self.put_estop()
         raise NotConfirmed(
-            f"the emergency stop was sent, and safety does not confirm it within {ESTOP_S:g} s: "
-            f"{SWITCH}. A certificate without the right to stop is one reason"
+            "the emergency stop was sent, and safety does not confirm it within "
+            f"{ESTOP_TICKS * PERIOD_S:g} s: {SWITCH}. A certificate without the right to stop is "
+            "one reason"
         )
 
     def put_estop(self) -> None:
@@ -163,18 +170,14 @@ class Robot:
         Traceback (most recent call last):
         t2.errors.Refused: Nothing is latched.
         """
-        state = self.safety.latest()
-        seen = tuple(cause.id for cause in state.causes if cause.name in state.latched)
-        request = m.ResetRequest(echo=state.heartbeat, causes=seen)
-        done = self._call("safety/reset", request, m.ResetDone)
-        end_s = time.monotonic() + CONFIRM_S
-        while time.monotonic() < end_s:
-            state = self.safety.latest()
-            shown = {cause.id for cause in state.causes if cause.name in state.latched}
-            is_answered = state.boot == done.boot and state.heartbeat >= done.heartbeat
-            if is_answered and not shown & set(seen):
-                return done
-            time.sleep(ESTOP_PERIOD_S)
+        seen = self.safety.latest()
+        check = ResetCheck(seen)
+        done = self._call("safety/reset", reset_request(seen), m.ResetDone)
+        check.answer(done)
+        while (is_confirmed := check.outcome(self.safety.latest(), time.monotonic_ns())) is None:
+            time.sleep(PERIOD_S)
+        if is_confirmed:
+            return done
         raise NotConfirmed("safety answered the reset, and its state does not show the effect")
 
     def release(self, direction: m.Direction, source: str, timeout: float = 5.0) -> None:
@@ -187,19 +190,9 @@ class Robot:
 
         >>> robot.release("backward", "teleop")  # the bumper is free
         """
-        key = self._key("drive", source=source)
-        publisher: SourcePublisher[m.Drive] = SourcePublisher(
-            self._session, key, "Drive", self.safety
-        )
-
-        def put(release: m.ReleaseRequest) -> None:
-            publisher.put(m.Drive(linear=0.0, angular=0.0, release=release, echo=0))
-            time.sleep(PERIOD_S)
-
+        publisher = DrivePublisher(self._session, self._key("drive", source=source), self.safety)
         self.safety.latest()
         try:
-            for _ in range(NEUTRAL):
-                put("none")
             begin_s = time.monotonic()
             while (passed_s := time.monotonic() - begin_s) < timeout:
                 state = self.safety.latest()
@@ -211,10 +204,10 @@ class Robot:
                     )
                 if state.source == source and state.release_refusal and passed_s > STANDSTILL_S:
                     raise Refused(state.release_refusal)
-                put(direction)
+                publisher.tick(request(release=direction))
+                time.sleep(PERIOD_S)
         finally:
-            for _ in range(ZEROS):
-                put("none")
+            publisher.stop()
             publisher.close()
         raise NotConfirmed(f"the bumper is still pressed after {timeout:g} s of release")
 

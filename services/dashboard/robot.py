@@ -11,20 +11,19 @@ import msgspec
 from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
-from common.codec import finite
-from common.keys import Call, Topic
-from common.log import Logger
-from common.motion import Twist
-from common.operator import (
+from common.client import (
     Contest,
     DriveRequests,
     EstopRepetition,
     EstopStep,
     Phase,
-    Request,
     ResetCheck,
+    request,
     reset_request,
 )
+from common.codec import finite
+from common.keys import Call, Topic
+from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock, HoldState, Push
@@ -92,11 +91,9 @@ class Robot:
         self._repeat_estop(safety)
         self._yield(safety)
         push = self.driver_lock.held(now_ns)
-        request = self._requests.tick(self._requested(push) if push else None)
-        if request is not None:
-            twist = request.twist
-            sent = self._source.request(twist.linear, twist.angular, request.release)
-            self.telemetry.update(self._requests_path, sent, now_ns)
+        drive = self._requests.tick(self._requested(push) if push else None)
+        if drive is not None:
+            self.telemetry.update(self._requests_path, self._source.put(drive), now_ns)
         self._check_resets(safety, now_ns)
         self._update_trail(now_ns)
 
@@ -193,12 +190,12 @@ class Robot:
             lock.lapse()
         self._overruled = self._overruled and bool(contest.other and lock.driver)
 
-    def _requested(self, push: Push) -> Request:
+    def _requested(self, push: Push) -> m.Drive:
         if push.release:
-            return Request(release=push.release)
+            return request(release=push.release)
         gear = self.driver_lock.gear - 1
         linear, angular = self._settings.gears_linear[gear], self._settings.gears_angular[gear]
-        return Request(Twist(push.linear * linear, push.angular * angular))
+        return request(push.linear * linear, push.angular * angular)
 
     def _repeat_estop(self, safety: m.SafetyState | None) -> None:
         step = self._estop.tick(safety)

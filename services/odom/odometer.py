@@ -12,7 +12,7 @@ from common.bus.bus import Arrival
 from common.bus.calls import Caller
 from common.codec import finite
 from common.freshness import NS_PER_S
-from common.operator import Echoes
+from common.heartbeat import Echoes
 from common.service import Node
 from services.odom.config import OdomConfig
 from services.odom.core.estimator import Estimator

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 from common import clock, keys
 from common import messages as m
+from common.client import reset_request
 from common.freshness import NS_PER_S
-from common.operator import reset_request
 from common.service import Node
 from services.ros2.attachment import Attachment
 from services.ros2.call_age import reset_refusal, switch_refusal

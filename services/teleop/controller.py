@@ -11,18 +11,10 @@ from msgspec.structs import replace
 
 from common import clock, keys
 from common.bus.bus import Arrival
+from common.bus.calls import no_answer, not_allowed
+from common.client import Contest, EstopRepetition, EstopStep, ResetCheck, reset_request
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Event, ResetDone, SafetyState
-from common.operator import (
-    Contest,
-    EstopRepetition,
-    EstopStep,
-    Request,
-    ResetCheck,
-    no_answer,
-    not_allowed,
-    reset_request,
-)
+from common.messages import Drive, Event, ResetDone, SafetyState
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
@@ -64,7 +56,7 @@ class Controller:
         self.terminal = self._controls.terminal
         self._gamepad = Gamepad("searching")
         self._drawn_ns = 0  # the last redraw of the screen
-        self._requested: Request | None = None
+        self._requested: Drive | None = None
         self._leaving = False
         self._reported: set[str] = set()  # rules that are broken, and in the event log
         self._late_ns = -NS_PER_S  # when a late press was last reported
@@ -128,8 +120,8 @@ class Controller:
         state = self._state(now_ns)
         self._enforce_rules(state, now_ns)
         self._requested = self._controls.tick(self._read_stick(now_ns), now_ns)
-        if (request := self._requested) is not None:
-            self._source.request(request.twist.linear, request.twist.angular, request.release)
+        if self._requested is not None:
+            self._source.put(self._requested)
         self._repeat_estop(state)
         self._check_reset(state, now_ns)
         self.view = self._make_view(now_ns)

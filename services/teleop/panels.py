@@ -201,7 +201,7 @@ def motion(view: View) -> Text:
 
 
 def _speeds(view: View) -> dict[str, Text]:
-    requested, measured = view.requested.twist if view.requested else None, view.velocity
+    requested, measured = view.requested, view.velocity
     linear = angular = None
     if view.safety:
         limits = view.safety.limits

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from common import log
 from common.messages import (
     Bumper,
+    Drive,
     Driver,
     Level,
     Link,
@@ -21,7 +22,6 @@ from common.messages import (
     Velocity,
 )
 from common.motion import Twist
-from common.operator import Request
 from common.settings import Log, LogLevel
 from common.text import printable
 from common.verdict import MAX_TEXT
@@ -49,7 +49,7 @@ class View:
     alarm: str = ""  # what the operator must know first
     gear: int
     top: Twist  # of full deflection in this gear
-    requested: Request | None = None  # None: silent
+    requested: Drive | None = None  # None: silent
     keys_refused: str = ""  # why keys are refused
     gamepad: str = ""  # its status
     move_stick: bool = False  # the gamepad drives and sent no event for a while

@@ -1,9 +1,13 @@
 """The age limit of an echo, and the text of a refusal."""
 
+from msgspec import structs
+
 from common.freshness import NS_PER_S
-from common.heartbeat import CAPACITY, Heartbeat
+from common.heartbeat import AHEAD, CAPACITY, MAX_CALL_AGE_NS, Echoes, Heartbeat
+from tests.factories import safety_state
 
 START = Heartbeat(1000)
+STATE = safety_state(heartbeat=7, boot=3)
 
 
 def test_an_echo_counts_up_to_its_limit() -> None:
@@ -48,3 +52,31 @@ def test_heartbeats_rise_and_are_forgotten_in_the_end() -> None:
     assert not beat.is_late(beat.number, CAPACITY + 4 + 10, 10)
     assert beat.is_late(beat.number, CAPACITY + 4 + 11, 10)
     assert beat.is_late(1001, 0, 10**9)
+
+
+def test_echoes_have_the_time_when_their_state_was_received() -> None:
+    echoes = Echoes()
+    assert "no echo" in echoes.refusal(None, 0)
+    assert "unknown" in echoes.refusal(7, 0)
+    echoes = echoes.received(STATE, 100)
+    assert echoes.refusal(7, 100 + MAX_CALL_AGE_NS) == ""
+    assert "allowed is 1 s" in echoes.refusal(7, 101 + MAX_CALL_AGE_NS)
+    assert "unknown" in echoes.refusal(6, 100)
+    newer = echoes.received(structs.replace(STATE, heartbeat=8), 100 + MAX_CALL_AGE_NS)
+    assert "allowed is 1 s" in newer.refusal(7, 101 + MAX_CALL_AGE_NS)
+    assert newer.refusal(8, 101 + MAX_CALL_AGE_NS) == ""
+
+
+def test_another_start_of_safety_makes_old_echoes_unknown() -> None:
+    echoes = (
+        Echoes().received(STATE, 100).received(structs.replace(STATE, heartbeat=900, boot=4), 200)
+    )
+    assert "unknown" in echoes.refusal(7, 200)
+    assert echoes.refusal(900, 200) == ""
+
+
+def test_an_echo_may_be_slightly_ahead_of_the_newest_state() -> None:
+    echoes = Echoes().received(STATE, 100)
+    assert echoes.refusal(7 + AHEAD, 100) == ""
+    assert "unknown" in echoes.refusal(8 + AHEAD, 100)
+    assert "allowed is 1 s" in echoes.refusal(8, 101 + MAX_CALL_AGE_NS)  # safety is silent now

@@ -7,9 +7,10 @@ import pytest
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.publisher import Publisher
+from common.client import DENIED_AFTER
 from common.loop import Loop
 from common.messages import MAX_REASON, Drive
-from common.source import DENIED_AFTER, DriveSource, LimitPublisher
+from common.source import DriveSource, LimitPublisher
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
 from verification.harness.bus import bus_on, running

@@ -4,9 +4,8 @@ import pytest
 
 from common import keys
 from common.bus.publisher import Publisher
+from common.client import DENIED_AFTER, ESTOP_TICKS, OVERRULED_TICKS
 from common.messages import Direction, Drive
-from common.operator import ESTOP_TICKS, OVERRULED_TICKS
-from common.source import DENIED_AFTER
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
 from services.dashboard.robot import Robot

@@ -12,6 +12,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink
 from common.bus.publisher import Publisher
+from common.client import reset_request
 from common.keys import Call
 from common.loop import Loop
 from common.messages import (
@@ -27,7 +28,6 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.operator import reset_request
 from tests.safety.policy_fixture import FREE, NO_ECHO, link
 from verification.harness.waiting import wait_until
 

@@ -13,6 +13,7 @@ from common import codec, keys, realtime
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink
 from common.bus.session import client_config
+from common.client import reset_request
 from common.config import Sources, load
 from common.loop import Loop
 from common.messages import (
@@ -22,7 +23,6 @@ from common.messages import (
     SafetyState,
     Velocity,
 )
-from common.operator import reset_request
 from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig

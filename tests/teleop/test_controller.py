@@ -4,11 +4,11 @@ import pytest
 from msgspec import structs
 
 from common import keys
+from common.bus.calls import no_answer, not_allowed
 from common.bus.publisher import Publisher
+from common.client import DENIED_AFTER, ESTOP_TICKS, OVERRULED_TICKS
 from common.messages import Bumper, Driver, Event, ResetDone, ResetRequest, Velocity
 from common.motion import Twist
-from common.operator import ESTOP_TICKS, OVERRULED_TICKS, no_answer, not_allowed
-from common.source import DENIED_AFTER
 from tests.factories import link, safety_state
 from tests.teleop.inputs import answer, stick
 from tests.teleop.support import FakeGamepad, Operator

@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.client import NEUTRAL, request
 from common.freshness import NS_PER_S
+from common.messages import Drive
 from common.motion import STILL, Twist
-from common.operator import NEUTRAL, Request
 from services.teleop.config import Teleop
 from services.teleop.core.controls import (
     DIRECTIONS,
@@ -24,7 +25,7 @@ from services.teleop.core.hold import Press
 from tests.teleop.inputs import PERIOD_NS, answer, stick
 
 SETTINGS = Teleop()
-FIRST_GEAR = Request(Twist(0.2, 0.0))
+FIRST_GEAR = request(0.2)
 UP, DOWN = stick(deadman=False), stick()
 LIMIT_TICKS = 40  # 2 s
 
@@ -41,7 +42,7 @@ class Operator:
         answer(self.controls.terminal, at_ns, took_s)
         return self.controls.press(Press(key, at_ns), self.now_ns)
 
-    def ticks(self, count: int, stick: Stick | None = None) -> list[Request | None]:
+    def ticks(self, count: int, stick: Stick | None = None) -> list[Drive | None]:
         sent = []
         for _ in range(count):
             sent.append(self.controls.tick(stick, self.now_ns))
@@ -139,7 +140,7 @@ def test_gears_are_chosen_by_number(operator: Operator) -> None:
     assert operator.controls.top() == Twist(0.2, 0.3)
     operator.press("5")
     operator.press("s")
-    assert operator.ticks(2)[-1] == Request(Twist(-0.8, 0.0))
+    assert operator.ticks(2)[-1] == request(-0.8)
     assert operator.controls.top() == Twist(0.8, 0.9)
     assert list(SETTINGS.gears_linear) == sorted(set(SETTINGS.gears_linear))
 
@@ -151,7 +152,7 @@ def test_a_release_and_driving_exclude_each_other(
     operator.press("w")
     operator.ticks(2)
     operator.press(key)
-    release = Request(release=direction)  # type: ignore[arg-type]
+    release = request(release=direction)  # type: ignore[arg-type]
     assert operator.ticks(3, DOWN)[1:] == [release] * 2
     operator.press("w")
     assert operator.ticks(2, DOWN) == [NEUTRAL, FIRST_GEAR]
@@ -160,8 +161,8 @@ def test_a_release_and_driving_exclude_each_other(
 def test_the_last_direction_of_a_release_counts_and_ends_by_itself(operator: Operator) -> None:
     for key, direction in (("f", "forward"), ("b", "backward"), ("f", "forward")):
         operator.press(key)
-        (_, request) = operator.ticks(2)
-        assert request == Request(release=direction)  # type: ignore[arg-type]
+        (_, sent) = operator.ticks(2)
+        assert sent == request(release=direction)  # type: ignore[arg-type]
     assert operator.controls.holds_keys(operator.now_ns)
     assert operator.ticks(14)[-4:] == [NEUTRAL] * 3 + [None]
     assert not operator.controls.holds_keys(operator.now_ns)
@@ -198,7 +199,7 @@ def test_after_a_stop_or_a_release_the_deadman_must_come_up(operator: Operator, 
 def test_keys_have_priority_over_the_gamepad(operator: Operator) -> None:
     operator.ticks(1, UP)
     operator.press("s")
-    assert operator.ticks(2, DOWN)[-1] == Request(Twist(-0.2, 0.0))
+    assert operator.ticks(2, DOWN)[-1] == request(-0.2)
 
 
 def test_a_gamepad_that_freezes_while_it_drives_is_released(operator: Operator) -> None:
@@ -234,7 +235,7 @@ def test_after_the_keys_a_frozen_gamepad_does_not_drive(operator: Operator) -> N
         operator.press("s")
         operator.ticks(1, stick(events=1))
     after = operator.ticks(30, stick(events=1))
-    assert {request.twist.linear for request in after if request} == {-0.2, 0.0}
+    assert {one.linear for one in after if one} == {-0.2, 0.0}
 
 
 # --- mapping --------------------------------------------------------------------------------

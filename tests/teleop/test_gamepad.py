@@ -207,6 +207,6 @@ def test_a_gamepad_of_sdl_that_freezes_while_it_drives_is_released(
         if 1 <= tick < 40:
             gamepad.push(1, -20_000 - tick)
         request = controls.tick(pad.read(), now_ns)
-        moved.append(bool(request and request.twist.linear))
+        moved.append(bool(request and request.linear))
         now_ns += 50_000_000
     assert moved == [False] * 2 + [True] * (38 + 40) + [False] * 40  # 2 s after its last event

@@ -5,9 +5,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
+from common.client import NEUTRAL, ZEROS
 from common.freshness import NS_PER_S
-from common.motion import STILL
-from common.operator import ZEROS
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
 from services.teleop.core.hold import RULES, Again, Deadman, Keys, Press
@@ -193,7 +192,7 @@ class Hold(RuleBasedStateMachine):
         if by_stick and not by_keys and abs(push) > self.settings.deadzone and is_late:
             by_stick = self.was_up = False
         is_held = bool(by_keys) or by_stick
-        moves = request is not None and request.twist != STILL
+        moves = request not in (None, NEUTRAL)
         if is_held and self.was_held and (len(by_keys) == 1 or (not by_keys and abs(push) > 0.1)):
             assert moves
         if not is_held or not self.was_held:

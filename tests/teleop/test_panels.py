@@ -4,9 +4,8 @@ from typing import Any
 
 import pytest
 
+from common.client import request
 from common.messages import Bumper, Cause, Driver, Limits, ReleaseRequest, Velocity
-from common.motion import Twist
-from common.operator import Request
 from services.teleop import panels
 from services.teleop.core.round_trip import UNKNOWN
 from services.teleop.view import Line, View
@@ -118,7 +117,7 @@ def test_alarm_verdict_and_causes(fields: dict[str, Any], rows: int, expected: l
 
 def contact_rows(rows: int = 4, held: ReleaseRequest = "none", **fields: object) -> list[str]:
     state = contact_state(release=release(**fields))
-    return panels.safety(view(safety=state, requested=Request(release=held)), rows).plain.split(
+    return panels.safety(view(safety=state, requested=request(release=held)), rows).plain.split(
         "\n"
     )
 
@@ -204,10 +203,10 @@ def table(of: View) -> dict[str, str]:
         ),
         ({"safety": safety_state(source="teleop")}, {"driver": "teleop (you)"}),
         ({"safety": safety_state(source="nav")}, {"driver": "nav"}),
-        ({"requested": Request(release="forward")}, {"driver": "you, release forward"}),
+        ({"requested": request(release="forward")}, {"driver": "you, release forward"}),
         ({"gamepad": "Pad"}, {"gamepad": "Pad"}),
         ({"gamepad": "Pad", "move_stick": True}, {"gamepad": "no event: MOVE THE STICK"}),
-        ({"requested": Request(Twist(-0.0, -0.0))}, {"m/s": "+0.00        -         -"}),
+        ({"requested": request(-0.0, -0.0)}, {"m/s": "+0.00        -         -"}),
     ],
 )
 def test_rows_of_the_motion_panel(fields: dict[str, Any], expected: dict[str, str]) -> None:
@@ -221,7 +220,7 @@ def test_speeds_requested_allowed_and_measured(linear: float, allowed: str) -> N
     limits = Limits(forward=0.22, backward=0.5, angular=0.9)
     shown = table(
         view(
-            requested=Request(Twist(linear, 0.1)),
+            requested=request(linear, 0.1),
             safety=safety_state(limits=limits),
             velocity=Velocity(linear=0.21, angular=-0.02),
         )

@@ -101,11 +101,8 @@ class Operator(Source):
         push = self._script[-1].push if driving and self._script else Deflection()
         stick = Stick(push, deadman=driving, events=self._events)
         request = self._controls.tick(stick if self._gamepad else None, now_ns)
-        self.message = None
-        if request is not None:
-            linear, angular = request.twist.linear, request.twist.angular
-            self.message = m.Drive(linear=linear, angular=angular, release=request.release, echo=0)
-        moves = request is not None and not request.twist.is_zero
+        self.message = request
+        moves = request is not None and not (request.linear == 0 == request.angular)
         self.asks_since_ns = (self.asks_since_ns or now_ns) if moves else None
         if now_ns >= self.muted_until_ns:
             super().publish()

@@ -12,7 +12,7 @@ from msgspec.structs import asdict
 
 from common import messages as m
 from common.freshness import NS_PER_S
-from common.operator import Echoes
+from common.heartbeat import Echoes
 from common.wire.commands import LedSet
 from common.wire.frame import Frame
 from services.bridge.core.output import Outputs, Refuse, Reply, Send

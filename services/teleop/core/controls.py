@@ -24,9 +24,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from common import codec
-from common.messages import Direction
+from common.client import DriveRequests, Phase, request
+from common.messages import Direction, Drive
 from common.motion import Twist, clamp
-from common.operator import DriveRequests, Phase, Request
 from services.teleop.config import Teleop
 from services.teleop.core.hold import RULES, Deadman, Keys, Press
 from services.teleop.core.round_trip import RoundTrip
@@ -142,7 +142,7 @@ class Controls:
         """Return the twist of full deflection."""
         return twist(Deflection(1, 1), self.gear, self._settings)
 
-    def tick(self, stick: Stick | None, now_ns: int) -> Request | None:
+    def tick(self, stick: Stick | None, now_ns: int) -> Drive | None:
         """Return the request to send now, or None; ``stick`` is None without a gamepad."""
         if stick is None:
             self.enforce("gamepad_gone", now_ns)
@@ -151,13 +151,13 @@ class Controls:
             self._deadman.update(stick.deadman, stick.events, now_ns)
         return self._requests.tick(self._held(stick, now_ns))
 
-    def _held(self, stick: Stick | None, now_ns: int) -> Request | None:
+    def _held(self, stick: Stick | None, now_ns: int) -> Drive | None:
         self._by_gamepad = False
         keys = self._keys.held(now_ns)
         if keys and keys[0] in RELEASE:
-            return Request(release=RELEASE[keys[0]])
+            return request(release=RELEASE[keys[0]])
         if keys:
-            return Request(twist(deflection(keys), self.gear, self._settings))
+            return self._moving(deflection(keys))
         if stick is None or not self._deadman.is_held:
             return None
         push = shaped(stick.push, self._settings.deadzone, self._settings.expo)
@@ -167,7 +167,11 @@ class Controls:
             self.enforce("gamepad_silent", now_ns)
             return None
         self._by_gamepad = moves
-        return Request(twist(push, self.gear, self._settings))
+        return self._moving(push)
+
+    def _moving(self, push: Deflection) -> Drive:
+        moves = twist(push, self.gear, self._settings)
+        return request(moves.linear, moves.angular)
 
 
 def deflection(held: Iterable[str]) -> Deflection:

@@ -1,4 +1,4 @@
-"""Requests and calls of an operator: what teleop and the dashboard send, and when.
+"""Client of safety: how a program drives, stops and resets, and how it knows that it may not. Pure.
 
 **Drive requests.** On every tick, 20 times a second, at most one request is sent:
 
@@ -12,13 +12,17 @@ RELEASING  zero; DRIVING       zero; SILENT after the last one
 
 A request is a twist, or a release off a pressed bumper. The zero before it is the neutral request
 that arms safety and the bridge; it is sent again when a release begins, ends or changes its
-direction. ``stop`` leads to RELEASING with three zeros from any phase.
+direction. ``stop`` leads to RELEASING with three zeros from any phase. Each message echoes the
+newest heartbeat of safety, which bounds its age without synchronized clocks.
+
+**Denied.** A router whose access rules forbid a message drops it without an error, and announces
+no subscriber of safety either. A client is denied after ``DENIED_AFTER`` states of safety without.
+
+**Overruled.** A client is overruled after ``OVERRULED_TICKS`` of requests while another source
+drives.
 
 **Emergency stop.** It is repeated on every tick until safety reports ``estop`` as latched. After
 ``ESTOP_TICKS`` it counts as not confirmed.
-
-**Overruled.** An operator is overruled after ``OVERRULED_TICKS`` of requests while another source
-drives.
 
 **Reset.** Any program on the bus may answer the call. Only safety's own state shows the effect:
 
@@ -36,17 +40,21 @@ from enum import Enum
 
 from msgspec import Struct
 
-from common.freshness import NS_PER_S
-from common.heartbeat import Heartbeat
-from common.messages import ReleaseRequest, ResetDone, ResetRequest, SafetyState
-from common.motion import STILL, Twist
+from common.messages import Drive, ReleaseRequest, ResetDone, ResetRequest, SafetyState
 
 CONFIRM_S = 1.0  # from a reset's answer to the state that shows its effect
-MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
-AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
 ZEROS = 3  # requests after a drive: one may be lost
-OVERRULED_TICKS = 10  # 0.5 s: the operator's own requests may be on their way
+DENIED_AFTER = 10  # states of safety; a router needs a moment to announce its subscribers
+OVERRULED_TICKS = 10  # 0.5 s: the client's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
+
+
+def request(linear: float = 0.0, angular: float = 0.0, release: ReleaseRequest = "none") -> Drive:
+    """Return a request (m/s, rad/s); its publisher fills in header and echo."""
+    return Drive(linear=linear, angular=angular, release=release, echo=0)
+
+
+NEUTRAL = request()
 
 
 class Phase(Enum):
@@ -57,16 +65,6 @@ class Phase(Enum):
     RELEASING = "releasing"
 
 
-class Request(Struct, frozen=True):
-    """What an operator's controls request: a twist, or a release off a pressed bumper."""
-
-    twist: Twist = STILL
-    release: ReleaseRequest = "none"
-
-
-NEUTRAL = Request()
-
-
 class DriveRequests(Struct):
     """The sequence of drive requests, one tick at a time."""
 
@@ -74,7 +72,7 @@ class DriveRequests(Struct):
     zeros: int = 0  # left to send while RELEASING
     release: ReleaseRequest = "none"  # requested in the last tick of DRIVING
 
-    def tick(self, requested: Request | None) -> Request | None:
+    def tick(self, requested: Drive | None) -> Drive | None:
         """Return the request to send now, or None; ``requested`` is None without a held control."""
         if requested is not None:
             begins = self.phase is not Phase.DRIVING or requested.release != self.release
@@ -92,6 +90,46 @@ class DriveRequests(Struct):
     def stop(self) -> None:
         """Send the final zeros in the next ticks, from any phase."""
         self.phase, self.zeros = Phase.RELEASING, ZEROS
+
+
+class Access(Struct):
+    """The echo of a client's messages, and whether they reach safety."""
+
+    echo: int = 0  # before the first state of safety, which refuses 0
+    unmatched: int = 0  # states of safety in a row without a subscriber for our messages
+
+    @property
+    def is_denied(self) -> bool:
+        """Whether safety's state arrives but our messages would not: watching only."""
+        return self.unmatched >= DENIED_AFTER
+
+    def received(self, state: SafetyState, passed_on: bool | None) -> bool:
+        """Note a new state; return whether the client is denied from now on.
+
+        ``passed_on``: whether the router announces a subscriber of safety; None if unknown.
+        """
+        self.echo = state.heartbeat
+        self.unmatched = self.unmatched + 1 if passed_on is False else 0
+        return self.unmatched == DENIED_AFTER
+
+
+class Contest(Struct):
+    """Counts the ticks in which a client requests motion and another source drives."""
+
+    source: str  # the client's own
+    other: str | None = None  # the source that drives instead
+    ticks: int = 0  # in a row, with requests
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the other source overrules the client."""
+        return self.ticks >= OVERRULED_TICKS
+
+    def tick(self, state: SafetyState | None, *, requests: bool) -> None:
+        """Count a tick; ``requests``: whether the client requests motion in it."""
+        driving = state.source if state else None
+        self.other = None if driving == self.source else driving
+        self.ticks = self.ticks + 1 if self.other and requests else 0
 
 
 class EstopStep(Enum):
@@ -127,25 +165,6 @@ class EstopRepetition(Struct):
         return EstopStep.REPEAT if self.ticks else EstopStep.LAST
 
 
-class Contest(Struct):
-    """Counts the ticks in which an operator requests motion and another source drives."""
-
-    source: str  # the operator's own
-    other: str | None = None  # the source that drives instead
-    ticks: int = 0  # in a row, with requests
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether the other source overrules the operator."""
-        return self.ticks >= OVERRULED_TICKS
-
-    def tick(self, state: SafetyState | None, *, requests: bool) -> None:
-        """Count a tick; ``requests``: whether the operator requests motion in it."""
-        driving = state.source if state else None
-        self.other = None if driving == self.source else driving
-        self.ticks = self.ticks + 1 if self.other and requests else 0
-
-
 class ResetCheck:
     """A reset under way, from its request to the state that confirms it."""
 
@@ -170,44 +189,8 @@ class ResetCheck:
         if state is not None and confirms(self._seen, self._done, state):
             return True
         if self._until_ns is None:
-            self._until_ns = now_ns + round(CONFIRM_S * NS_PER_S)
+            self._until_ns = now_ns + round(CONFIRM_S * 1e9)
         return False if now_ns > self._until_ns else None
-
-
-class Echoes(Struct, frozen=True):
-    """Heartbeats of the running safety service, as another service received them."""
-
-    boot: int = 0
-    heartbeat: Heartbeat = Heartbeat()
-
-    def received(self, state: SafetyState, now_ns: int) -> "Echoes":
-        """Return the echoes with a state; those of an earlier start of safety are discarded."""
-        heartbeat = self.heartbeat if state.boot == self.boot else Heartbeat()
-        return Echoes(state.boot, heartbeat.noted(state.heartbeat, now_ns))
-
-    def refusal(self, echo: int | None, now_ns: int) -> str:
-        """Return why a call with this echo is refused, as text; empty if it is accepted.
-
-        A state may reach the operator's program before it comes here: an echo slightly ahead
-        counts as the newest number, and has its age.
-        """
-        newest = self.heartbeat.number
-        if echo is not None and echo <= newest + AHEAD:
-            echo = min(echo, newest)
-        return self.heartbeat.refusal(echo, now_ns, MAX_CALL_AGE_NS)
-
-
-def no_answer(server: str) -> str:
-    """Return the text of a call without any answer."""
-    return f"{server} does not answer; run `t2 doctor`"
-
-
-def not_allowed(server: str) -> str:
-    """Return the text of a call without any answer from a service whose messages arrive.
-
-    A router whose access rules forbid a call drops it without an error.
-    """
-    return f"no reply, though {server} runs: this certificate may not call it (see `t2 keys list`)"
 
 
 def reset_request(seen: SafetyState) -> ResetRequest:
@@ -221,7 +204,7 @@ def confirms(seen: SafetyState, done: ResetDone, state: SafetyState) -> bool:
 
     ``seen`` is the state that the request was built from. The answer must come from the safety
     service that publishes the state. It must name causes that were latched in ``seen``, and none of
-    these may remain. A program without such a state within ``CONFIRM_S`` reports "not confirmed".
+    these may remain.
     """
     if not done.boot == seen.boot == state.boot or state.heartbeat < done.heartbeat:
         return False

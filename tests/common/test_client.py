@@ -1,30 +1,30 @@
-"""Requests and calls of an operator: drive requests, E-STOP repetition, reset, echoes."""
+"""The client of safety: drive requests, access, contest, E-STOP repetition, reset."""
+
+from itertools import pairwise
 
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from msgspec import structs
 
-from common.freshness import NS_PER_S
-from common.messages import Cause, Limits, ResetDone, SafetyState
-from common.motion import Twist
-from common.operator import (
-    AHEAD,
+from common.client import (
     CONFIRM_S,
     ESTOP_TICKS,
-    MAX_CALL_AGE_NS,
     NEUTRAL,
+    OVERRULED_TICKS,
     ZEROS,
+    Access,
+    Contest,
     DriveRequests,
-    Echoes,
     EstopRepetition,
     EstopStep,
     Phase,
-    Request,
     ResetCheck,
     confirms,
     reset_request,
 )
+from common.freshness import NS_PER_S
+from common.messages import Cause, Drive, Limits, ResetDone, SafetyState
 
 CONTACT = Cause(name="contact", action="brake", age=1.0, text="", id=41)
 ESTOP = Cause(name="estop", action="brake", age=1.0, text="", id=42)
@@ -36,8 +36,11 @@ SEEN = SafetyState(
 DONE = ResetDone(text="", boot=3, heartbeat=9, cleared=(41, 42))
 AFTER = structs.replace(SEEN, heartbeat=9, latched=(), causes=(IDLE,))
 
-GO = Request(Twist(0.2, 0.1))
-BACK, FORTH = Request(release="backward"), Request(release="forward")
+GO = Drive(linear=0.2, angular=0.1, echo=0)
+BACK, FORTH = (
+    structs.replace(NEUTRAL, release="backward"),
+    structs.replace(NEUTRAL, release="forward"),
+)
 
 SILENT, DRIVING = DriveRequests(Phase.SILENT), DriveRequests(Phase.DRIVING)
 OFF = DriveRequests(Phase.DRIVING, release="backward")
@@ -60,15 +63,15 @@ DRIVE_TABLE = [  # before, requested, request, after
 
 @pytest.mark.parametrize(("before", "requested", "request_", "after"), DRIVE_TABLE)
 def test_the_table_of_drive_requests(
-    before: DriveRequests, requested: Request | None, request_: Request | None, after: DriveRequests
+    before: DriveRequests, requested: Drive | None, request_: Drive | None, after: DriveRequests
 ) -> None:
     requests = structs.replace(before)  # the table's own must not change
     assert requests.tick(requested) == request_
     assert requests == after
 
 
-def test_a_twist_is_zero_by_default() -> None:
-    assert Request(Twist(0.0, 0.0), "none") == NEUTRAL
+def test_a_neutral_request_asks_for_nothing() -> None:
+    assert (NEUTRAL.linear, NEUTRAL.angular, NEUTRAL.release) == (0.0, 0.0, "none")
     assert [phase.value for phase in Phase] == ["silent", "driving", "releasing"]
 
 
@@ -79,21 +82,75 @@ def test_stop_sends_three_zeros_from_any_phase(phase: Phase) -> None:
     assert [requests.tick(None) for _ in range(5)] == [NEUTRAL] * 3 + [None] * 2
 
 
-@given(st.lists(st.sampled_from(["go", "idle", "stop"])))
-def test_a_drive_begins_with_a_zero_and_ends_with_three(steps: list[str]) -> None:
-    requests = DriveRequests()
-    sent = []
-    for step in [*steps, *["idle"] * (ZEROS + 1)]:
-        if step == "stop":
-            requests.stop()
-        else:
-            sent.append(requests.tick(GO if step == "go" else None))
-    assert sent[-1] is None
-    for i, request in enumerate(sent):
-        if request == GO:
-            assert sent[i - 1] in (GO, NEUTRAL)
-            assert i > 0
-            assert sent[i + 1] is not None  # a zero or another twist, never silence
+class Driving(RuleBasedStateMachine):
+    """Any ticks and stops: what is sent begins and ends each request with zeros."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.requests = DriveRequests()
+        self.sent: list[Drive | None] = []
+
+    @rule(requested=st.sampled_from([None, NEUTRAL, GO, BACK, FORTH]))
+    def tick(self, requested: Drive | None) -> None:
+        self.sent.append(self.requests.tick(requested))
+        assert self.sent[-1] in (None, NEUTRAL, requested)
+
+    @rule()
+    def stop(self) -> None:
+        self.requests.stop()
+        assert [self.requests.tick(None) for _ in range(ZEROS + 1)] == [NEUTRAL] * ZEROS + [None]
+        self.sent += [*[NEUTRAL] * ZEROS, None]
+
+    @invariant()
+    def each_motion_follows_a_neutral_request(self) -> None:
+        for before, now in pairwise([None, *self.sent]):
+            if now not in (None, NEUTRAL):
+                assert before is not None
+                assert before == NEUTRAL or before.release == now.release
+
+    @invariant()
+    def three_zeros_come_before_silence(self) -> None:
+        for number in range(1, len(self.sent)):
+            if self.sent[number] is None and self.sent[number - 1] is not None:
+                assert self.sent[max(0, number - ZEROS) : number] == [NEUTRAL] * ZEROS
+
+
+TestDriving = Driving.TestCase
+
+
+@pytest.mark.parametrize(
+    ("passed_on", "unmatched", "denied"),
+    [(False, 8, False), (False, 9, True), (False, 10, False), (True, 9, False), (None, 9, False)],
+)
+def test_a_client_is_denied_once_its_messages_reach_nobody_for_ten_states(
+    passed_on: bool | None, unmatched: int, denied: bool
+) -> None:
+    access = Access(unmatched=unmatched)
+    assert access.received(SEEN, passed_on) is denied
+    assert access.echo == SEEN.heartbeat
+    assert access.is_denied is (passed_on is False and unmatched >= 9)
+    assert Access() == Access(echo=0, unmatched=0)
+
+
+@pytest.mark.parametrize(
+    ("ticks", "source", "requests", "other", "after"),
+    [
+        (8, "teleop", True, "teleop", 9),
+        (9, "teleop", True, "teleop", OVERRULED_TICKS),
+        (9, "teleop", False, "teleop", 0),
+        (9, "web", True, None, 0),
+        (9, None, True, None, 0),
+    ],
+)
+def test_a_client_is_overruled_after_half_a_second_of_requests(
+    ticks: int, source: str | None, requests: bool, other: str | None, after: int
+) -> None:
+    contest = Contest("web", "nav", ticks)
+    contest.tick(structs.replace(SEEN, source=source), requests=requests)
+    assert (contest.other, contest.ticks) == (other, after)
+    assert contest.is_lost is (after == OVERRULED_TICKS)
+    contest.tick(None, requests=True)
+    assert (contest.other, contest.ticks) == (None, 0)
 
 
 def test_without_a_stop_nothing_is_repeated() -> None:
@@ -183,31 +240,3 @@ def test_a_reset_is_confirmed_by_the_state_alone() -> None:
     assert not confirms(SEEN, DONE, structs.replace(AFTER, boot=4))  # another safety service now
     other = structs.replace(AFTER, boot=4), structs.replace(DONE, boot=4)
     assert not confirms(SEEN, other[1], other[0])
-
-
-def test_echoes_have_the_time_when_their_state_was_received() -> None:
-    echoes = Echoes()
-    assert "no echo" in echoes.refusal(None, 0)
-    assert "unknown" in echoes.refusal(7, 0)
-    echoes = echoes.received(SEEN, 100)
-    assert echoes.refusal(7, 100 + MAX_CALL_AGE_NS) == ""
-    assert "allowed is 1 s" in echoes.refusal(7, 101 + MAX_CALL_AGE_NS)
-    assert "unknown" in echoes.refusal(6, 100)
-    newer = echoes.received(structs.replace(SEEN, heartbeat=8), 100 + MAX_CALL_AGE_NS)
-    assert "allowed is 1 s" in newer.refusal(7, 101 + MAX_CALL_AGE_NS)
-    assert newer.refusal(8, 101 + MAX_CALL_AGE_NS) == ""
-
-
-def test_another_start_of_safety_makes_old_echoes_unknown() -> None:
-    echoes = (
-        Echoes().received(SEEN, 100).received(structs.replace(SEEN, heartbeat=900, boot=4), 200)
-    )
-    assert "unknown" in echoes.refusal(7, 200)
-    assert echoes.refusal(900, 200) == ""
-
-
-def test_an_echo_may_be_slightly_ahead_of_the_newest_state() -> None:
-    echoes = Echoes().received(SEEN, 100)
-    assert echoes.refusal(7 + AHEAD, 100) == ""
-    assert "unknown" in echoes.refusal(8 + AHEAD, 100)
-    assert "allowed is 1 s" in echoes.refusal(8, 101 + MAX_CALL_AGE_NS)  # safety is silent now
