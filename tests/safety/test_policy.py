@@ -5,13 +5,25 @@ from collections.abc import Callable
 
 import pytest
 from msgspec.structs import replace
+from msgspec.structs import replace as with_fields
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Drive, Limits, SafetyState, Switches
+from common.messages import (
+    SONAR_NAMES,
+    Bumper,
+    Direction,
+    Drive,
+    Limits,
+    Mileage,
+    SafetyState,
+    Switches,
+    Velocity,
+)
+from common.motion import STILL, Twist
 from services.safety.config import Safety
-from services.safety.core.causes import BY_NAME, FAILURES, Clears, latched
-from services.safety.core.inputs import DriveRequest
-from tests.safety.policy_fixture import TICK_S, PolicyFixture, link
+from services.safety.core.causes import BY_NAME, FAILURES, RULES, Clears, Held, latched
+from services.safety.core.inputs import DriveRequest, Inputs
+from tests.safety.policy_fixture import TICK_S, PolicyFixture, hit, link
 
 
 def test_a_start_waits_for_every_input() -> None:
@@ -335,3 +347,321 @@ def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_reque
     assert fixture.drive(0.3, seconds=1.0).command == "stop"
     fixture.drive()
     assert fixture.drive(0.3).command == "run"
+
+
+def test_a_decision_without_a_request_refuses_none() -> None:
+    fixture = PolicyFixture().ready()
+    assert fixture.decide().refused == ""
+
+
+def test_an_old_velocity_is_no_runaway() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.linear = 0.9
+    fixture.tick()
+    fixture.muted = {"velocity"}
+    fixture.tick(40)
+    assert "silent" in fixture.state.latches
+    assert "runaway" not in fixture.state.latches
+
+
+def test_a_reading_that_stays_the_same_while_driving_limits_to_the_creep_speed() -> None:
+    fixture = PolicyFixture()
+    fixture.sonar(front=3.0)
+    assert fixture.ready().drive(0.3, seconds=1.0).name == "run"
+    assert fixture.drive(0.3, seconds=1.5).name == "slow"
+    assert fixture.state.sonar_array.sonars[SONAR_NAMES.index("front")].suspect
+    assert fixture.verdict.twist.linear == pytest.approx(0.15)
+
+
+def test_being_pushed_off_the_bumper_uses_up_no_way() -> None:
+    fixture = hit()
+    fixture.linear = 0.3
+    fixture.tick(5)
+    assert fixture.state.release.travelled == 0.0
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "trips"),
+    [
+        (0.79, 0.5, False), (0.81, 0.5, True), (-0.09, 0.5, False), (-0.11, 0.5, True),
+        (0.5, 0.99, False), (0.5, 1.01, True), (0.5, -0.19, False), (0.5, -0.21, True),
+    ],
+)  # fmt: skip
+def test_a_runaway_is_one_of_either_axis(linear: float, angular: float, trips: bool) -> None:
+    fixture = PolicyFixture().running(0.5, 0.5)
+    fixture.linear, fixture.angular = linear, angular
+    fixture.drive(0.5, 0.5, seconds=0.28)
+    assert "runaway" not in fixture.state.latches
+    fixture.drive(0.5, 0.5, seconds=0.04)
+    assert ("runaway" in fixture.state.latches) is trips
+
+
+def test_two_publishers_are_named() -> None:
+    fixture = PolicyFixture().running()
+    fixture.driver_boot, fixture.driver_seq = 100, 0
+    fixture.request(0.5)
+    held = fixture.state.latches["two_publishers"]
+    assert held.text == "Two publishers use teleop."
+    assert held.token == (0, fixture.now_ns)
+
+
+def test_what_no_sample_shows_is_known_by_the_time() -> None:
+    fixture = PolicyFixture().running(0.5)
+    fixture.linear = 0.9
+    fixture.drive(0.5, seconds=0.4)
+    assert fixture.state.latches["runaway"].token == (0, fixture.now_ns)
+
+
+def test_the_first_bumper_sample_follows_none() -> None:
+    """Numbers start anywhere: only between two samples can one be lost."""
+    fixture = PolicyFixture()
+    fixture.seq = 1000
+    fixture.tick()
+    assert "bumper" not in fixture.state.latches
+
+
+def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
+    fixture = PolicyFixture().ready()
+    before = fixture.drive(0.5).twist.linear
+    fixture.now_ns += NS_PER_S // 8
+    fixture.feed()
+    after = fixture.request(0.5).twist.linear
+    assert after - before == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(("late_ns", "command"), [(0, "run"), (1, "stop")])
+def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str) -> None:
+    fixture = PolicyFixture().running()
+    fixture.now_ns += round(Safety().bumper_age * NS_PER_S) + late_ns
+    fixture.feed()
+    fixture.state = replace(fixture.state, heartbeat=fixture.state.heartbeat.beat(fixture.now_ns))
+    assert fixture.request(0.5).command == command
+    if late_ns:
+        assert "stalled" in fixture.state.latches["silent"].text
+        assert fixture.drive(0.5, seconds=2.0).command == "stop"
+        fixture.drive()
+    assert fixture.drive(0.5).command == "run"
+
+
+def test_a_held_cause_knows_since_when() -> None:
+    fixture = PolicyFixture().ready()
+    lease_ticks = round(0.3 / TICK_S)
+    fixture.tick(lease_ticks)
+    assert "no_request" not in fixture.state.latches
+    fixture.tick()
+    since_ns = fixture.now_ns
+    fixture.tick(3)
+    now_ns = fixture.now_ns
+    held = fixture.state.latches["no_request"]
+    assert held == Held(since_ns, now_ns, 0, (0, now_ns), "No source requests motion.", held.id)
+
+
+def test_flapping_knows_since_when() -> None:
+    fixture = PolicyFixture().ready()
+    for _ in range(int(FAILURES)):
+        fixture.tick(40)
+        fixture.muted = {"bumper"}
+        fixture.tick(9)
+        fixture.muted = set()
+    held = fixture.state.latches["flapping"]
+    assert fixture.now_ns - NS_PER_S // 10 < held.since_ns < held.bad_ns == fixture.now_ns
+    assert held.token == (0, fixture.now_ns)
+
+
+def test_a_cause_is_identified_by_the_decision_in_which_it_began() -> None:
+    fixture = PolicyFixture().ready()
+    for _ in range(int(FAILURES)):
+        fixture.tick(40)
+        fixture.muted = {"bumper"}
+        for _ in range(9):
+            fixture.tick()
+            if "flapping" in fixture.state.latches:
+                break
+        else:
+            fixture.muted = set()
+    for name in ("flapping", "no_request"):
+        assert fixture.state.latches[name].id // len(RULES) > 0
+    assert fixture.state.latches["flapping"].id // len(RULES) == fixture.state.decision
+
+
+def test_room_is_not_looked_for_while_motion_is_barred() -> None:
+    fixture = PolicyFixture().running()
+    fixture.estop()
+    fixture.linear = 0.0
+    fixture.sonar(front=0.1)
+    assert fixture.drive(0.5).command == "brake"
+    assert "blocked" not in fixture.state.latches
+    assert fixture.verdict.twist == STILL
+
+
+def test_a_request_that_is_stopped_commands_no_motion() -> None:
+    fixture = PolicyFixture()
+    fixture.tick(40)
+    fixture.drive(0.5)
+    assert fixture.tick().name == "inhibited"  # time has passed, so that a ramp would have begun
+    assert "neutral" in fixture.state.latches
+    assert fixture.verdict.twist == STILL
+
+
+def test_nothing_creeps_while_two_publishers_are_active() -> None:
+    fixture = hit()
+    assert fixture.hold() == ""
+    assert "release" in fixture.state.latches
+    fixture.driver_boot, fixture.driver_seq = 100, 0
+    assert fixture.request(0.0).refused == "second_publisher"
+    assert fixture.verdict.command == "brake"  # the release ends, and the bumper is still pressed
+    assert "release" not in fixture.state.latches
+
+
+@pytest.mark.parametrize("latched_by", [None, 41])
+def test_a_new_contact_brakes_first_as_its_decision_does(latched_by: int | None) -> None:
+    fixture = PolicyFixture().running(0.3)
+    fixture.link = replace(link(), latched_by=latched_by)
+    fixture.pressed = True
+    fixture.tick()
+    first, decided = fixture.motions
+    assert first == replace(decided, source=None)  # the first BRAKE answers no source
+    assert (first.command, first.judged, first.latched) == ("brake", fixture.seq, True)
+    assert first.predecessor == latched_by
+
+
+def test_other_samples_yield_one_motion() -> None:
+    fixture = PolicyFixture().running(0.3)
+    fixture.tick()
+    assert len(fixture.motions) == 1
+    fixture = hit()  # a release may be moving the vehicle off the obstacle
+    fixture.tick()
+    assert len(fixture.motions) == 1
+
+
+def test_a_contact_brakes_before_any_other_sample() -> None:
+    fixture = PolicyFixture()
+    fixture.inputs = Inputs(bumper=Latest(Bumper(pressed=True), 5))
+    fixture.decide()
+    assert [motion.command for motion in fixture.motions] == ["brake", "brake"]
+    assert fixture.motions[0].predecessor is None
+
+
+def test_a_velocity_is_unknown_until_it_is_a_number() -> None:
+    assert Inputs().measured is None
+    for linear, known in ((math.nan, None), (0.5, Twist(0.5, 0.0))):
+        velocity = Latest(Velocity(linear=linear, angular=0.0), 0)
+        assert Inputs(velocity=velocity).measured == (Latest(known, 0) if known else None)
+
+
+@pytest.mark.parametrize(
+    ("distance", "heading", "known"),
+    [(1.0, 2.0, True), (math.nan, 0.0, False), (0.0, math.inf, False), (-math.inf, 0.0, False)],
+)
+def test_counters_are_unknown_until_they_are_numbers(
+    distance: float, heading: float, known: bool
+) -> None:
+    assert Inputs().counters is None
+    mileage = Latest(Mileage(distance=distance, heading=heading, epoch=3, boot=9), 0)
+    assert Inputs(mileage=mileage).counters is (mileage if known else None)
+
+
+OLD, OWN = 5, 6
+DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
+UNKNOWN = (
+    "Safety has restarted: the travel of an earlier release is unknown. Push the vehicle off by "
+    "hand, then reset."
+)
+
+
+def successor(latched_by: int | None) -> PolicyFixture:
+    """Start a service beside a bridge that remembers this."""
+    fixture = PolicyFixture()
+    fixture.inputs = replace(fixture.inputs, boot=OWN)
+    fixture.link = with_fields(fixture.link, latched_by=latched_by)
+    return fixture
+
+
+def test_a_latch_is_reported_until_it_is_reset() -> None:
+    fixture, told = PolicyFixture().running(), []
+    for step in (fixture.tick, fixture.estop, lambda: fixture.drive(0.0, seconds=1.0)):
+        step()
+        told.append(fixture.motions[-1].latched)
+    assert fixture.reset() == ""
+    assert [*told, fixture.motions[-1].latched] == [False, True, True, False]
+
+
+def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
+    fixture = successor(latched_by=OLD)
+    fixture.tick(100)
+    fixture.drive(0.0)
+    assert fixture.drive(0.5, seconds=1.0).command == "brake"
+    assert latched(fixture.state.latches) == ("predecessor",)
+    motion = fixture.motions[-1]
+    assert (motion.latched, motion.predecessor) == (True, OLD)
+    assert fixture.reset() == "Still present: Safety restarted while a reset was due."
+    fixture.link = with_fields(fixture.link, latched_by=OWN)  # the bridge has received our latch
+    fixture.tick(100)
+    assert fixture.reset() == ""
+    fixture.link = with_fields(fixture.link, latched_by=None)
+    fixture.drive(0.0)
+    assert fixture.drive(0.5).command == "run"
+
+
+def test_a_motion_that_the_bridge_braked_alone_has_its_own_text() -> None:
+    fixture = successor(latched_by=OLD)
+    fixture.tick(10)
+    bridge = fixture.inputs.link
+    assert bridge is not None
+    fixture.link = with_fields(fixture.link, latched_by=bridge.value.boot)
+    fixture.tick(10)
+    assert fixture.state.latches["predecessor"].text == (
+        "The vehicle moved without a command while safety was absent."
+    )
+
+
+def test_a_successor_without_a_link_sample_names_no_predecessor() -> None:
+    fixture = successor(latched_by=OLD)
+    fixture.muted = {"link"}
+    fixture.tick()
+    fixture.estop()
+    motion = fixture.motions[-1]
+    assert (motion.latched, motion.predecessor) == (True, None)
+
+
+def test_without_a_latch_a_successor_needs_no_reset() -> None:
+    successor(latched_by=None).ready()
+
+
+@pytest.mark.parametrize("first", ["bumper", "link"])
+def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str) -> None:
+    fixture = successor(latched_by=OLD)
+    fixture.pressed = True
+    fixture.muted = {"link" if first == "bumper" else "bumper"}
+    fixture.tick(3)
+    fixture.muted = set()
+    fixture.tick(50)
+    assert latched(fixture.state.latches) == ("contact", "predecessor")
+    fixture.link = with_fields(fixture.link, latched_by=OWN)
+    fixture.tick(10)
+    assert fixture.reset() == ""
+    assert fixture.verdict.reply is not None
+    assert fixture.verdict.reply.text == f"Reset, but still latched: The bumper was hit. {UNKNOWN}"
+    for direction in DIRECTIONS:
+        fixture.let_go()
+        assert fixture.hold(direction) == UNKNOWN
+    fixture.let_go()
+    release = fixture.published().release
+    assert release is not None
+    assert release.left == 0.0
+    assert fixture.reset() == f"Still present: The bumper was hit. {UNKNOWN}"
+
+
+def test_the_next_contact_after_a_reset_has_a_release_again() -> None:
+    fixture = successor(latched_by=OLD)
+    fixture.pressed = True
+    fixture.tick(50)
+    fixture.link = with_fields(fixture.link, latched_by=OWN)
+    fixture.pressed = False
+    fixture.tick(10)
+    assert fixture.reset() == ""
+    assert latched(fixture.state.latches) == ()
+    fixture.pressed = True
+    fixture.let_go(5)
+    assert fixture.hold() == ""
+    assert fixture.tick(3).command == "run"

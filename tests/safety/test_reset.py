@@ -1,4 +1,4 @@
-"""Conditions of a reset, besides the end of all causes."""
+"""Resets: conditions, answers word for word, and what stays latched."""
 
 import copy
 import math
@@ -6,12 +6,14 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from services.safety.core.causes import latched
-from services.safety.core.inputs import Reset
-from services.safety.core.state import Reply
-from tests.safety.policy_fixture import NO_ECHO_TEXT, PolicyFixture, hit
+from services.safety.core import operator_requests
+from services.safety.core.causes import FaultBudget, Held, latched
+from services.safety.core.inputs import Event, Inputs, Reset
+from services.safety.core.state import Reply, State
+from tests.safety.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit
 
 UNKNOWN = "Standstill is not confirmed: no velocity is received."
 
@@ -70,7 +72,7 @@ def stopped() -> PolicyFixture:
 
 
 def blink(fixture: PolicyFixture) -> int:
-    """Report a fault of a motor driver once; return its identity."""
+    """Report a fault of the left motor driver once; return its identity."""
     fixture.left_bits = 1
     fixture.tick()
     fixture.left_bits = 0
@@ -240,3 +242,156 @@ def test_nothing_is_ever_cleared_that_was_not_named(acts: list[str]) -> None:
 def _renewed(act: str) -> bool:
     """A cause that comes back has a new identity: the older occurrence is not reported."""
     return act in ("estop", "driver", "contact")
+
+
+@pytest.mark.parametrize("cause", ["estop", "driver_left", "estop_reader", "flapping"])
+def test_who_stands_on_the_bumper_gets_off_by_himself_whatever_else_was_latched(
+    cause: str,
+) -> None:
+    fixture = hit()
+    if cause == "estop":
+        fixture.estop()
+    elif cause == "driver_left":
+        blink(fixture)
+    elif cause == "estop_reader":
+        fixture.estop_connection = 0
+        fixture.tick()
+        fixture.estop_connection = 1
+    else:
+        for _ in range(5):
+            fixture.muted = {"velocity"}
+            fixture.tick(12)
+            fixture.muted = set()
+            fixture.tick(30)
+    fixture.tick(40)
+    assert latched(fixture.state.latches) == ("contact", cause)
+    assert fixture.hold() == f"{fixture.state.latches[cause].text} Reset first."
+    assert fixture.reset() == "Motion is requested: release the controls first."
+    fixture.let_go()
+    assert fixture.reset() == ""
+    assert fixture.verdict.reply is not None
+    assert fixture.verdict.reply.text == f"Reset, but still latched: {HOLD_TEXT}"
+    assert latched(fixture.state.latches) == ("contact",)
+    assert fixture.drive(0.5).command == "brake"
+    assert fixture.drive(0.0).command == "brake"
+    assert fixture.hold("backward", 2) == ""
+    assert fixture.verdict.twist.linear < 0
+    fixture.pressed = False
+    fixture.let_go(10)
+    assert fixture.reset() == ""
+    assert fixture.drive().command == "run"
+
+
+def test_a_reset_on_a_pressed_bumper_wants_all_that_a_reset_wants() -> None:
+    fixture = hit()
+    assert fixture.reset() == f"Still present: {HOLD_TEXT}"
+    fixture.estop()
+    assert "Still present: The bumper was hit. Emergency stop." in fixture.reset()
+    fixture.tick(3)
+    fixture.linear = 0.3
+    fixture.tick()
+    assert fixture.reset() == "The vehicle still moves."
+    fixture.linear = None
+    fixture.tick()
+    fixture.request(0.5)
+    assert fixture.reset() == "Motion is requested: release the controls first."
+    fixture.tick(40)
+    fixture.pressed = False
+    fixture.tick()
+    assert fixture.reset() == "Still present: The bumper was hit."
+    assert latched(fixture.state.latches) == ("contact", "estop")
+
+
+def test_a_reset_on_a_pressed_bumper_leaves_what_is_not_gone() -> None:
+    fixture = hit()
+    fixture.estop()
+    fixture.left_bits = 1
+    fixture.tick(3)
+    fault = fixture.state.latches["driver_left"].text
+    assert fixture.reset() == ""
+    assert fixture.verdict.reply is not None
+    assert fixture.verdict.reply.text == f"Reset, but still latched: The bumper was hit. {fault}"
+    assert latched(fixture.state.latches) == ("contact", "driver_left")
+    fixture.tick()
+    assert fixture.hold() == fault
+
+
+def test_flapping_that_is_not_gone_is_not_forgiven() -> None:
+    fixture = hit()
+    fixture.state = replace(fixture.state, fault_budget=FaultBudget(0.0, fixture.now_ns))
+    fixture.muted = {"velocity"}
+    fixture.tick(12)
+    fixture.muted = set()
+    fixture.estop()
+    fixture.tick(3)
+    assert fixture.reset() == ""
+    assert latched(fixture.state.latches) == ("contact", "flapping")
+    assert fixture.state.fault_budget.is_spent
+
+
+def inputs_of(fixture: PolicyFixture, event: Event | None = None) -> Inputs:
+    return replace(fixture.inputs, estop_connection=1, event=event)
+
+
+def called(fixture: PolicyFixture, event: Event) -> tuple[State, Reply]:
+    """Answer a call right now, without the rest of the decision."""
+    state, reply = operator_requests.handle(
+        fixture.state, inputs_of(fixture, event), fixture.policy.settings, fixture.now_ns
+    )
+    assert reply is not None
+    return state, reply
+
+
+def also(fixture: PolicyFixture, name: str, text: str, *, good: int = 9) -> int:
+    """Latch another cause, gone already unless ``good`` is small; return its identity."""
+    one = Held(
+        fixture.now_ns - NS_PER_S, fixture.now_ns - NS_PER_S, good, (0, 1), text, id=len(name)
+    )
+    fixture.state = replace(fixture.state, latches={**fixture.state.latches, name: one})
+    return one.id
+
+
+def freed() -> PolicyFixture:
+    """Return a contact whose bumper is free again."""
+    fixture = hit()
+    fixture.pressed = False
+    fixture.tick(5)
+    return fixture
+
+
+def test_a_reset_earns_the_credit_back_unless_flapping_stays() -> None:
+    for stays, budget in ((False, FaultBudget()), (True, FaultBudget(0.5, 7))):
+        fixture = freed()
+        (contact,) = (fixture.state.latches[name].id for name in latched(fixture.state.latches))
+        fixture.state = replace(fixture.state, fault_budget=FaultBudget(0.5, 7))
+        if stays:
+            also(fixture, "flapping", "Inputs failed.")
+        state, reply = called(fixture, Reset(fixture.echo, (contact,)))
+        assert reply.done
+        assert state.fault_budget == budget
+
+
+def test_what_stays_latched_is_named() -> None:
+    fixture = freed()
+    ids = [also(fixture, "estop", "One."), also(fixture, "runaway", "Two.")]
+    contact = fixture.state.latches["contact"].id
+    assert (
+        called(fixture, Reset(fixture.echo, (contact,)))[1].text
+        == "Reset, but still latched: One. Two."
+    )
+    assert called(fixture, Reset(fixture.echo, tuple(ids)))[1].text == (
+        "Reset, but still latched: The bumper was hit."
+    ), "it is free: no advice how to move off"
+    assert called(fixture, Reset(fixture.echo, ()))[1].text == (
+        "The reset names no cause. Latched: The bumper was hit. One. Two. "
+        "Send the `id` of each as `causes`."
+    )
+
+
+def test_a_bumper_that_is_pressed_without_a_latch_is_no_remaining_contact() -> None:
+    fixture = hit()
+    latches = {name: one for name, one in fixture.state.latches.items() if name != "contact"}
+    fixture.state = replace(fixture.state, latches=latches)
+    estop, _ = also(fixture, "estop", "One."), also(fixture, "runaway", "Two.")
+    _, reply = called(fixture, Reset(fixture.echo, (estop,)))
+    assert (reply.done, reply.text) == (True, "Reset, but still latched: Two.")

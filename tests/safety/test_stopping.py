@@ -50,18 +50,6 @@ def test_a_vehicle_that_rolled_on_is_held_by_brake_until_it_drives_again() -> No
     until(fixture, "stop")  # as before it rolled
 
 
-def test_a_vehicle_that_has_not_driven_is_not_held_by_brake() -> None:
-    until(PolicyFixture(), "stop")
-
-
-def test_a_vehicle_whose_velocity_was_unknown_is_not_held_by_brake() -> None:
-    fixture = PolicyFixture().running(0.28)
-    fixture.muted = {"velocity"}
-    until(fixture, "brake")
-    fixture.muted, fixture.linear = set(), 0.0
-    until(fixture, "stop")
-
-
 def test_a_slope_does_not_exhaust_the_fault_budget() -> None:
     fixture = PolicyFixture().ready()
     for _ in range(10):
@@ -75,17 +63,15 @@ def test_a_slope_does_not_exhaust_the_fault_budget() -> None:
     assert "flapping" not in fixture.state.latches
 
 
-def test_a_request_of_zero_commands_standstill_as_well() -> None:
-    fixture = PolicyFixture().ready()
-    fixture.drive(seconds=1.0)
-    fixture.linear = 0.28
-    assert fixture.drive(seconds=0.5).command == "brake"
-    assert "uncommanded_motion" in fixture.state.latches
-
-
 @pytest.mark.parametrize(
     ("linear", "angular", "moving"),
-    [(1e-4, 0.0, False), (-4e-4, 8e-4, False), (6e-4, 0.0, True), (0.0, -9e-4, True)],
+    [
+        (0.0, 0.0, False),
+        (1e-4, 0.0, False),
+        (-4e-4, 8e-4, False),
+        (6e-4, 0.0, True),
+        (0.0, -9e-4, True),
+    ],
 )
 def test_a_request_that_the_board_gets_as_zero_commands_standstill(
     linear: float, angular: float, moving: bool
@@ -155,20 +141,6 @@ def creeps(fixture: PolicyFixture, ticks: int = 10) -> None:
         fixture.tick()
 
 
-def test_a_creep_between_counters_that_are_not_finite_latches() -> None:
-    fixture = PolicyFixture().ready()
-    fixture.linear = fixture.angular = 0.0
-    fixture.tick(50)
-    at = fixture.distance
-    for _ in range(10):
-        fixture.distance = math.nan
-        fixture.tick()
-        at += 0.01
-        fixture.distance = at
-        fixture.tick()
-    assert "uncommanded_motion" in fixture.state.latches
-
-
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_a_creep_that_only_the_counters_show_latches(interrupted: bool) -> None:
     fixture = PolicyFixture().ready()
@@ -182,10 +154,3 @@ def test_a_creep_that_only_the_counters_show_latches(interrupted: bool) -> None:
     assert "uncommanded_motion" not in fixture.state.latches
     creeps(fixture)
     assert "uncommanded_motion" in fixture.state.latches
-
-
-def test_decisions_are_numbered() -> None:
-    fixture = PolicyFixture()
-    first = fixture.state.decision
-    fixture.decide()
-    assert fixture.state.decision == first + 1

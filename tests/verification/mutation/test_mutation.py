@@ -26,7 +26,7 @@ def _in_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_tests_of_a_core_are_those_of_its_folder_without_processes() -> None:
     found = cores()
-    assert "tests/safety/test_zones.py" in found["services/safety/core/planning.py"]
+    assert "tests/safety/test_planning.py" in found["services/safety/core/planning.py"]
     by_fixture = found["services/safety/core/policy.py"]
     assert "tests/safety/test_driving.py" in by_fixture
     assert "tests/safety/test_service.py" not in by_fixture

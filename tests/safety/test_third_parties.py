@@ -1,4 +1,4 @@
-"""Speed limits by third parties through the whole decision."""
+"""Speed limits and kept emergency stops of third parties through the whole decision."""
 
 import math
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S
 from common.motion import ROUNDED_MPS, STILL
 from services.safety.config import LimitSource, Safety
-from services.safety.core.inputs import LimitRequest
+from services.safety.core.inputs import KeepaliveRequest, LimitRequest
 from services.safety.core.operator_requests import LET_GO
 from tests.safety.policy_fixture import PolicyFixture
 
@@ -20,6 +20,7 @@ SOURCES = {
 }
 IGNORED = Safety(limits={"lidar": LimitSource(lease=LEASE_S, silence="ignore")})
 NEEDED = Safety(limits=SOURCES)
+KEPT = Safety(estop_keepalive=("pendant",))
 CAPS = st.none() | st.floats(0, 3)
 SPEEDS = st.floats(-2, 2)
 
@@ -171,3 +172,127 @@ def test_no_run_is_faster_than_a_valid_cap_after_its_deceleration(
                 assert abs(verdict.twist.linear) <= max(cap, 1.0 - 0.6 * slowing_s) + 1e-9
             speed = abs(verdict.twist.linear)
     assert speed <= 1.0
+
+
+# --- emergency stops that must be kept alive ------------------------------------------------
+
+
+def kept(fixture: PolicyFixture, linear: float, seconds: float) -> None:
+    """Drive, with a keepalive ten times a second."""
+    for _ in range(round(seconds / 0.1)):
+        fixture.keepalive()
+        fixture.drive(linear, seconds=0.1)
+
+
+def running() -> PolicyFixture:
+    fixture = PolicyFixture(KEPT)
+    fixture.tick(40)
+    kept(fixture, 0.0, 1.0)
+    kept(fixture, 0.5, 1.0)
+    assert fixture.verdict.command == "run", fixture.state.latches
+    return fixture
+
+
+def test_it_inhibits_until_it_is_heard_for_the_first_time() -> None:
+    fixture = PolicyFixture(KEPT)
+    fixture.drive(0.0, seconds=2.0)
+    fixture.drive(0.5, seconds=0.5)
+    assert fixture.verdict.name == "inhibited"
+    assert "emergency stop keepalive of pendant" in fixture.state.latches["starting"].text
+    assert not fixture.latched()
+    kept(fixture, 0.5, 1.0)
+    assert fixture.verdict.command == "stop"  # not before a neutral request
+    kept(fixture, 0.0, 0.3)
+    kept(fixture, 0.5, 0.3)
+    assert fixture.verdict.command == "run"
+
+
+def test_its_silence_brakes_and_latches_until_it_is_back_and_reset() -> None:
+    fixture = running()
+    assert fixture.drive(0.5, seconds=0.8).command == "run"
+    assert fixture.drive(0.5, seconds=0.3).command == "brake"
+    fixture.linear = 0.0
+    fixture.tick(50)
+    assert fixture.reset() == (
+        "Still present: The emergency stop is no longer kept alive by pendant."
+    )
+    for _ in range(10):
+        fixture.keepalive()
+        fixture.tick(5)
+    assert fixture.verdict.command == "brake"
+    assert fixture.reset() == ""
+    fixture.linear = None
+    kept(fixture, 0.5, 0.4)
+    assert fixture.verdict.command == "stop"
+    kept(fixture, 0.0, 0.8)
+    kept(fixture, 0.5, 0.3)
+    assert fixture.verdict.command == "run"
+
+
+def test_messages_that_a_proxy_holds_do_not_keep_it_alive() -> None:
+    fixture = running()
+    echo = fixture.echo
+    for _ in range(12):
+        fixture.keepalive(echo=echo)
+        fixture.drive(0.5, seconds=0.1)
+    assert fixture.verdict.command == "brake"
+    assert fixture.keepalive(echo=echo).refused == "keepalive_late"
+
+
+def test_a_second_program_under_the_name_latches() -> None:
+    fixture = running()
+    fixture.keepalive_boot = 67
+    assert fixture.keepalive().refused == "keepalive_second_publisher"
+    assert fixture.verdict.command == "brake"
+    assert fixture.state.verdict.name == "brake"
+
+
+def test_an_unknown_name_does_nothing() -> None:
+    fixture = running()
+    assert fixture.keepalive("stranger").refused == "keepalive_unknown_source"
+    wrong = fixture.decide(KeepaliveRequest("pendant", None, fixture.now_ns))
+    assert (wrong.refused, wrong.command) == ("keepalive_not_a_request", "run")
+
+
+def test_without_names_nothing_is_expected() -> None:
+    fixture = PolicyFixture().running()
+    assert fixture.published().estop_keepalives == ()
+    assert fixture.drive(0.5, seconds=3.0).command == "run"
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["beat", "old echo", "again", "rival", "silent"]), st.integers(1, 30)
+        ),
+        max_size=8,
+    )
+)
+def test_no_run_later_than_the_timeout_after_the_heartbeat_that_was_echoed(
+    events: list[tuple[str, int]],
+) -> None:
+    fixture = running()
+    proven_ns, first, latched = fixture.now_ns, fixture.echo, False
+    fixture.keepalive()
+    for kind, ticks in events:
+        for _ in range(ticks):
+            fixture.tick()
+            if kind == "beat":
+                if fixture.now_ns - proven_ns > NS_PER_S:
+                    latched = True
+                fixture.keepalive()
+                proven_ns = fixture.now_ns
+            elif kind == "old echo":
+                fixture.keepalive(echo=first)
+            elif kind == "again":
+                fixture.keepalive_seq -= 1
+                fixture.keepalive()
+            elif kind == "rival":
+                fixture.keepalive_boot += 1
+                fixture.keepalive()
+                fixture.keepalive_boot -= 1
+                latched = True
+            fixture.request(0.5)
+            latched = latched or fixture.now_ns - proven_ns > NS_PER_S
+            assert not (latched and fixture.verdict.command != "brake"), (kind, ticks)

@@ -1,4 +1,4 @@
-"""Allowed speeds: the formula, the geometry of each sonar, and what holds for any twist."""
+"""Planning: allowed speeds, the geometry of each sonar, and the ramp."""
 
 import math
 
@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from common.messages import SONAR_NAMES
-from common.motion import Twist
+from common.motion import STILL, Twist
 from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
-from services.safety.core.planning import GRAZING_MPS, Zones, zones
+from services.safety.core.planning import GRAZING_MPS, Zones, ramp, ramp_start, zones
 from services.safety.core.release import stopping_distance
 
 FREE = (math.inf,) * 8
@@ -192,3 +192,44 @@ def test_measured_motion_has_its_own_bounds(
 def test_stopping_distance() -> None:
     assert stopping_distance(1.0, 0.25, 0.5) == pytest.approx(1.25)
     assert stopping_distance(0.5, 0.2, 0.5) == pytest.approx(0.35)
+
+
+UP, DOWN = Twist(0.5, 1.5), Twist(0.6, 1.0)
+speeds = st.floats(-2.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("current", "target", "after"),
+    [
+        (0.0, 1.0, 0.05),
+        (0.98, 1.0, 1.0),
+        (1.0, 0.0, 0.94),
+        (0.5, -1.0, 0.44),
+        (0.03, -1.0, 0.0),
+        (0.0, -1.0, -0.05),
+        (-1.0, 0.0, -0.94),
+    ],
+)
+def test_a_ramp_step(current: float, target: float, after: float) -> None:
+    assert ramp(Twist(current), Twist(target), UP, DOWN, 0.1).linear == pytest.approx(after)
+
+
+def test_turning_has_a_ramp_of_its_own() -> None:
+    after = ramp(STILL, Twist(1.0, 1.0), UP, DOWN, 0.1)
+    assert (after.linear, after.angular) == pytest.approx((0.05, 0.15))
+
+
+@given(speeds, speeds, st.floats(0.0, 0.1))
+def test_a_ramp_never_overshoots(current: float, target: float, dt_s: float) -> None:
+    after = ramp(Twist(current), Twist(target), UP, DOWN, dt_s).linear
+    assert min(current, target) - 1e-12 <= after <= max(current, target) + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("measured", "target", "begin"),
+    [(0.5, 1.0, 0.5), (1.0, 0.5, 0.5), (-0.5, 1.0, 0.0), (0.5, 0.0, 0.0), (-0.5, -1.0, -0.5)],
+)
+def test_a_ramp_begins_with_what_is_wanted_of_the_motion(
+    measured: float, target: float, begin: float
+) -> None:
+    assert ramp_start(Twist(measured, measured), Twist(target, target)) == Twist(begin, begin)

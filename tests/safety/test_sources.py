@@ -1,0 +1,471 @@
+"""Sources: admission of messages, the source in control, speed limits and keepalives."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from common import codec
+from common.errors import MessageError
+from common.freshness import NS_PER_S
+from common.heartbeat import Heartbeat
+from common.messages import Drive, EstopKeepalive, KeepaliveState, Limit, LimitState
+from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
+from services.safety.config import LimitSource, Safety
+from services.safety.core.inputs import DriveRequest, KeepaliveRequest, LimitRequest
+from services.safety.core.sources import (
+    CONFLICT_NS,
+    Admission,
+    Arbiter,
+    DriveChannel,
+    Keepalives,
+    LimitChannel,
+    SpeedLimits,
+    printable,
+)
+
+MS = NS_PER_S // 1000
+AGE_NS = 400 * MS
+LEASE_S, LEASE_NS = 0.5, 500 * MS
+TIMEOUT_S, TIMEOUT_NS = 1.0, NS_PER_S
+BEAT = Heartbeat(40).beat(0).beat(300 * MS)  # sent 41 at 0, 42 at 0.3 s
+SOURCES = Safety().sources
+TELEOP_NS = round(SOURCES["teleop"].lease * NS_PER_S)
+LIMITERS = {
+    "lidar": LimitSource(lease=LEASE_S, silence="stop"),
+    "fleet": LimitSource(lease=LEASE_S, silence="ignore"),
+}
+DRIVES, LIMITS = Arbiter(SOURCES), SpeedLimits(LIMITERS)
+KEPT = Keepalives(("pendant", "web"), TIMEOUT_S)
+
+
+def admission(now_ns: int) -> Admission:
+    """Return an admission for which the newest heartbeat is always young enough."""
+    return Admission(BEAT, AGE_NS, min(now_ns, AGE_NS))
+
+
+def request(
+    arbiter: Arbiter,
+    now_ns: int = 0,
+    source: str = "teleop",
+    linear: float = 0.0,
+    *,
+    seq: int = 1,
+    boot: int = 1,
+    **fields: Any,
+) -> tuple[Arbiter, str]:
+    fields = {"angular": 0.0, "echo": 41, **fields}
+    drive = Drive(linear=linear, seq=seq, boot=boot, **fields)
+    return arbiter.accept(DriveRequest(source, drive, now_ns), admission(now_ns))
+
+
+def limit(
+    limits: SpeedLimits,
+    linear: float | None = None,
+    now_ns: int = 0,
+    *,
+    source: str = "lidar",
+    seq: int = 1,
+    boot: int = 1,
+    **fields: Any,
+) -> tuple[SpeedLimits, str]:
+    message = Limit(linear=linear, seq=seq, boot=boot, **{"echo": 41, **fields})
+    return limits.accept(LimitRequest(source, message, now_ns), admission(now_ns))
+
+
+def keep(
+    keepalives: Keepalives,
+    now_ns: int = 0,
+    *,
+    source: str = "pendant",
+    echo: int = 41,
+    seq: int = 1,
+    boot: int = 1,
+    late_ns: int = 0,
+) -> tuple[Keepalives, str]:
+    message = EstopKeepalive(echo=echo, seq=seq, boot=boot)
+    checked = Admission(BEAT, TIMEOUT_NS, now_ns + late_ns)
+    return keepalives.accept(KeepaliveRequest(source, message, now_ns), checked)
+
+
+# --- admission ------------------------------------------------------------------------------
+
+Accept = Callable[[str, bool, int, Admission], str]
+
+
+def accept_drive(source: str, valid: bool, echo: int, checked: Admission) -> str:
+    drive = Drive(linear=0.1, angular=0.0, echo=echo) if valid else None
+    return DRIVES.accept(DriveRequest({"known": "web"}.get(source, source), drive), checked)[1]
+
+
+def accept_limit(source: str, valid: bool, echo: int, checked: Admission) -> str:
+    message = Limit(echo=echo) if valid else None
+    return LIMITS.accept(LimitRequest({"known": "fleet"}.get(source, source), message), checked)[1]
+
+
+def accept_keepalive(source: str, valid: bool, echo: int, checked: Admission) -> str:
+    message = EstopKeepalive(echo=echo) if valid else None
+    name = {"known": "web"}.get(source, source)
+    return KEPT.accept(KeepaliveRequest(name, message), checked)[1]
+
+
+@pytest.mark.parametrize("accept", [accept_drive, accept_limit, accept_keepalive])
+@pytest.mark.parametrize(
+    ("given", "now_ns", "reason"),
+    [
+        (("nobody", True, 41), 0, "unknown_source"),
+        (("nobody", False, 41), 0, "unknown_source"),
+        (("known", False, 41), 0, "not_a_request"),
+        (("known", True, 40), 0, "late"),
+        (("known", True, 43), 0, "late"),
+        (("known", True, 41), AGE_NS + 1, "late"),
+        (("known", True, 41), AGE_NS, ""),
+        (("known", True, 42), AGE_NS + 1, ""),
+    ],
+)
+def test_reasons_of_refusal(
+    accept: Accept, given: tuple[str, bool, int], now_ns: int, reason: str
+) -> None:
+    assert accept(*given, Admission(BEAT, AGE_NS, now_ns)) == reason
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_values_that_are_not_finite_are_refused(value: float) -> None:
+    assert request(DRIVES, linear=value) == (DRIVES, "not_finite")
+    assert request(DRIVES, angular=value) == (DRIVES, "not_finite")
+    assert limit(LIMITS, value) == (LIMITS, "not_finite")
+    assert limit(LIMITS, angular=value) == (LIMITS, "not_finite")
+
+
+@pytest.mark.parametrize(("seq", "reason"), [(4, "seq_not_rising"), (5, "seq_not_rising"), (6, "")])
+def test_seq_rises_within_its_boot(seq: int, reason: str) -> None:
+    channels: list[tuple[Any, Any]] = [(request, DRIVES), (limit, LIMITS), (keep, KEPT)]
+    for accept, empty in channels:
+        before, _ = accept(empty, seq=5)
+        after, refused = accept(before, now_ns=1, seq=seq)
+        assert refused == reason
+        assert (after == before) == bool(reason)
+
+
+@pytest.mark.parametrize("seq", [0, 1, 9])
+def test_a_new_boot_counts_anew(seq: int) -> None:
+    arbiter, _ = request(DRIVES, seq=5)
+    arbiter, refused = request(arbiter, TELEOP_NS + 1, boot=2, seq=seq)
+    assert refused == ""
+    assert request(arbiter, TELEOP_NS + 1, boot=2, seq=seq)[1] == "seq_not_rising"
+
+
+def test_a_second_publisher_waits_for_the_lease_of_the_first_to_end() -> None:
+    arbiter = request(DRIVES)[0].armed(0)
+    refused, reason = request(arbiter, TELEOP_NS, boot=2)
+    assert reason == "second_publisher"
+    assert refused.conflict(TELEOP_NS) == ["teleop"]
+    assert refused.conflict(TELEOP_NS + 1) == []  # not in control any more
+    taken, reason = request(arbiter, TELEOP_NS + 1, boot=2)
+    assert (reason, taken.channels["teleop"].neutral) == ("", False)
+    taken, reason = request(refused, TELEOP_NS + 1, boot=2)
+    assert reason == ""
+    assert taken.conflict(TELEOP_NS + 1) == ["teleop"]  # the first may still be there
+    taken, _ = request(taken, TELEOP_NS + CONFLICT_NS, boot=2, seq=2)
+    assert taken.conflict(TELEOP_NS + CONFLICT_NS) == []
+
+
+@pytest.mark.parametrize("seq", [4, 5])
+def test_a_lower_seq_of_a_known_boot_is_a_new_publisher_after_the_age(seq: int) -> None:
+    arbiter = request(DRIVES, seq=5)[0].armed(0)
+    arbiter, _ = request(arbiter, 1, boot=2)  # a conflict, which a copy does not end
+    beat = BEAT.beat(AGE_NS)
+    copy = DriveRequest("teleop", Drive(linear=0.1, angular=0.0, echo=43, seq=seq, boot=1), AGE_NS)
+    assert arbiter.accept(copy, Admission(beat, AGE_NS, AGE_NS)) == (arbiter, "seq_not_rising")
+    copy, later = replace(copy, received_ns=AGE_NS + 1), Admission(beat, AGE_NS, AGE_NS + 1)
+    taken, reason = arbiter.accept(copy, later)
+    assert (reason, taken.channels["teleop"].neutral) == ("", False)
+    assert (taken.channels["teleop"].seq, taken.conflict(AGE_NS + 1)) == (seq, ["teleop"])
+    assert copy.drive
+    replayed = replace(copy, drive=replace(copy.drive, echo=41))  # as before the last request
+    assert arbiter.accept(replayed, later) == (arbiter, "late")
+
+
+# --- the source in control ------------------------------------------------------------------
+
+
+def test_the_request_is_stored() -> None:
+    arbiter, _ = request(DRIVES)
+    assert not arbiter.requests_motion(0)
+    for seq, (linear, angular) in enumerate(((0.1, -0.2), (0.0, 0.3), (0.4, 0.0)), start=2):
+        arbiter, refused = request(arbiter, linear=linear, angular=angular, seq=seq)
+        assert (arbiter.channels["teleop"].requested, refused) == (Twist(linear, angular), "")
+        assert arbiter.requests_motion(0)
+    assert not arbiter.requests_motion(NS_PER_S)
+
+
+def test_a_source_starts_without_requests() -> None:
+    assert DriveChannel() == DriveChannel(
+        boot=None, seq=0, received_ns=None, conflict_ns=None, requested=Twist(0.0, 0.0),
+        release="none", neutral=False, neutral_ns=None, overruled_by="",
+    )  # fmt: skip
+    assert CONFLICT_NS == 500_000_000
+    assert (DRIVES.in_control(0), DRIVES.conflict(0)) == (None, [])
+
+
+def test_two_publishers_bar_only_their_own_source() -> None:
+    arbiter, _ = request(request(DRIVES, source="web")[0], source="web", boot=2)
+    assert arbiter.conflict(0) == ["web"]
+    assert request(arbiter, source="teleop")[0].conflict(0) == []
+    assert request(arbiter, source="nav")[0].conflict(0) == ["web"]
+
+
+@pytest.mark.parametrize(("gap_s", "neutral"), [(1.0, True), (1.1, False)])
+def test_a_suspended_source_needs_a_neutral_request(gap_s: float, neutral: bool) -> None:
+    """An SDK program after SIGSTOP and SIGCONT."""
+    at_ns = round((SOURCES["teleop"].lease + gap_s) * NS_PER_S)
+    drive = Drive(linear=0.5, angular=0.0, echo=43, seq=2, boot=1)
+    now = Admission(BEAT.beat(at_ns), AGE_NS, at_ns)
+    arbiter, refused = request(DRIVES)[0].armed(0).accept(DriveRequest("teleop", drive, at_ns), now)
+    assert refused == ""
+    assert arbiter.channels["teleop"].neutral is neutral
+
+
+def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
+    arbiter = request(request(DRIVES)[0], source="web", linear=0.5)[0].armed(0)
+    assert arbiter.channels["teleop"].neutral
+    assert not arbiter.channels["web"].neutral
+    arbiter = arbiter.disarmed()
+    assert arbiter.channels["teleop"].neutral is False
+    assert not arbiter.armed(NS_PER_S).channels["teleop"].neutral
+
+
+def test_a_lease_counts_from_the_reception() -> None:
+    late = Admission(BEAT, AGE_NS, 100 * MS)
+    drive = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=1)
+    arbiter, _ = DRIVES.accept(DriveRequest("teleop", drive, 5), late)
+    assert arbiter.in_control(5 + TELEOP_NS) == "teleop"
+    assert arbiter.in_control(6 + TELEOP_NS) is None
+    assert not arbiter.armed(6 + TELEOP_NS).channels["teleop"].neutral
+    other = replace(drive, boot=2)  # so does the time of a second publisher
+    arbiter, refused = arbiter.accept(DriveRequest("teleop", other, 6), late)
+    assert (refused, arbiter.conflict(6)) == ("second_publisher", ["teleop"])
+    assert arbiter.accept(DriveRequest("teleop", other, 6 + TELEOP_NS), late)[1] == ""
+
+
+def test_the_source_in_control_overrules_lower_ones_only() -> None:
+    arbiter, lowest = DRIVES, request(DRIVES, source="nav")[0]
+    assert [one.overruled(0) is one for one in (arbiter, lowest)] == [True, True]
+    for source in ("teleop", "web", "nav"):
+        arbiter, _ = request(arbiter, source=source)
+    arbiter = request(arbiter, source="demo", linear=0.3)[0].armed(0)
+    assert arbiter.overruled(NS_PER_S).channels == arbiter.channels  # nobody holds it
+    lower = {name: one for name, one in arbiter.channels.items() if name != "teleop"}
+    overruled = replace(arbiter, channels=lower).overruled(0)
+    states = {name: (one.neutral, one.overruled_by) for name, one in overruled.channels.items()}
+    assert states == {"web": (True, ""), "demo": (False, "web"), "nav": (False, "web")}
+    again = overruled.armed(0).channels
+    assert (again["nav"].neutral, again["nav"].overruled_by) == (True, "")
+    assert again["demo"].overruled_by == "web"  # it asks for motion
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([*SOURCES, "nobody"]), st.integers(0, 400), st.floats(-1, 1)),
+        max_size=30,
+    )
+)
+def test_the_best_fresh_source_drives(asked: list[tuple[str, int, float]]) -> None:
+    arbiter, last, now_ns, beat = DRIVES, {}, 0, Heartbeat()
+    for seq, (source, pause_ms, linear) in enumerate(asked, start=1):
+        now_ns += pause_ms * MS
+        beat = beat.beat(now_ns)
+        drive = Drive(linear=linear, angular=0.0, echo=beat.number, seq=seq, boot=3)
+        sent = DriveRequest(source, drive, now_ns)
+        arbiter, refused = arbiter.accept(sent, Admission(beat, AGE_NS, now_ns))
+        assert refused == ("" if source in SOURCES else "unknown_source")
+        if not refused:
+            last[source] = (now_ns, linear)
+        fresh = [n for n, (at, _) in last.items() if now_ns - at <= SOURCES[n].lease * NS_PER_S]
+        best = max(fresh, key=lambda n: SOURCES[n].priority, default=None)
+        assert arbiter.in_control(now_ns) == best
+        if best:
+            assert arbiter.channels[best].requested == Twist(last[best][1], 0.0)
+
+
+# --- speed limits ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"linear": -0.1}, {"angular": -1}, {"linear": "fast"}, {"linear": True}, {"reason": "x" * 81},
+     {"reason": 5}, {"echo": None}],
+)  # fmt: skip
+def test_a_wrong_type_is_no_limit(fields: dict[str, object]) -> None:
+    with pytest.raises(MessageError, match="not a Limit"):
+        codec.decode(codec._encoder.encode({"echo": 1, **fields}), Limit)
+
+
+def test_a_reason_shows_no_control_characters() -> None:
+    assert printable("person\tat\x1b[2J 2 m\u202e\n") == "person at [2J 2 m"
+    assert limit(LIMITS, 0.2, reason="a\x07b.")[0].channels["lidar"].reason == "a b."
+
+
+def test_a_second_limiting_publisher_is_reported_for_the_lease() -> None:
+    other, refused = limit(limit(LIMITS, 0.2)[0], 0.9, LEASE_NS, boot=2)
+    assert (refused, other.channels["lidar"].linear) == ("second_publisher", 0.2)
+    assert other.conflicts(LEASE_NS + CONFLICT_NS - 1) == ["limit lidar"]
+    assert other.conflicts(LEASE_NS + CONFLICT_NS) == []
+    taken, refused = limit(limit(LIMITS, 0.2)[0], 0.9, LEASE_NS + 1, boot=2)
+    assert (refused, taken.channels["lidar"].linear) == ("", 0.9)
+    assert taken.conflicts(LEASE_NS + 1) == []
+    slow = SpeedLimits({"lidar": LimitSource(lease=1.0, silence="ignore")})
+    slow, _ = limit(limit(slow)[0], boot=2)
+    assert next(slow.observations(NS_PER_S - 1)).text == "Stopped by lidar: two publishers."
+    assert slow.conflicts(NS_PER_S) == []
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "asked", "slowed"),
+    [
+        (0.25, None, Twist(-1.0, 0.4), Twist(-0.25, 0.1)),
+        (None, 0.1, Twist(1.0, 0.4), Twist(0.25, 0.1)),
+        (0.25, None, Twist(0.25, 2.0), None),
+        (None, None, Twist(1.0, 1.0), None),
+    ],
+)
+def test_a_cap_keeps_the_curve_and_ends_with_its_lease(
+    linear: float | None, angular: float | None, asked: Twist, slowed: Twist | None
+) -> None:
+    limits, _ = limit(LIMITS, linear, angular=angular)
+    expected = (slowed, "lidar") if slowed else (asked, None)
+    assert limits.limited(asked, LEASE_NS) == expected
+    assert limits.limited(asked, LEASE_NS + 1) == (asked, None)
+
+
+@pytest.mark.parametrize(("lidar", "fleet"), [(0.5, 0.2), (0.2, 0.5)])
+def test_the_tightest_source_is_named(lidar: float, fleet: float) -> None:
+    limits, _ = limit(limit(LIMITS, lidar)[0], fleet, source="fleet")
+    tightest = "fleet" if fleet < lidar else "lidar"
+    assert limits.limited(Twist(1.0), 0) == (Twist(0.2), tightest)
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "stops"),
+    [
+        (0.0, None, True), (None, 0.0, True), (-0.0, 1.0, True), (5e-324, None, True),
+        (ROUNDED_MPS, None, True), (None, ROUNDED_RADPS, True),
+        (ROUNDED_MPS * 1.01, ROUNDED_RADPS * 1.01, False), (None, None, False),
+    ],
+)  # fmt: skip
+def test_zero_is_a_protective_stop(
+    linear: float | None, angular: float | None, stops: bool
+) -> None:
+    limits, _ = limit(LIMITS, linear, angular=angular, reason="PERSON.")
+    stop, silent = limits.observations(0)
+    assert (stop.name, stop.present, stop.token) == ("limit_stop", stops, (0, 0))
+    assert not silent.present
+    if stops:
+        assert stop.text == "Stopped by lidar: PERSON."
+        assert limits.limited(Twist(1.0, 1.0), 0) == (STILL, "lidar")
+    assert not next(limits.observations(LEASE_NS + 1)).present
+    both, _ = limit(limit(LIMITS, 0.0, reason="dog")[0], 0.0, source="fleet")
+    assert next(both.observations(0)).text == "Stopped by lidar: dog, fleet."
+
+
+def test_silence_stops_from_the_start_and_after_each_lease() -> None:
+    _, silent = LIMITS.observations(0)
+    assert (silent.name, silent.present, silent.token) == ("limit_silent", True, (0, 0))
+    assert silent.text == "No speed limit arrives of lidar."
+    limits, _ = limit(LIMITS)
+    for now_ns, present in ((LEASE_NS, False), (LEASE_NS + 1, True)):
+        assert [one.present for one in limits.observations(now_ns)] == [False, present]
+    _, silent = SpeedLimits(dict.fromkeys(("lidar", "fleet"), LIMITERS["lidar"])).observations(0)
+    assert silent.text == "No speed limit arrives of lidar, fleet."
+    assert list(SpeedLimits({}).observations(0)) == []
+
+
+def test_states_of_limits() -> None:
+    never = LimitState(
+        source="lidar", linear=None, angular=None, reason="", age=None, silent=True, effect="stop"
+    )
+    assert LIMITS.states(None, 0)[0] == never
+    assert [one.effect for one in LIMITS.states(None, 0)] == ["stop", "none"]
+    limits, _ = limit(limit(LIMITS, 0.5, reason="person")[0], angular=0.3, source="fleet")
+    lidar, fleet = limits.states("lidar", LEASE_NS)
+    assert lidar == LimitState(
+        source="lidar", linear=0.5, angular=None, reason="person", age=LEASE_S, silent=False,
+        effect="slow",
+    )  # fmt: skip
+    assert (fleet.linear, fleet.angular, fleet.effect, fleet.silent) == (None, 0.3, "none", False)
+    lidar, fleet = limits.states("lidar", LEASE_NS + 1)
+    assert (lidar.linear, lidar.reason, lidar.silent, lidar.effect) == (None, "", True, "stop")
+    assert (fleet.angular, fleet.silent, fleet.effect) == (None, True, "none")
+    assert limit(LIMITS, 0.0)[0].states("lidar", 0)[0].effect == "stop"
+    assert SpeedLimits({}).states(None, 0) == ()
+    assert LimitChannel() == LimitChannel(linear=math.inf, angular=math.inf, reason="")
+    assert LimitChannel(received_ns=3 * NS_PER_S).age_s(4_500 * MS) == 1.5
+
+
+CAPS, SPEEDS = st.none() | st.floats(0, 3), st.floats(-2, 2)
+
+
+@given(st.lists(st.tuples(CAPS, CAPS), min_size=2, max_size=2), SPEEDS, SPEEDS)
+def test_no_limit_raises_any_speed_or_bends_the_curve(
+    caps: list[tuple[float | None, float | None]], linear: float, angular: float
+) -> None:
+    limits, asked = LIMITS, Twist(linear, angular)
+    for source, (cap, turn) in zip(LIMITERS, caps, strict=True):
+        limits, _ = limit(limits, cap, angular=turn, source=source)
+    twist, by = limits.limited(asked, 0)
+    assert (by is None) == (twist == asked)
+    for cap, turn in caps:
+        assert abs(twist.linear) <= min(abs(linear), math.inf if cap is None else cap) + 1e-12
+        assert abs(twist.angular) <= min(abs(angular), math.inf if turn is None else turn) + 1e-12
+    assert twist.linear * angular == pytest.approx(twist.angular * linear, abs=1e-9)
+
+
+# --- keepalives -----------------------------------------------------------------------------
+
+
+def alive(keepalives: Keepalives, now_ns: int) -> bool:
+    return keepalives.states(now_ns)[0].alive
+
+
+def test_a_keepalive_counts_from_the_echoed_heartbeat() -> None:
+    keepalives, _ = keep(KEPT, 900 * MS, late_ns=50 * MS)  # held for 0.9 s
+    assert [alive(keepalives, now_ns) for now_ns in (TIMEOUT_NS, TIMEOUT_NS + 1)] == [True, False]
+    keepalives, _ = keep(keepalives, 950 * MS, echo=42, seq=2)
+    later_ns = TIMEOUT_NS + 300 * MS
+    assert [alive(keepalives, now_ns) for now_ns in (later_ns, later_ns + 1)] == [True, False]
+
+
+@pytest.mark.parametrize("now_ns", [100 * MS, TIMEOUT_NS, TIMEOUT_NS + 1])
+def test_another_program_under_the_name_is_a_loss_at_any_time(now_ns: int) -> None:
+    other, refused = keep(keep(KEPT)[0], now_ns, boot=2, echo=42)
+    assert refused == ("second_publisher" if now_ns <= TIMEOUT_NS else "")
+    seen = other.observation(now_ns)
+    assert (seen.name, seen.present, seen.token) == ("estop_keepalive", True, (0, now_ns))
+    assert seen.text == "The emergency stop is no longer kept alive by pendant."
+    assert other.channels["pendant"].in_conflict(now_ns + CONFLICT_NS - 1)
+
+
+@pytest.mark.parametrize(("now_ns", "lost"), [(TIMEOUT_NS, False), (TIMEOUT_NS + 1, True)])
+def test_a_gap_is_a_loss_although_the_program_is_the_same(now_ns: int, lost: bool) -> None:
+    later, refused = keep(keep(KEPT)[0], now_ns, echo=42, seq=2)
+    assert refused == ""
+    assert later.observation(now_ns).present is lost
+    assert alive(later, now_ns) is not lost
+
+
+def test_a_name_that_was_never_received_is_missing_and_not_lost() -> None:
+    assert KEPT.missing == ["pendant", "web"]
+    assert not KEPT.observation(0).present
+    keepalives, _ = keep(KEPT)
+    assert keepalives.missing == ["web"]
+    assert not keepalives.observation(0).present
+    assert keepalives.states(500 * MS) == (
+        KeepaliveState(source="pendant", age=0.5, alive=True, timeout=TIMEOUT_S),
+        KeepaliveState(source="web", age=None, alive=False, timeout=TIMEOUT_S),
+    )
+    text = keep(keepalives, source="web")[0].observation(2 * TIMEOUT_NS).text
+    assert text == "The emergency stop is no longer kept alive by pendant, web."
