@@ -32,14 +32,6 @@ Parts = list[tuple[float, float, list[tuple[bool, bool]]]]
 # --- arcs and lost samples ------------------------------------------------------------------
 
 
-@given(speeds, turnings, st.integers(1, 60))
-def test_an_arc_is_exact_by_counters_alone(linear: float, angular: float, ticks: int) -> None:
-    odom = started()
-    odom.board.linear, odom.board.angular = linear, angular
-    odom.drive(ticks, velocity=False)
-    assert apart(odom.estimator._predicted.pose, odom.board.truth) == EXACT
-
-
 @given(speeds, turnings, st.integers(1, 4))
 def test_velocities_carry_the_pose_to_now(linear: float, angular: float, ticks: int) -> None:
     odom = started()
@@ -371,16 +363,3 @@ def test_a_motion_without_velocities_and_the_next_one_are_not_compared() -> None
     detector.add(12 * TICK_NS, arc(0.02), arc(0.01))
     detector.update(12 * TICK_NS)
     assert detector.residual == pytest.approx(0.01)
-
-
-def test_wheels_that_turn_without_counts_slip() -> None:
-    odom = driving()
-    assert odom.odometry().slip is False
-    odom.board.linear = 0.0
-    for _ in range(20):
-        odom.board.tick()
-        odom.update(velocity=False)
-        odom.estimator.on_velocity(Velocity(linear=1.0, angular=0.0), odom.board.now_ns)
-    odometry = odom.odometry()
-    assert odometry.slip is True
-    assert odometry.residual == pytest.approx(-0.4, abs=0.03)

@@ -85,27 +85,24 @@ def test_a_repeated_estop_is_sent_and_reported_once(operator: Operator) -> None:
     assert operator.node.events == 2
 
 
-def test_an_unconfirmed_estop_is_reported(operator: Operator) -> None:
-    operator.press("e")
-    operator.ticks(ESTOP_TICKS - 1)
-    assert len(operator.lines) == 1
-    operator.ticks(3)
-    assert operator.node.fake.estops == ESTOP_TICKS + 1
-    assert "NOT CONFIRMED" in operator.lines[-1]
-
-
-def test_an_estop_that_the_router_drops_is_reported(
-    operator: Operator, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("denied", [True, False])
+def test_an_estop_that_is_not_latched_is_reported(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch, denied: bool
 ) -> None:
-    monkeypatch.setattr(Publisher, "passed_on", False)
+    monkeypatch.setattr(Publisher, "passed_on", not denied)
     operator.press("e")
-    for _ in range(ESTOP_TICKS + 2):
-        operator.tell_safety()
-        operator.ticks(1)
-    assert operator.lines[-1] == (
-        "EMERGENCY STOP NOT CONFIRMED, probably not allowed: use the vehicle's own switch"
-    )
-    assert operator.controller.view.alarm == operator.lines[-1]
+    for ticks in (ESTOP_TICKS - 1, 3):
+        assert not any("NOT CONFIRMED" in line for line in operator.lines)
+        for _ in range(ticks):
+            operator.tell_safety()
+            operator.ticks(1)
+    assert operator.node.fake.estops == ESTOP_TICKS + 1
+    why = ", probably not allowed" if denied else ""
+    alarm = f"EMERGENCY STOP NOT CONFIRMED{why}: use the vehicle's own switch"
+    assert operator.lines[-1] == operator.controller.view.alarm == alarm
+    operator.tell_safety(latched=("estop",))
+    operator.ticks(1)
+    assert operator.controller.view.alarm != alarm
 
 
 # --- rules ----------------------------------------------------------------------------------
@@ -281,28 +278,20 @@ def test_a_reset_clears_the_shown_causes_and_is_confirmed(operator: Operator) ->
     assert operator.lines == ["Reset."]
 
 
-def test_a_reset_without_effect_is_not_confirmed(operator: Operator) -> None:
+@pytest.mark.parametrize(("boot", "latched"), [(5, True), (77, False)])
+def test_a_reset_without_effect_is_not_confirmed(
+    operator: Operator, boot: int, latched: bool
+) -> None:
+    """The latch stays, or another program than safety has answered."""
     operator.tell_contact()
     operator.press("r")
-    operator.node.fake.answers[0][0](DONE)
-    for _ in range(20):  # the latch stays
-        operator.tell_contact(heartbeat=8)
+    operator.node.fake.answers[0][0](structs.replace(DONE, boot=boot))
+    for _ in range(23):
+        if latched:
+            operator.tell_contact(heartbeat=8)
+        else:
+            operator.tell_safety(boot=5, heartbeat=8)
         operator.ticks(1)
-    assert_unconfirmed(operator)
-
-
-def test_a_reset_that_another_program_answers_is_not_confirmed(operator: Operator) -> None:
-    operator.tell_contact()
-    operator.press("r")
-    operator.node.fake.answers[0][0](structs.replace(DONE, boot=77))
-    for _ in range(20):
-        operator.tell_safety(boot=5, heartbeat=8)
-        operator.ticks(1)
-    assert_unconfirmed(operator)
-
-
-def assert_unconfirmed(operator: Operator) -> None:
-    operator.ticks(3)
     (line,) = (line for line in operator.node.event_log.lines() if "NOT CONFIRMED" in line.text)
     assert line.level == "error"
 

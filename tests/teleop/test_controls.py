@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from common.client import NEUTRAL, request
 from common.freshness import NS_PER_S
 from common.messages import Drive
-from common.motion import STILL, Twist
+from common.motion import Twist
 from services.teleop.config import Teleop
 from services.teleop.core.controls import (
     DIRECTIONS,
@@ -19,7 +19,6 @@ from services.teleop.core.controls import (
     Stick,
     deflection,
     shaped,
-    twist,
 )
 from services.teleop.core.hold import Press
 from tests.teleop.inputs import PERIOD_NS, answer, stick
@@ -111,14 +110,6 @@ def test_a_tap_is_a_zero_the_twist_and_three_zeros(
     assert operator.controls.is_silent
 
 
-def test_repeats_keep_driving(operator: Operator) -> None:
-    for _ in range(20):
-        operator.press("w")
-        operator.ticks(5)
-    assert operator.ticks(1) == [FIRST_GEAR]
-    assert operator.ticks(20)[-1] is None
-
-
 @pytest.mark.parametrize("key", ["space", "e"])
 def test_a_stop_ends_a_hold_at_once_and_sends_zeros_in_any_case(
     operator: Operator, key: str
@@ -171,21 +162,6 @@ def test_the_last_direction_of_a_release_counts_and_ends_by_itself(operator: Ope
 # --- gamepad --------------------------------------------------------------------------------
 
 
-def test_a_gamepad_drives_while_its_deadman_is_down(operator: Operator) -> None:
-    assert operator.ticks(2, UP) == [None, None]
-    assert operator.ticks(3, DOWN) == [NEUTRAL, FIRST_GEAR, FIRST_GEAR]
-    assert operator.ticks(4, UP) == [NEUTRAL] * 3 + [None]
-
-
-def test_a_lost_gamepad_releases_and_its_return_moves_nothing(operator: Operator) -> None:
-    operator.ticks(1, UP)
-    operator.ticks(3, DOWN)
-    assert operator.ticks(4, None) == [NEUTRAL] * 3 + [None]
-    assert operator.ticks(3, DOWN) == [None] * 3
-    operator.ticks(1, UP)
-    assert operator.ticks(2, DOWN) == [NEUTRAL, FIRST_GEAR]
-
-
 @pytest.mark.parametrize("key", ["space", "e", "f", "b"])
 def test_after_a_stop_or_a_release_the_deadman_must_come_up(operator: Operator, key: str) -> None:
     operator.ticks(1, UP)
@@ -228,16 +204,6 @@ def test_a_stick_at_rest_needs_no_event(operator: Operator, linear: float) -> No
     assert operator.ticks(1, stick(events=2)) == [FIRST_GEAR]  # its own movement is an event
 
 
-def test_after_the_keys_a_frozen_gamepad_does_not_drive(operator: Operator) -> None:
-    operator.ticks(1, UP)
-    operator.ticks(2, stick(events=1))
-    for _ in range(60):
-        operator.press("s")
-        operator.ticks(1, stick(events=1))
-    after = operator.ticks(30, stick(events=1))
-    assert {one.linear for one in after if one} == {-0.2, 0.0}
-
-
 # --- mapping --------------------------------------------------------------------------------
 
 
@@ -268,10 +234,6 @@ def test_keys_give_a_direction(held: list[str], push: tuple[float, float]) -> No
 def test_keys_never_exceed_full_deflection(held: list[str]) -> None:
     push = deflection(held)
     assert max(abs(push.linear), abs(push.angular)) <= 1
-
-
-def test_no_deflection_is_no_motion() -> None:
-    assert [twist(Deflection(), gear, SETTINGS) for gear in (1, 5)] == [STILL, STILL]
 
 
 @pytest.mark.parametrize(
