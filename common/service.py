@@ -21,9 +21,9 @@ from common import clock, keys, log, realtime
 from common.bus.bus import Bus
 from common.bus.drive import DriveLink, LinkWatch
 from common.bus.session import ONE_POOL, RUNTIME_ENV
-from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION, arguments, sources
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION, arguments, needs_extra, sources
 from common.config import Loaded, load
-from common.errors import ConfigError, LinkError
+from common.errors import ConfigError, LinkError, RobotError
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Durations, Event, Health, Level
@@ -174,12 +174,10 @@ def run_optional_service(
     ``found`` imports and returns the builder of the service.
     """
     try:
-        build = found()
-    except ModuleNotFoundError as error:
-        print(  # noqa: T201 - logs are not set up yet
-            f"{name} needs {error.name}: install the extra `{extra}` (pip install -e '.[{extra}]')",
-            file=sys.stderr,
-        )
+        with needs_extra(extra, name):
+            build = found()
+    except RobotError as error:
+        print(error, file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG
     os.nice(NICENESS)
     return run(name, root, build, argv)

@@ -2,9 +2,9 @@
 
 import contextlib
 import socket
-import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 from common import keys
 from common import messages as m
@@ -22,32 +22,30 @@ class Relay:
     """Passes one TCP connection on to a router and counts the bytes towards it."""
 
     def __init__(self, router: str) -> None:
-        host, port = router.removeprefix("tcp/").split(":")
         self.sent = 0
-        self._router = host, int(port)
+        self._router = router.removeprefix("tcp/").split(":")
         self._server = socket.create_server(("127.0.0.1", 0))
         self.endpoint = f"tcp/127.0.0.1:{self._server.getsockname()[1]}"
 
     @contextlib.contextmanager
     def running(self) -> Iterator[None]:
-        with self._server:
-            thread = threading.Thread(target=self._run)
-            thread.start()
+        with self._server, ThreadPoolExecutor(2) as pool:
+            pool.submit(self._run, pool)
             yield
-            thread.join()
 
-    def _run(self) -> None:
-        near, _ = self._server.accept()
-        with near, socket.create_connection(self._router) as far:
-            back = threading.Thread(target=self._copy, args=(far, near, False))
-            back.start()
-            self._copy(near, far, True)
-            back.join()
+    def _run(self, pool: ThreadPoolExecutor) -> None:
+        host, port = self._router
+        near, far = self._server.accept()[0], socket.create_connection((host, int(port)))
+        back = pool.submit(self._copy, far, near, 0)
+        self._copy(near, far, 1)
+        back.result()
+        near.close()
+        far.close()
 
-    def _copy(self, source: socket.socket, sink: socket.socket, counted: bool) -> None:
+    def _copy(self, source: socket.socket, sink: socket.socket, counted: int) -> None:
         with contextlib.suppress(OSError):
             while part := source.recv(65_536):
-                self.sent += len(part) if counted else 0
+                self.sent += counted * len(part)
                 sink.sendall(part)
             sink.shutdown(socket.SHUT_WR)
 
