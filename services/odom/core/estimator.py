@@ -28,6 +28,7 @@ from msgspec.structs import replace
 
 from common import messages as m
 from common.freshness import NS_PER_S, Latest, fresh
+from common.standstill import comparable
 from services.odom.config import Odom
 from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, NoiseModel
 from services.odom.core.pose import (
@@ -103,10 +104,7 @@ class Estimator:
         """Process a counter sample; return whether the counters restarted."""
         self._advance(now_ns)
         before, self._counters = self._counters, mileage
-        restarted = before is not None and (before.boot, before.epoch) != (
-            mileage.boot,
-            mileage.epoch,
-        )
+        restarted = before is not None and not comparable(before, mileage)
         if before is None or restarted:
             self._corrected = self._predicted
         else:
