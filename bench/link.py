@@ -28,7 +28,7 @@ from sim.requests import Wire
 from sim.trace import Command
 from verification.faults.namespaces import enter
 from verification.faults.remote_host import Address, net
-from verification.faults.stack_fixture import QUICK
+from verification.faults.stack_fixture import QUICK, QUICK_MOTORS
 from verification.harness.bus import bus_on, running
 from verification.harness.certificates import Site
 from verification.harness.child_process import ChildProcess
@@ -114,7 +114,9 @@ def two_hosts(folder: Path) -> Iterator[Hosts]:
     )
     listen = f'["unixsock-stream/{folder}/bus.sock", "tls/0.0.0.0:{port}"]'
     with (
-        running_stack(folder, sets=[*QUICK, *robots], shipped=True, listen=listen) as stack,
+        running_stack(
+            folder, sets=[*QUICK, *robots], profiles=[QUICK_MOTORS], shipped=True, listen=listen
+        ) as stack,
         running(Loop()) as loop,
         bus_on(
             stack.endpoint, loop,

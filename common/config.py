@@ -1,10 +1,10 @@
 """Configuration loading: TOML files, environment and command line to frozen structs.
 
 A setting is named by its path, ``board.port``. Sources in order of precedence, the last one wins:
-files, tables that a program passes, environment (``T2__BOARD__PORT``, in any case), ``--set
-board.port=4002``. Tables are merged across sources. Sections of other services are ignored; unknown
-sections and fields are refused, because a misspelt setting would be lost silently. A certificate's
-file name is relative to the settings file that contains it.
+files, environment (``T2__BOARD__PORT``, in any case), ``--set board.port=4002``. Tables are merged
+across sources. Sections of other services are ignored; unknown sections and fields are refused,
+because a misspelt setting would be lost silently. A certificate's file name is relative to the
+settings file that contains it.
 """
 
 import difflib
@@ -22,8 +22,6 @@ from common.errors import ConfigError
 from common.removed_settings import REMOVED
 
 C = TypeVar("C", bound=Struct)
-
-Table = tuple[str, Mapping[str, Any]]  # origin, and settings by path
 
 DEFAULT_FILE = Path(__file__).parent.parent / "config" / "t2.toml"
 ENV_PREFIX = "T2__"
@@ -45,7 +43,6 @@ class Sources(Struct, frozen=True):
     files: Sequence[Path] = (DEFAULT_FILE,)
     environ: Mapping[str, str] = msgspec.field(default_factory=lambda: dict(os.environ))
     sets: Sequence[str] = ()
-    tables: Sequence[Table] = ()  # on top of the files
 
 
 class Setting(Struct, frozen=True):
@@ -70,8 +67,6 @@ def load(root: type[C], sources: Sources) -> Loaded[C]:
     given = {path: Setting(value, DEFAULT) for path, value in flatten(root())}
     for file in sources.files:
         given |= _from_file(file)
-    for origin, table in sources.tables:
-        given |= {path: Setting(value, origin) for path, value in table.items()}
     given |= _from_environ(root, sources.environ)
     given |= _from_sets(root, sources.sets)
     names = {part.name for part in msgspec.structs.fields(root)}
@@ -221,6 +216,8 @@ def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) ->
     for name, value in table.items():
         at = f"{path}.{name}" if path else name
         if at in REMOVED:
+            if all(leaf == {} for _, leaf in flatten(value)):  # an empty table sets nothing
+                continue
             raise ConfigError(f"{_origin(at, given)}: {at}: {REMOVED[at]}")
         if name not in types:
             unknown = f"unknown{_suggestion(name, types)}"

@@ -15,7 +15,16 @@ CONSTANT = {
     "ros2.bumper_rate": "10 Hz",
     "ros2.diagnostics_rate": "1 Hz",
 }
+SIMULATED = (
+    "brake_range", "bumper_brake", "led_channels", "sonar", "bumper", "body", "drive", "velocity",
+    "counters", "firmware", "cable",
+)  # fmt: skip
 REMOVED = {
     **{path: f"was replaced by {other}" for path, other in REPLACED.items()},
     **{path: f"is no setting any more, always {value}" for path, value in CONSTANT.items()},
+    **{
+        f"sim.{name}": "is no setting any more; a profile changes the simulated vehicle: "
+        "--profile FILE of t2 sim, t2 up and t2 demo (sim/README.md)"
+        for name in SIMULATED
+    },
 }

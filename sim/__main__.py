@@ -7,45 +7,40 @@ from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from common import log, realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError
-from sim import profiles
-from sim.config import Config, load_plan, load_script
+from sim.config import Config, add_profiles, load_model, load_plan, profile_list
+from sim.model import Model
 from sim.process import Process, Trace
-from sim.requests import Script
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the simulator's options."""
     parser.add_argument("--world", help="name of a file in sim/worlds, or path of a TOML file")
-    profiles.add_argument(parser)
+    add_profiles(parser)
     parser.add_argument("--list-profiles", action="store_true", help="list the profiles and end")
     parser.add_argument("--trace", type=Path, metavar="FILE", help="write a trace file")
-    parser.add_argument("--faults", type=Path, metavar="FILE", help="fault script")
     add_sources(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Simulate until SIGINT or SIGTERM; raise ``ConfigError`` before anything opens."""
     if options.list_profiles:
-        print(profiles.listing())
+        print(profile_list())
         return 0
     world = [f"sim.world={options.world}"] if options.world is not None else []
     options.sets = [*options.sets, *world]
-    given = replace(sources(options), tables=profiles.tables(options.profile))
-    config = load(Config, given).config
-    plan = load_plan(config.sim.world, config.vehicle)
-    script = load_script(options.faults) if options.faults else Script()
+    config = load(Config, sources(options)).config
+    model = load_model(options.profile, Model(wire=config.wire, vehicle=config.vehicle))
+    plan = load_plan(config.sim.world, model.vehicle)
     if config.robot.realtime:
         realtime.request(realtime.BOARD)
     log.configure(config.log, "sim")
     with closing(Trace(options.trace)) as trace:
         try:
-            process = Process(config, plan, script, trace)
+            process = Process(config, model, plan, trace)
         except LinkError as error:
             log.Logger().error(str(error))
             return EXIT_LINK

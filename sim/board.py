@@ -1,6 +1,6 @@
 """The simulated main board: state, answers, and the effect of the current command.
 
-It holds the last motion command indefinitely: no watchdog is documented; ``sim.firmware`` can have
+It holds the last motion command indefinitely: no watchdog is documented; ``firmware.watchdog`` is
 one. It has two emergency brakes, off at power-on, which override that command. The real behaviour
 is unknown; here it is:
 
@@ -20,34 +20,60 @@ A faulty sonar brakes nothing. A motion command has no answer: the velocity is s
 import math
 import random
 
+from common.freshness import NS_PER_S
 from common.motion import Twist
-from common.settings import Wire
 from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
-from sim.config import Sim
+from sim.model import Model
 from sim.sonar import Ranges
 
-# rad/s of one unit on the wire; the unit of each direction is a setting.
+# rad/s of one unit on the wire.
 RADIANS = {"decidegree": math.radians(0.1), "milliradian": 0.001}
 DRIVER_SIDES = {"left": Side.LEFT, "right": Side.RIGHT}
 FORWARD_SONARS, BACKWARD_SONARS = (1, 2, 3), (5, 6, 7)
 S32_SPAN = 2**32
 ROLLING = 0.005  # m/s, slower counts as standing
+EVEN = 0.5  # chance that a bouncing switch is closed
 
 STOP = c.MotionCommand(c.MotionKind.STOP)
 BREAK = c.MotionCommand(c.MotionKind.BREAK)
 
 
+class Switch:
+    """The contact of the bumper strip, which may bounce.
+
+    bounce: s after each press and release in which it opens and closes at random; the first reading
+    after a change is correct.
+    """
+
+    def __init__(self, bounce: float, seed: int) -> None:
+        self._bounce_ns = round(bounce * NS_PER_S)
+        self._random = random.Random(f"bumper {seed}")
+        self._touched = False
+        self._until_ns = 0
+        self.closed = False
+
+    def touch(self, touched: bool, now_ns: int) -> None:
+        """Set whether something presses the strip now."""
+        if touched != self._touched:
+            self._touched, self._until_ns = touched, now_ns + self._bounce_ns
+            self.closed = touched
+        elif now_ns < self._until_ns:
+            self.closed = self._random.random() < EVEN
+        else:
+            self.closed = touched
+
+
 class Board:
     """State since power-on; ``sense`` sets the sensor values."""
 
-    def __init__(self, wire: Wire, settings: Sim, ranges: Ranges) -> None:
-        self._command_unit = RADIANS[wire.command_angular_unit]
-        self._feedback_unit = RADIANS[wire.feedback_angular_unit]
-        self._settings = settings
-        self._random = random.Random(f"velocity {settings.seed}")
-        self._slips = random.Random(f"counters {settings.seed}")
+    def __init__(self, model: Model, ranges: Ranges, seed: int = 1) -> None:
+        self._command_unit = RADIANS[model.wire.command_angular_unit]
+        self._feedback_unit = RADIANS[model.wire.feedback_angular_unit]
+        self._model = model
+        self._random = random.Random(f"velocity {seed}")
+        self._slips = random.Random(f"counters {seed}")
         self._twist = Twist()
         self._ranges = ranges
         self.pressed = False
@@ -56,11 +82,10 @@ class Board:
         self.power_on()
 
     def power_on(self) -> None:
-        """Reset counters, switches, command, lamps and driver faults."""
+        """Reset counters, switches, command and driver faults."""
         self.command = STOP
         self.ultrasonic_brake = self.bumper_brake = False
         self.driver_bits = {Side.LEFT: 0, Side.RIGHT: 0}
-        self.lamps: dict[int, c.LedSet] = {}
         self._distance = self._turn = 0.0
 
     def sense(self, twist: Twist, ranges: Ranges, pressed: bool) -> None:
@@ -73,7 +98,7 @@ class Board:
 
     def count(self, distance: float, turn: float) -> None:
         """Add a true distance (m) and turn (rad) to the counters, with their errors."""
-        error = self._settings.counters
+        error = self._model.counters
         self._distance += distance * (1 + error.scale)
         self._turn += turn * (1 + error.turn_scale) + distance * error.pull
         # A random walk: the deviation of a step is that of a unit times the root of its length.
@@ -105,7 +130,7 @@ class Board:
 
     def velocity(self) -> r.VelocityReport:
         """Return the continuous velocity report."""
-        error = self._settings.velocity
+        error = self._model.velocity
         linear = self._twist.linear + error.bias + self._noise(error.noise)
         angular = self._twist.angular + error.angular_bias + self._noise(error.angular_noise)
         return r.VelocityReport(round(linear * 1000), round(angular / self._feedback_unit))
@@ -124,10 +149,7 @@ class Board:
         if isinstance(frame, c.BumperBrakeSet):
             self.bumper_brake = frame.on
             return r.BumperBrakeReport(frame.on)
-        known = frame.channel < self._settings.led_channels
-        if known:
-            self.lamps[frame.channel] = frame
-        return r.LedReport(known)
+        return r.LedReport(True)
 
     def _report(self, frame: Frame) -> Frame:
         if isinstance(frame, c.DistanceQuery):
@@ -157,11 +179,11 @@ class Board:
             if way in self._ways()
             for index in sonars
         ]
-        return any(self._ranges[index] < self._settings.brake_range * 1000 for index in watched)
+        return any(self._ranges[index] < self._model.brake_range * 1000 for index in watched)
 
     def _hit(self) -> bool:
         backs_off = self._pressed_way != 0 and self._ways() == {-self._pressed_way}
-        return self.pressed and not (backs_off and self._settings.bumper_brake == "toward")
+        return self.pressed and not (backs_off and self._model.bumper_brake == "toward")
 
 
 def _sign(linear: float) -> int:

@@ -1,152 +1,38 @@
-"""Settings, world files and fault scripts of the simulated vehicle."""
+"""Settings, profiles and worlds of the simulated vehicle, from their files.
 
+A profile is a file ``profiles/NAME.toml`` with parameters of ``sim.model``. The services read none
+of them. The settings that they need to drive such a vehicle are its ``stack``.
+"""
+
+import argparse
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import msgspec
 from msgspec import Meta, Struct
 
-from common.config import read_toml
+from common.config import DEFAULT, Setting, build, flatten, read_toml
 from common.errors import ConfigError
-from common.motion import Command
 from common.settings import Board, Section, Shared, Vehicle, Wire
 from sim.geometry import Rectangle
-from sim.requests import Chance, Hits, Port, Script, Where
+from sim.model import Model
 from sim.world import Plan, World
 
 F = TypeVar("F", bound=Struct)
 
 WORLDS = Path(__file__).parent / "worlds"
-
-Rate = Annotated[float, Meta(ge=0.01, le=100.0)]
-BrakeRate = Annotated[float, Meta(ge=0.1, le=1000.0)]
-
-
-class Sonar(Section, frozen=True, kw_only=True):
-    """The eight sonars. Chances are those of each reading of each sonar, 20 a second."""
-
-    noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.005  # m, standard deviation
-    cone: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.5  # rad, whole opening
-    quantum: Annotated[float, Meta(ge=0.001, le=0.1)] = 0.001  # m, step of the reported ranges
-    # m, the longest range that is reported; at most vehicle.sonar_max
-    saturation: Annotated[float, Meta(ge=0.5, le=20.0)] = 20.0
-    floor_chance: Chance = 0.0  # that the floor echoes
-    floor_range: Annotated[float, Meta(ge=0.1, le=5.0)] = 1.0  # m, along the beam
-    cross_talk: Chance = 0.0  # that the echo of a neighbour's pulse is taken, if it comes first
-    vanish: Chance = 0.0  # that an echo is lost
-    vanish_readings: Annotated[int, Meta(ge=1, le=200)] = 1  # for how many readings it stays lost
-
-
-class Bumper(Section, frozen=True, kw_only=True):
-    """The switch of the bumper strip."""
-
-    # s after each press and release in which the switch opens and closes at random
-    bounce: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
-
-
-class Body(Section, frozen=True, kw_only=True):
-    """The body at an obstacle."""
-
-    rebound: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.0  # share of the speed, backward
-
-
-class Drive(Section, frozen=True, kw_only=True):
-    """Motor dynamics: the speed loop of RUN, the ramp of STOP, and BRAKE (manual 2.2).
-
-    The real figures are unknown. These brake harder than the 0.6 m/s^2 that safety assumes.
-    """
-
-    acceleration: Rate = 1.2  # m/s^2, either way, on RUN
-    angular_acceleration: Rate = 3.0  # rad/s^2, on RUN
-    coast: Rate = 0.8  # m/s^2, on STOP
-    angular_coast: Rate = 2.0  # rad/s^2, on STOP
-    brake: BrakeRate = 1000.0  # m/s^2, on BRAKE; 1000: at once
-    angular_brake: BrakeRate = 1000.0  # rad/s^2, on BRAKE
-    # The motion in a 10 ms step must be shorter than the smallest body, or it could pass a wall.
-    max_linear: Annotated[float, Meta(gt=0.0, le=5.0)] = 1.5  # m/s
-    max_angular: Annotated[float, Meta(gt=0.0, le=3.0)] = 1.5  # rad/s
-    dead_time: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # s until a command has any effect
-    lag: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # s, time constant of RUN and STOP
-    dead_zone: Annotated[float, Meta(ge=0.0, le=0.3)] = 0.0  # m/s of a side, slower stands still
-    # The right wheels are faster than commanded by half of this share, the left ones slower.
-    asymmetry: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0
-    weak_wheel: Chance = 0.0  # share of its speed and force that one left wheel lacks
-    # rad; the ground falls ahead. STOP ramps to a standstill and lets go of the wheels.
-    slope: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0
-
-
-class Velocity(Section, frozen=True, kw_only=True):
-    """Errors of the reported velocity."""
-
-    noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # m/s, standard deviation
-    angular_noise: Annotated[float, Meta(ge=0.0, le=0.5)] = 0.0  # rad/s
-    bias: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0  # m/s
-    angular_bias: Annotated[float, Meta(ge=-0.5, le=0.5)] = 0.0  # rad/s
-
-
-class Counters(Section, frozen=True, kw_only=True):
-    """Errors of the counted distance and turn: systematic shares, and random walks."""
-
-    scale: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0  # share of the distance
-    turn_scale: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0  # share of the turn
-    pull: Annotated[float, Meta(ge=-0.2, le=0.2)] = 0.0  # rad counted per m, on a straight line
-    noise: Annotated[float, Meta(ge=0.0, le=0.2)] = 0.0  # m per sqrt(m)
-    turn_noise: Annotated[float, Meta(ge=0.0, le=0.2)] = 0.0  # rad per sqrt(rad)
-
-
-class Firmware(Section, frozen=True, kw_only=True):
-    """Behaviour of the board that the manual leaves open."""
-
-    answers: Where = "asked"  # where answers go: to the port that asked, by default
-    hits: Hits = "answers"  # where reports of a pressed bumper go
-    echoes: bool = True  # whether it echoes its emergency brake switches
-    ignores: tuple[Command, ...] = ()  # motion commands that it does not obey
-    # s without a motion command until the board does STOP by itself; 0: never
-    watchdog: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0
-    split: Chance = 0.0  # that a frame is sent in two datagrams
-    # s that frames wait to be sent in one datagram; 0: one datagram for each
-    merge: Annotated[float, Meta(ge=0.0, le=0.1)] = 0.0
-
-
-class Line(Section, frozen=True, kw_only=True):
-    """Faults of one direction of the cable, as of ``sim.requests.Wire``; chances of a datagram."""
-
-    port: Port = "both"  # of the PC's two, the one with these faults
-    drop: Chance = 0.0
-    duplicate: Chance = 0.0
-    reorder: Chance = 0.0
-    corrupt: Chance = 0.0
-    join: Chance = 0.0
-    delay: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # s
-    jitter: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0  # s, maximum additional delay
-
-
-class Cable(Section, frozen=True, kw_only=True):
-    """The cable between board and PC."""
-
-    to_pc: Line = Line()
-    to_board: Line = Line()
+PROFILES = Path(__file__).parent / "profiles"
+IDEAL = Model()
+HEAD = ("title", "source", "stack")  # of a profile
 
 
 class Sim(Section, frozen=True, kw_only=True):
-    """The simulated vehicle and its world. The defaults are ideal; see the profiles."""
+    """The simulated vehicle. ``--profile`` changes its parameters, see sim/README.md."""
 
     world: str = "office"  # a name in sim/worlds, or the path of a TOML file
     seed: Annotated[int, Meta(ge=0)] = 1  # of all noise and faults
     control_port: Annotated[int, Meta(ge=0, le=65535)] = 0  # UDP on 127.0.0.1; 0: none
-    # How the board's own emergency brakes work is unknown. Its sonar brake acts closer than
-    # safety's margin of 0.20 m: it is the second line of defence.
-    brake_range: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.15  # m
-    bumper_brake: Literal["toward", "all"] = "toward"  # what it refuses while pressed
-    led_channels: Annotated[int, Meta(ge=0, le=256)] = 16  # the board refuses others
-    sonar: Sonar = Sonar()
-    bumper: Bumper = Bumper()
-    body: Body = Body()
-    drive: Drive = Drive()
-    velocity: Velocity = Velocity()
-    counters: Counters = Counters()
-    firmware: Firmware = Firmware()
-    cable: Cable = Cable()
 
 
 class Config(Shared, frozen=True, kw_only=True):
@@ -158,26 +44,89 @@ class Config(Shared, frozen=True, kw_only=True):
     sim: Sim = Sim()
 
 
+class Profile(Section, frozen=True, kw_only=True):
+    """A profile file; ``parameters`` are those of ``Model``, by path."""
+
+    title: str
+    source: str  # where it is known from, or what the manual leaves open
+    stack: str = ""  # settings with which the services drive such a vehicle
+    parameters: dict[str, Any]
+
+
+def add_profiles(parser: argparse.ArgumentParser) -> None:
+    """Add the option that names profiles."""
+    parser.add_argument(
+        "--profile", action="append", default=[], metavar="NAME",
+        help="unkind vehicle, a file in sim/profiles or a path; may be repeated",
+    )  # fmt: skip
+
+
+def known_profiles() -> list[str]:
+    """Return the names of the shipped profiles."""
+    return _stems(PROFILES)
+
+
+def read_profile(name: str) -> Profile:
+    """Read a profile by name or path; raise ``ConfigError`` for an unknown or invalid one."""
+    file = _named(name, PROFILES)
+    if not file.is_file():
+        known = ", ".join(known_profiles())
+        raise ConfigError(f"--profile {name}: no such file; known profiles are {known}")
+    table = read_toml(file, str(file))
+    parameters = {path: value for path, value in flatten(table) if path not in (*HEAD, "")}
+    head = {key: table[key] for key in HEAD if key in table}
+    return _convert({**head, "parameters": parameters}, Profile, file)
+
+
+def load_model(names: Sequence[str], ideal: Model = IDEAL) -> Model:
+    """Return the vehicle of these profiles; raise ``ConfigError`` when two of them contradict."""
+    given = {path: Setting(value, DEFAULT) for path, value in flatten(ideal)}
+    chosen: dict[str, tuple[str, Any]] = {}
+    for name in names:
+        for path, value in read_profile(name).parameters.items():
+            other, before = chosen.setdefault(path, (name, value))
+            if before != value:
+                raise ConfigError(
+                    f"--profile {name}: {path} = {value!r}, but profile {other} has {before!r}; "
+                    "leave one of them out"
+                )
+            given[path] = Setting(value, f"profile {name}")
+    return build(Model, given)
+
+
+def profile_list() -> str:
+    """Return a line for each profile, with what the services need for it."""
+    lines = []
+    for name in known_profiles():
+        profile = read_profile(name)
+        lines.append(f"{name:20} {profile.title}")
+        lines += [f"{'':20} stack: --set {each}" for each in profile.stack.split()]
+    return "\n".join(lines)
+
+
 def load_plan(world: str, vehicle: Vehicle) -> Plan:
     """Read a world by name or path; raise ``ConfigError`` when its start is blocked."""
-    file = Path(world) if world.endswith(".toml") else WORLDS / f"{world}.toml"
+    file = _named(world, WORLDS)
     if not file.is_file():
-        known = ", ".join(sorted(path.stem for path in WORLDS.glob("*.toml")))
+        known = ", ".join(_stems(WORLDS))
         raise ConfigError(f"sim.world = {world!r}: no such file; known worlds are {known}")
-    plan = _load(file, Plan)
+    plan = _convert(read_toml(file, str(file)), Plan, file)
     body = Rectangle(vehicle.length / 2, vehicle.width / 2)
     if World.of(plan).blocks(body, plan.start.pose):
         raise ConfigError(f"{file}: start: the vehicle stands in a wall or a box")
     return plan
 
 
-def load_script(file: Path) -> Script:
-    """Read a fault script; raise ``ConfigError`` naming the field that is injected."""
-    return _load(file, Script)
+def _stems(folder: Path) -> list[str]:
+    return sorted(file.stem for file in folder.glob("*.toml"))
 
 
-def _load(file: Path, kind: type[F]) -> F:
+def _named(name: str, folder: Path) -> Path:
+    return Path(name) if name.endswith(".toml") else folder / f"{name}.toml"
+
+
+def _convert(table: dict[str, Any], kind: type[F], file: Path) -> F:
     try:
-        return msgspec.convert(read_toml(file, str(file)), kind)
+        return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
         raise ConfigError(f"{file}: {error}") from None

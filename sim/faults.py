@@ -1,8 +1,8 @@
 """Simulated cable: one direction between board and PC, with datagram faults.
 
-Faults apply to each datagram in this order: dropped, corrupted, sent from a foreign address, held
-and joined with the next one, duplicated, queued by the rate limit, delayed. Datagrams without delay
-are delivered at once and in order.
+Faults apply to each datagram in this order: dropped, corrupted, sent from a foreign address,
+duplicated, queued by the rate limit, delayed. Datagrams without delay are delivered at once and in
+order.
 """
 
 import heapq
@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from common.freshness import NS_PER_S
-from sim.requests import Wire
+from sim.model import Line
 
 REORDER_S = 0.03  # long enough that datagrams sent at 50 Hz overtake
-NONE = Wire()
+NONE = Line()
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +32,11 @@ class Cable:
     ports: the PC's; needed only by faults of one of them.
     """
 
-    def __init__(self, seed: int, faults: Wire | None = None, ports: Sequence[int] = ()) -> None:
-        self.faults = faults or NONE
+    def __init__(self, seed: int, faults: Line = NONE, ports: Sequence[int] = ()) -> None:
+        self.faults = faults
         self._ports = ports
         self._random = random.Random(seed)
         self._under_way: list[tuple[int, int, Datagram]] = []  # due, order, datagram
-        self._held: dict[int, bytes] = {}
         self._order = 0
         self._free_ns = 0  # when all queued data has left
 
@@ -50,17 +49,11 @@ class Cable:
             datagram = replace(datagram, payload=self._flip(datagram.payload))
         if self._happens(faults.foreign):
             datagram = replace(datagram, foreign=True)
-        payload = self._held.pop(datagram.port, b"") + datagram.payload
-        if self._happens(faults.join):
-            self._held[datagram.port] = payload
-            return
         for _ in range(2 if self._happens(faults.duplicate) else 1):
-            left_ns = self._leaves_ns(faults, len(payload), now_ns)
+            left_ns = self._leaves_ns(faults, len(datagram.payload), now_ns)
             if left_ns is not None:
                 due_ns = left_ns + round(self._delay_s(faults) * NS_PER_S)
-                heapq.heappush(
-                    self._under_way, (due_ns, self._order, replace(datagram, payload=payload))
-                )
+                heapq.heappush(self._under_way, (due_ns, self._order, datagram))
                 self._order += 1
 
     def take(self, now_ns: int) -> list[Datagram]:
@@ -80,7 +73,7 @@ class Cable:
         which = self.faults.port
         return which == "both" or port == self._ports[0 if which == "first" else -1]
 
-    def _leaves_ns(self, faults: Wire, size: int, now_ns: int) -> int | None:
+    def _leaves_ns(self, faults: Line, size: int, now_ns: int) -> int | None:
         """Return when so many bytes have left, after all before them; None if none may wait."""
         if faults.rate is None:
             return now_ns
@@ -95,7 +88,7 @@ class Cable:
         # Nothing is drawn for what cannot happen: switching one fault on leaves the others' draws.
         return chance > 0 and self._random.random() < chance
 
-    def _delay_s(self, faults: Wire) -> float:
+    def _delay_s(self, faults: Line) -> float:
         late = self._random.uniform(0.0, faults.jitter) if faults.jitter else 0.0
         return faults.delay + late + (REORDER_S if self._happens(faults.reorder) else 0.0)
 

@@ -6,43 +6,42 @@ without saying which of them an answer takes.
 
 import random
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from common.wire import reports as r
 from common.wire.frame import Frame
 from common.wire.framing import Framing
-from sim.config import Firmware
 from sim.faults import Datagram
-from sim.requests import Where
+from sim.model import Firmware, Where
 
 ECHOES = (r.UltrasonicBrakeReport, r.BumperBrakeReport)
 
 
 class Output:
-    """Packs frames for the PC; ``settings`` and ``muted`` may change while it runs."""
+    """Packs frames for the PC; ``firmware`` may change while it runs."""
 
-    def __init__(self, settings: Firmware, framing: Framing, ports: Sequence[int], seed: int):
-        self.settings = settings
-        self.muted: frozenset[type[Frame]] = frozenset()
+    def __init__(self, firmware: Firmware, framing: Framing, ports: Sequence[int], seed: int):
+        self.firmware = firmware
         self._framing = framing
         self._ports = ports
         self._random = random.Random(f"firmware {seed}")
-        self._loss: tuple[frozenset[type[Frame]], int] = frozenset(), 1
-        self._loss_counts: Counter[type[Frame]] = Counter()
+        self._muted: frozenset[type[Frame]] = frozenset()
+        self._every = 1
+        self._counts: Counter[type[Frame]] = Counter()
         self._waiting: dict[int, bytes] = defaultdict(bytes)  # by port, to be merged
 
-    def lose(self, reports: frozenset[type[Frame]], every: int) -> None:
-        """Drop every n-th of these reports from now on."""
-        self._loss = reports, every
-        self._loss_counts.clear()
+    def mute(self, reports: Iterable[type[Frame]], every: int) -> None:
+        """Suppress every n-th of these reports from now on."""
+        self._muted, self._every = frozenset(reports), every
+        self._counts.clear()
 
     def answer(self, frame: Frame, asked: int) -> list[Datagram]:
         """Return the datagrams of an answer to a query from this port; none for one held back."""
-        if isinstance(frame, ECHOES) and not self.settings.echoes:
+        if isinstance(frame, ECHOES) and not self.firmware.echoes:
             return []
-        where = self.settings.answers
-        if isinstance(frame, r.BumperReport) and frame.on and self.settings.hits != "answers":
-            where = self.settings.hits
+        where = self.firmware.answers
+        if isinstance(frame, r.BumperReport) and frame.on:
+            where = self.firmware.hits or where
         return self._pack(frame, self._addressed(where, asked))
 
     def unasked(self, frame: Frame) -> list[Datagram]:
@@ -61,24 +60,23 @@ class Output:
     def _pack(self, frame: Frame, ports: Sequence[int]) -> list[Datagram]:
         datagrams = []
         for port in ports:
-            if type(frame) in self.muted or self._is_lost(type(frame)):
+            if self._is_muted(type(frame)):
                 continue
             payload = self._framing.pack(frame)
-            if self.settings.merge:
+            if self.firmware.merge:
                 self._waiting[port] += payload
                 continue
             datagrams += [Datagram(part, port) for part in self._parts(payload)]
         return datagrams
 
     def _parts(self, payload: bytes) -> Sequence[bytes]:
-        if not self.settings.split or self._random.random() >= self.settings.split:
+        if not self.firmware.split or self._random.random() >= self.firmware.split:
             return (payload,)
         cut = self._random.randrange(1, len(payload))
         return payload[:cut], payload[cut:]
 
-    def _is_lost(self, kind: type[Frame]) -> bool:
-        kinds, every = self._loss
-        if kind not in kinds:
+    def _is_muted(self, kind: type[Frame]) -> bool:
+        if kind not in self._muted:
             return False
-        self._loss_counts[kind] += 1
-        return self._loss_counts[kind] % every == 0
+        self._counts[kind] += 1
+        return self._counts[kind] % self._every == 0

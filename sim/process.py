@@ -12,8 +12,7 @@ from common.log import Logger
 from common.loop import Loop
 from sim import trace as t
 from sim.config import Config
-from sim.injection import Injection
-from sim.requests import Script
+from sim.model import Model
 from sim.simulation import STEP_NS, Simulation
 from sim.sockets import BoardSocket, ControlSocket
 from sim.world import Plan
@@ -42,10 +41,9 @@ class Trace:
 class Process:
     """The whole of ``python -m sim``; the constructor opens the sockets."""
 
-    def __init__(self, config: Config, plan: Plan, script: Script, trace: Trace) -> None:
-        now_ns = clock.now_ns()
-        self.simulation = Simulation(config, plan, now_ns)
-        self._injection = Injection(self.simulation, script, now_ns)
+    def __init__(self, config: Config, model: Model, plan: Plan, trace: Trace) -> None:
+        ports = config.board.listen_ports
+        self.simulation = Simulation(model, plan, clock.now_ns(), config.sim.seed, ports)
         self._trace = trace
         self._log = Logger()
         with ExitStack() as stack:  # closes opened sockets when a later port is taken
@@ -53,7 +51,7 @@ class Process:
             self._board = stack.enter_context(closing(BoardSocket(config.board)))
             self.loop.watch(self._board.sock, self._receive)
             if config.sim.control_port:
-                control = ControlSocket(config.sim.control_port, self._injection)
+                control = ControlSocket(config.sim.control_port, self.simulation)
                 stack.enter_context(closing(control))
                 self.loop.watch(control.sock, lambda now_ns: self._serve_control(control, now_ns))
             self._opened = stack.pop_all()
@@ -70,12 +68,12 @@ class Process:
         self._opened.close()
 
     def _step(self, now_ns: int) -> None:
-        self._injection.advance(now_ns)
+        self.simulation.advance(now_ns)
         self._deliver()
 
     def _receive(self, now_ns: int) -> None:
         # Advance first, so that answers are current even after a stall of this process.
-        self._injection.advance(now_ns)
+        self.simulation.advance(now_ns)
         for payload, port in self._board.receive():
             self.simulation.receive(payload, port, now_ns)
         self._deliver()

@@ -4,14 +4,12 @@ Time is an input: ``advance`` steps up to it, ``receive`` and ``handle`` happen 
 collected: datagrams for the PC, and lines for the trace. The same seed and the same calls give the
 same outputs. One step::
 
-    script -> command -> velocity -> motion in the world -> sensors -> stream -> trace
+    command -> velocity -> motion in the world -> sensors -> stream -> trace
 """
 
 import math
 from collections import Counter
 from collections.abc import Sequence
-
-import msgspec
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Command
@@ -20,16 +18,13 @@ from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Side
 from common.wire.framing import Framing, Received
 from sim import trace as t
-from sim.board import STOP, Board
-from sim.bumper import Switch
-from sim.config import Config, Line
+from sim.board import STOP, Board, Switch
 from sim.faults import Cable, Datagram
 from sim.firmware import Output
 from sim.geometry import Rectangle
-from sim.motors import Motors
-from sim.requests import Wire
+from sim.model import Model
 from sim.sonar import Sonars
-from sim.vehicle import move, rebounded, wheel_angles
+from sim.vehicle import Motors, move, rebounded
 from sim.world import Plan, World
 
 STEP_NS = NS_PER_S // 100
@@ -49,26 +44,32 @@ COMMANDS = {
 class Simulation:
     """A vehicle that was powered on at ``now_ns``; its start must be free of obstacles."""
 
-    def __init__(self, config: Config, plan: Plan, now_ns: int) -> None:
+    def __init__(
+        self,
+        model: Model,
+        plan: Plan,
+        now_ns: int,
+        seed: int = 1,
+        ports: Sequence[int] = (4002, 4001),  # of the PC
+    ) -> None:
         self.now_ns = now_ns  # end of the last step
         self.world = World.of(plan)
-        self.body = Rectangle(config.vehicle.length / 2, config.vehicle.width / 2)
+        self.body = Rectangle(model.vehicle.length / 2, model.vehicle.width / 2)
         self.pose = plan.start.pose
         self.twist = STILL
         self.pressed_by_hand = False
-        sim = config.sim
-        self.sonars = Sonars(config.vehicle, sim.sonar, sim.seed)
+        self.sonars = Sonars(model.vehicle, model.sonar, seed)
         self._ranges = self.sonars.measure(self.world, self.pose)
-        self.board = Board(config.wire, sim, self._ranges)
-        ports = config.board.listen_ports
-        self.to_pc = Cable(sim.seed + 1, _faults(sim.cable.to_pc), ports)
-        self.to_board = Cable(sim.seed + 2, _faults(sim.cable.to_board), ports)
+        self.board = Board(model, self._ranges, seed)
+        self.to_pc = Cable(seed + 1, model.cable.to_pc, ports)
+        self.to_board = Cable(seed + 2, model.cable.to_board, ports)
         self.counters: Counter[str] = Counter()
-        self._config = config
-        self._framing = Framing(config.wire.crc, config.wire.crc_covers)
-        self.output = Output(sim.firmware, self._framing, ports, sim.seed)
-        self._motors = Motors(sim.drive, config.vehicle.track)
-        self._switch = Switch(sim.bumper.bounce, sim.seed)
+        self._ports = ports
+        self._framing = Framing(model.wire.crc, model.wire.crc_covers)
+        self.output = Output(model.firmware, self._framing, ports, seed)
+        self._motors = Motors(model.drive, model.vehicle.track)
+        self._rebound = model.body.rebound
+        self._switch = Switch(model.bumper.bounce, seed)
         self._commanded_ns = now_ns
         self._records: list[t.Line] = []
         self._steps = 0
@@ -155,7 +156,6 @@ class Simulation:
             clearance=clearance if math.isfinite(clearance) else None,
             contact=self._contact,
             pressed=self._switch.closed,
-            wheels=wheel_angles(self.twist, self._config.vehicle),
             command=self._command,
             braking=self.board.braking(),
             ultrasonic_brake=self.board.ultrasonic_brake,
@@ -191,12 +191,12 @@ class Simulation:
             self.record(t.Power(mono_ns=self.now_ns, on=True))
 
     def _is_merged(self) -> bool:
-        wait_ns = self.output.settings.merge * NS_PER_S
+        wait_ns = self.output.firmware.merge * NS_PER_S
         return wait_ns > 0 and self._steps % max(1, round(wait_ns / STEP_NS)) == 0
 
     def _update_watchdog(self) -> None:
         silence_s = (self.now_ns - self._commanded_ns) / NS_PER_S
-        if 0 < self.output.settings.watchdog < silence_s:
+        if 0 < self.output.firmware.watchdog < silence_s:
             self.board.command = STOP
 
     def _move(self, dt: float) -> None:
@@ -206,8 +206,7 @@ class Simulation:
             self.twist = twist
             return
         way = move(self.pose, twist, dt, lambda pose: self.world.blocks(self.body, pose))
-        rebound = self._config.sim.body.rebound
-        self.pose, self.twist = way.pose, rebounded(twist, rebound) if way.held else twist
+        self.pose, self.twist = way.pose, rebounded(twist, self._rebound) if way.held else twist
         self._driven += abs(way.distance)
         self.board.count(way.distance, way.turn)
         self._contact = self.world.contact(self.body, self.pose)
@@ -231,7 +230,7 @@ class Simulation:
                 self._hold(part.frame, now_ns)
                 self.record(self._command)
                 self._commanded_ns = now_ns
-                if self._command.kind in self.output.settings.ignores:
+                if self._command.kind in self.output.firmware.ignores:
                     continue
             answer = self.board.answer(part.frame)
             if answer is not None:
@@ -248,9 +247,9 @@ class Simulation:
 
     def _send_flood(self, count: int, garbage: bytes | None) -> None:
         payload = garbage or self._framing.pack(self.board.velocity())
-        ports = self._config.board.listen_ports
         for number in range(0 if self._silent(self.now_ns) else count):
-            self.to_pc.put(Datagram(payload, ports[number % len(ports)]), self.now_ns)
+            port = self._ports[number % len(self._ports)]
+            self.to_pc.put(Datagram(payload, port), self.now_ns)
 
     def _send(self, datagrams: Sequence[Datagram], now_ns: int) -> None:
         if not self._silent(now_ns):
@@ -273,7 +272,3 @@ class Simulation:
 
     def _silent(self, now_ns: int) -> bool:
         return now_ns < self._silent_until_ns
-
-
-def _faults(line: Line) -> Wire:
-    return Wire(**msgspec.structs.asdict(line))

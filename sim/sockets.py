@@ -14,8 +14,9 @@ import msgspec
 from common.errors import LinkError, MessageError
 from common.settings import Board
 from sim.faults import Datagram
-from sim.injection import Injection, Reply
+from sim.injection import Reply, handle
 from sim.requests import Asked, GetTruth
+from sim.simulation import Simulation
 from sim.trace import Truth
 
 HOST = "127.0.0.1"  # of the control socket
@@ -59,9 +60,9 @@ class BoardSocket:
 class ControlSocket:
     """The simulator's end of the control socket."""
 
-    def __init__(self, port: int, injection: Injection) -> None:
+    def __init__(self, port: int, simulation: Simulation) -> None:
         self.sock = bound(HOST, port, "sim.control_port")
-        self._injection = injection
+        self._simulation = simulation
 
     def serve(self, now_ns: int) -> None:
         """Answer the waiting requests."""
@@ -79,7 +80,7 @@ class ControlSocket:
             request = _requests.decode(payload)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             return Reply(ok=False, error=str(error))
-        return self._injection.handle(request, now_ns)
+        return handle(self._simulation, request, now_ns)
 
 
 class Control:

@@ -43,7 +43,6 @@ class Truth(Record, frozen=True, kw_only=True, tag="truth"):
     clearance: float | None  # m, to the nearest surface that sonar sees; None without any
     contact: bool  # something presses the bumper strip
     pressed: bool  # the bumper as the board senses it: contact, or by hand
-    wheels: tuple[float, ...]  # rad: front left, front right, rear left, rear right
     command: Command  # the current command of the board
     braking: bool  # one of the board's own emergency brakes overrules that command
     ultrasonic_brake: bool

@@ -1,22 +1,28 @@
-"""Vehicle dynamics: velocity and pose of a body on four driven and steered wheels.
+"""Vehicle dynamics: motors, velocity and pose of a body on four driven and steered wheels.
 
-Both axles steer, so that the body turns around any point of its own y axis, or on the spot; the
-wheel angles follow from the twist alone. Wheels blocked by an obstacle stand still.
+Both axles steer, so that the body turns around any point of its own y axis, or on the spot. Wheels
+blocked by an obstacle stand still. Motors are ideal by default; both sides are driven by the speed
+of their middle::
+
+    command -> dead time -> sides: dead zone, asymmetry, weak wheel -> ramp and lag -> slope
 """
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from common.motion import STILL, Twist, clamp
-from common.settings import Vehicle
 from common.wire.commands import MotionKind
-from sim.config import Drive
 from sim.geometry import Pose
+from sim.model import Drive
 
 WHEELS = 4
+GRAVITY = 9.81  # m/s^2
 SETTLED = 1e-4  # m/s or rad/s from its target, where a lag ends
 BISECTIONS = 12  # of one step, 15 mm at 1.5 m/s: contact is found to a few micrometres
+
+Command = tuple[MotionKind, Twist]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +33,51 @@ class Movement:
     distance: float  # m, forward positive
     turn: float  # rad
     held: bool  # an obstacle ended it early
+
+
+class Motors:
+    """The motors of one vehicle.
+
+    track: m, left wheels to right wheels.
+    """
+
+    def __init__(self, drive: Drive, track: float) -> None:
+        self._drive = drive
+        self._track = track
+        self._pending: deque[Command] = deque()
+        self._command: Command = MotionKind.STOP, Twist()
+        self._released = False  # STOP has come to a standstill, and holds no more
+
+    def follow(self, twist: Twist, kind: MotionKind, target: Twist, dt: float) -> Twist:
+        """Return the velocity ``dt`` seconds later under the command that the board gives now."""
+        kind, target = self._delayed((kind, target), dt)
+        if kind is MotionKind.RUN:
+            target = self._uneven(target)
+        after = next_twist(twist, kind, target, self._drive, dt)
+        self._released = kind is MotionKind.STOP and (self._released or after.linear == 0)
+        if not (self._released and self._drive.slope):
+            return after
+        rolling = twist.linear + GRAVITY * math.sin(self._drive.slope) * dt
+        return Twist(clamp(rolling, self._drive.max_linear), after.angular)
+
+    def _delayed(self, command: Command, dt: float) -> Command:
+        self._pending.append(command)
+        if len(self._pending) > round(self._drive.dead_time / dt):
+            self._command = self._pending.popleft()
+        return self._command
+
+    def _uneven(self, target: Twist) -> Twist:
+        drive = self._drive
+        if not (drive.dead_zone or drive.asymmetry or drive.weak_wheel):
+            return target
+        aside = target.angular * self._track / 2
+        left, right = (
+            0.0 if abs(speed) < drive.dead_zone else speed
+            for speed in (target.linear - aside, target.linear + aside)
+        )
+        left *= (1 - drive.asymmetry / 2) * (1 - 2 * drive.weak_wheel / WHEELS)
+        right *= 1 + drive.asymmetry / 2
+        return Twist((left + right) / 2, (right - left) / self._track)
 
 
 def next_twist(twist: Twist, kind: MotionKind, target: Twist, drive: Drive, dt: float) -> Twist:
@@ -71,23 +122,6 @@ def move(pose: Pose, twist: Twist, dt: float, blocked: Callable[[Pose], bool]) -
         free, hit = (free, middle) if blocked(moved(pose, twist, middle)) else (middle, hit)
     end = moved(pose, twist, free)
     return Movement(end, twist.linear * free, twist.angular * free, held=True)
-
-
-def wheel_angles(twist: Twist, vehicle: Vehicle) -> tuple[float, ...]:
-    """Return the steering angles of the wheels, rad within a quarter turn.
-
-    Front left, front right, rear left, rear right.
-    """
-    x, y = vehicle.wheelbase / 2, vehicle.track / 2
-    return tuple(_wheel_angle(twist, *at) for at in ((x, y), (x, -y), (-x, y), (-x, -y)))
-
-
-def _wheel_angle(twist: Twist, x: float, y: float) -> float:
-    # Adding 0.0 turns -0.0 into 0.0, which atan2 would take for backward.
-    forward, left = twist.linear - twist.angular * y + 0.0, twist.angular * x + 0.0
-    if forward < 0:  # a wheel rolls backward instead of turning around
-        return math.atan2(-left, -forward)
-    return math.atan2(left, forward)
 
 
 def _toward(value: float, target: float, most: float, share: float) -> float:

@@ -1,7 +1,6 @@
 """World model: walls and boxes, visible to sonar or only to the bumper.
 
-A plan is the content of a world file; the world is the plan as surfaces. A world is immutable:
-adding a box makes a new one.
+A plan is the content of a world file; the world is the plan as surfaces.
 """
 
 import math
@@ -118,14 +117,6 @@ class World:
     def clearance(self, body: Rectangle, pose: Pose) -> float:
         """Return the distance to the nearest surface visible to sonar, in metres, or infinity."""
         return min((body.gap(pose, segment) for segment in self.visible), default=math.inf)
-
-    def with_box(self, box: Box) -> Self:
-        """Return a world with this box; it replaces one of the same name."""
-        return type(self)(self.walls, (*self.without(box.name).boxes, box))
-
-    def without(self, name: str) -> Self:
-        """Return a world without the box of that name."""
-        return type(self)(self.walls, tuple(box for box in self.boxes if box.name != name))
 
 
 def _outlines(boxes: Iterable[Box]) -> tuple[Segment, ...]:

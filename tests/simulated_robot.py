@@ -21,7 +21,8 @@ import t2.stream
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
-from sim.config import Config, load_plan
+from common.settings import Vehicle
+from sim.config import load_plan
 from verification.search.bus import MS, Envelope, Subscription
 from verification.search.stack import ASK_NS, Stack
 
@@ -41,9 +42,7 @@ class SimulatedStack(Stack):
     """
 
     def __init__(self, world: str = "office") -> None:
-        config = Config()
-        plan = load_plan(world, config.vehicle)
-        super().__init__(config, plan, step_ns=TICK_MS * MS)
+        super().__init__(plan=load_plan(world, Vehicle()), step_ns=TICK_MS * MS)
         self.each_beat: list[Callable[[], object]] = []
         self.poses: list[m.Odometry] = []
         self.answers: list[bool] = []  # to resets

@@ -21,8 +21,7 @@ from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
 from common.loop import Loop
-from sim import profiles
-from sim.config import load_plan
+from sim.config import add_profiles, load_model, load_plan
 
 if TYPE_CHECKING:
     from cli.demo.lap_thread import LapThread
@@ -38,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
     )
-    profiles.add_argument(parser)
+    add_profiles(parser)
     add_sources(parser)
 
 
@@ -56,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
             " -e sdk"
         ) from None
     options.no_sim, options.world = False, WORLD
-    profiles.tables(options.profile)  # refuses an unknown one before anything starts
+    load_model(options.profile)  # refuses an invalid one before anything starts
     prepare_folder(options)
     stall_s = host_stalls.measured()
     options.sets = host_stalls.with_accepted_joined(

@@ -17,7 +17,7 @@ from common import child_process, log, realtime
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError
-from sim import profiles
+from sim.config import add_profiles, load_model
 
 Commands = list[tuple[str, Sequence[str]]]
 
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-sim", action="store_true", help="use a real board")
     parser.add_argument("--only", metavar="NAME", help="start only this process, such as bridge")
     parser.add_argument("--world", help="world of the simulated vehicle; sim.world by default")
-    profiles.add_argument(parser)
+    add_profiles(parser)
     parser.add_argument(
         "--no-router", action="store_true", help="use a running router, such as zenohd"
     )
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Keep the stack running until SIGINT or SIGTERM."""
-    profiles.tables(options.profile)  # refuses an unknown one before anything starts
+    load_model(options.profile)  # refuses an invalid one before anything starts
     if options.no_sim and options.profile:
         raise ConfigError(
             "--profile changes the simulated vehicle: leave --no-sim or --profile out"

@@ -118,7 +118,7 @@ def test_a_service_leaves_the_sections_of_others_alone(settings_dir: SettingsFix
         ("odom.hold=5e-2", "odom.hold", 0.05),
         ("log.format=json", "log.format", "json"),
         ("safety.sources.web.priority=3", "safety.sources.web.priority", 3),
-        ("sim.drive.coast=2", "sim.drive.coast", 2.0),
+        ("odom.turn_noise=2", "odom.turn_noise", 2.0),
     ],
 )  # fmt: skip
 def test_a_set_is_read_as_its_field_wants_it(
@@ -143,7 +143,9 @@ def test_a_table_adds_to_what_was_given_before(settings_dir: SettingsFixture) ->
     assert loaded.settings["safety.sources.new.lease"].origin.startswith("--set safety.sources=")
 
 
-@pytest.mark.parametrize("empty", ["[board]", "board = {}", "[safety.sources]", ""])
+@pytest.mark.parametrize(
+    "empty", ["[board]", "board = {}", "[safety.sources]", "", "[sim.drive]", "[sim.cable.to_pc]"]
+)
 def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty: str) -> None:
     loaded = settings_dir.load("[board]\nport = 5000", empty)
     assert loaded.config.board.port == 5000
@@ -168,7 +170,9 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
             "over0.toml: ros2.odom_rate: is no setting any more, always 25 Hz",
         ),
         ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
-        ("[sim.drive]\nzzz = 1", "over0.toml: sim.drive.zzz: unknown; there are acceleration"),
+        ("[sim.drive]\ncoast = 1", "over0.toml: sim.drive: is no setting any more; a profile"),
+        ("[sim]\nled_channels = 1", "over0.toml: sim.led_channels: is no setting any more; a p"),
+        ("[sim]\nzzz = 1", "over0.toml: sim.zzz: unknown; there are control_port, seed, world"),
         ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),
         ("[board]\nport = {}", "over0.toml: board.port = {}: Expected `int`, got `object`"),
         ("[board]\nport = 70000", "port = 70000: Expected `int` <= 65535; allowed is 1..65535"),

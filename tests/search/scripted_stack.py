@@ -10,8 +10,8 @@ from common.motion import Twist
 from common.wire.reports import VelocityReport
 from sim import requests as q
 from sim.board import Board
-from sim.config import Config
 from sim.faults import Datagram
+from sim.model import Model
 from sim.sonar import Ranges
 from verification.search.bus import MS, ROBOT, Disturbance
 from verification.search.stack import Stack
@@ -51,10 +51,9 @@ class ScriptedStack(Stack):
 
     def __init__(self) -> None:
         super().__init__()
-        config, simulation = Config(), self.vehicle.simulation
-        self.board = OverriddenBoard(config.wire, config.sim, (NO_ECHO_MM,) * 8)
+        self.board = OverriddenBoard(Model(), (NO_ECHO_MM,) * 8)
         self.board.ranges = [None] * 8
-        simulation.board = self.board
+        self.vehicle.simulation.board = self.board
 
     def request(
         self, linear: float | None, ms: int = 0, *, angular: float = 0.0, source: str = "teleop"

@@ -12,7 +12,6 @@ from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from services.safety.core.planning import Limit, Zones
-from sim.config import Config
 from sim.geometry import Pose, Rectangle
 from sim.trace import Truth
 from sim.world import World
@@ -71,7 +70,7 @@ def test_every_parameter_is_known_and_both_ends_of_its_range_are_settings() -> N
     for one in ranges():
         for value in one.choices or (one.low, one.high):
             assert isinstance(value, bool | int | float | str)
-            msgspec.convert(Draw(1, {one.name: value}).settings(), Config)
+            Draw(1, {one.name: value}).model()
 
 
 def test_a_seed_gives_the_same_draw() -> None:

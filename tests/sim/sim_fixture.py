@@ -1,6 +1,7 @@
 """A simulated vehicle without sockets and clock, and a PC controlled by the test."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -10,10 +11,10 @@ from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
-from sim.config import Config
 from sim.faults import Datagram
-from sim.injection import Injection, Reply
-from sim.requests import Asked, Script
+from sim.injection import Reply, handle
+from sim.model import Model
+from sim.requests import Asked
 from sim.simulation import Simulation
 from sim.trace import Line, Truth
 from sim.world import Plan
@@ -23,10 +24,9 @@ START_NS = 5 * NS_PER_S  # any time but zero
 EMPTY = Plan(title="nothing")
 
 
-def config(**sections: dict[str, Any]) -> Config:
-    """Return settings without noise, over the defaults."""
-    sections["sim"] = {"sonar": {"noise": 0.0}, "bumper_brake": "toward"} | sections.get("sim", {})
-    return msgspec.convert(sections, Config)
+def model(**tables: Any) -> Model:
+    """Return a model without noise of the sonars, with these parameters."""
+    return msgspec.convert({"sonar": {"noise": 0.0}, **tables}, Model)
 
 
 def room(*boxes: dict[str, Any], **plan: Any) -> Plan:
@@ -38,15 +38,18 @@ WALL_AHEAD = room(walls=[{"points": [[3.0, -5.0], [3.0, 5.0]]}])
 
 
 class SimFixture:
-    """A simulation with its script, the PC's side of the wire, and all that came of it."""
+    """A simulation, the PC's side of the wire, and all that came of it."""
 
     def __init__(
-        self, plan: Plan = EMPTY, settings: Config | None = None, script: Script | None = None
+        self,
+        plan: Plan = EMPTY,
+        vehicle: Model | None = None,
+        seed: int = 1,
+        ports: Sequence[int] = PORTS,
     ) -> None:
-        settings = settings or config()
-        self.simulation = Simulation(settings, plan, START_NS)
-        self.injection = Injection(self.simulation, script or Script(), START_NS)
-        self.framing = Framing(settings.wire.crc, settings.wire.crc_covers)
+        vehicle = vehicle or model()
+        self.simulation = Simulation(vehicle, plan, START_NS, seed, ports)
+        self.framing = Framing(vehicle.wire.crc, vehicle.wire.crc_covers)
         self.now_ns = START_NS
         self.datagrams: list[Datagram] = []
         self.records: list[Line] = []
@@ -71,19 +74,19 @@ class SimFixture:
         said = []
         while self.now_ns < end_ns:
             self.now_ns = min(end_ns, self.now_ns + NS_PER_S // 100)
-            self.injection.advance(self.now_ns)
+            self.simulation.advance(self.now_ns)
             said += self._collect()
         return said
 
     def do(self, request: Asked) -> Reply:
-        """Do something to it."""
-        reply = self.injection.handle(request, self.now_ns)
+        """Apply a request."""
+        reply = handle(self.simulation, request, self.now_ns)
         self.records += self.simulation.take_records()
         return reply
 
     @property
     def truth(self) -> Truth:
-        """Return how things are."""
+        """Return the true state."""
         return self.simulation.truth(self.now_ns)
 
     def frames(self, datagram: Datagram) -> list[Frame]:

@@ -5,13 +5,13 @@ from typing import Any
 import msgspec
 import pytest
 
+from common.freshness import NS_PER_S
 from common.motion import Twist
-from common.settings import Wire
 from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
-from sim.board import BREAK, STOP, Board
-from sim.config import Counters, Sim, Velocity
+from sim.board import BREAK, STOP, Board, Switch
+from sim.model import Model
 from sim.sonar import Ranges
 
 CLEAR: Ranges = (5000, 5000, 5000, 5000, 5000, 5000, 5000, 5000)
@@ -19,21 +19,20 @@ LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)
 FORWARD = c.MotionCommand(c.MotionKind.RUN, 500)
 BACKWARD = c.MotionCommand(c.MotionKind.RUN, -100)
 TURN = c.MotionCommand(c.MotionKind.RUN, 0, 300)
+MS = NS_PER_S // 1000
 
 
-def board(unit: str = "decidegree", feedback: str = "", **settings: Any) -> Board:
-    units = {"command_angular_unit": unit, "feedback_angular_unit": feedback or unit}
-    wire = msgspec.convert(units, Wire)
-    return Board(wire, Sim(**settings), CLEAR)
+def board(seed: int = 1, **parameters: Any) -> Board:
+    return Board(msgspec.convert(parameters, Model), CLEAR, seed)
 
 
 def near(*sonars: int, millimetres: int = 100) -> Ranges:
     return tuple(millimetres if k in sonars else 5000 for k in range(8))
 
 
-def hit(way: float = 0.5, **settings: Any) -> Board:
+def hit(way: float = 0.5, **parameters: Any) -> Board:
     """Return a board with its bumper brake on that was hit while moving that way."""
-    some = board(**settings)
+    some = board(**parameters)
     some.answer(c.BumperBrakeSet(True))
     some.sense(Twist(way), CLEAR, pressed=False)
     some.sense(Twist(), CLEAR, pressed=True)
@@ -66,12 +65,6 @@ def test_a_motion_command_is_held_without_an_answer() -> None:
     assert some.drive() == FORWARD
 
 
-def test_a_lamp_that_is_not_there_is_refused() -> None:
-    some = board(led_channels=3)
-    assert some.answer(LED) == r.LedReport(False)
-    assert some.lamps == {}
-
-
 def test_reports_tell_what_was_sensed() -> None:
     some = board()
     some.sense(Twist(0.25, math.radians(-12)), near(2), pressed=True)
@@ -80,46 +73,38 @@ def test_reports_tell_what_was_sensed() -> None:
     assert some.answer(c.BumperQuery()) == r.BumperReport(True)
 
 
-def test_the_angular_unit_is_a_setting_both_ways() -> None:
-    some = board("milliradian")
+def test_each_direction_has_its_angular_unit() -> None:
+    wire = {"command_angular_unit": "milliradian", "feedback_angular_unit": "decidegree"}
+    some = board(wire=wire)
     assert some.target(c.MotionCommand(c.MotionKind.RUN, 0, 500)) == Twist(0.0, 0.5)
-    some.sense(Twist(0.0, -0.25), CLEAR, pressed=False)
-    assert some.velocity() == r.VelocityReport(0, -250)
+    some.sense(Twist(0.0, math.radians(30)), CLEAR, pressed=False)
+    assert some.velocity() == r.VelocityReport(0, 300)
     assert board().target(TURN).angular == pytest.approx(math.radians(30))
-    mixed = board("milliradian", "decidegree")
-    assert mixed.target(c.MotionCommand(c.MotionKind.RUN, 0, 500)) == Twist(0.0, 0.5)
-    mixed.sense(Twist(0.0, math.radians(30)), CLEAR, pressed=False)
-    assert mixed.velocity() == r.VelocityReport(0, 300)
-
-
-def test_counters_add_up_with_their_signs() -> None:
-    some = board()
-    some.count(1.5, math.radians(30))
-    some.count(-0.25, math.radians(-45))
-    assert some.answer(c.DistanceQuery()) == r.DistanceReport(1250, -150)
 
 
 @pytest.mark.parametrize(
-    ("degrees", "reported"), [(179.9, 1799), (180.2, -1798), (-181.0, 1790), (725.0, 50)]
+    ("counted", "report"),
+    [
+        ([(1.5, 30), (-0.25, -45)], (1250, -150)),  # with their signs
+        ([(0.0, 179.9)], (0, 1799)),  # the heading wraps at half a turn
+        ([(0.0, 180.2)], (0, -1798)),
+        ([(0.0, 725.0)], (0, 50)),
+        ([(2147483.647, 0)], (2**31 - 1, 0)),  # the distance wraps at 32 bits
+        ([(2147483.648, 0)], (-(2**31), 0)),
+        ([(-2147483.649, 0)], (2**31 - 1, 0)),
+    ],
 )
-def test_the_heading_wraps_at_half_a_turn(degrees: float, reported: int) -> None:
+def test_counters_add_up_and_wrap(
+    counted: list[tuple[float, float]], report: tuple[int, int]
+) -> None:
     some = board()
-    some.count(0.0, math.radians(degrees))
-    assert some.answer(c.DistanceQuery()) == r.DistanceReport(0, reported)
-
-
-@pytest.mark.parametrize(
-    ("metres", "reported"),
-    [(2147483.647, 2**31 - 1), (2147483.648, -(2**31)), (-2147483.649, 2**31 - 1)],
-)
-def test_the_distance_wraps_at_32_bits(metres: float, reported: int) -> None:
-    some = board()
-    some.count(metres, 0.0)
-    assert some.answer(c.DistanceQuery()) == r.DistanceReport(reported, 0)
+    for metres, degrees in counted:
+        some.count(metres, math.radians(degrees))
+    assert some.answer(c.DistanceQuery()) == r.DistanceReport(*report)
 
 
 def test_wheels_of_another_size_count_another_distance_and_turn() -> None:
-    some = board(counters=Counters(scale=0.01, turn_scale=-0.02, pull=0.05))
+    some = board(counters={"scale": 0.01, "turn_scale": -0.02, "pull": 0.05})
     some.count(2.0, math.radians(90))
     some.count(-1.0, 0.0)
     heading = round(math.degrees(math.radians(90) * 0.98 + 0.05) * 10)
@@ -129,7 +114,7 @@ def test_wheels_of_another_size_count_another_distance_and_turn() -> None:
 def test_the_slip_of_wheels_grows_with_the_root_of_the_way() -> None:
     found = []
     for seed in range(200):
-        some = board(seed=seed, counters=Counters(noise=0.1, turn_noise=0.1))
+        some = board(seed, counters={"noise": 0.1, "turn_noise": 0.1})
         for _ in range(100):
             some.count(0.04, 0.01)
         report = some.answer(c.DistanceQuery())
@@ -142,13 +127,12 @@ def test_the_slip_of_wheels_grows_with_the_root_of_the_way() -> None:
 
 def test_power_on_forgets_all() -> None:
     some = board()
-    for frame in (FORWARD, LED, c.BumperBrakeSet(True), c.UltrasonicBrakeSet(True)):
+    for frame in (FORWARD, c.BumperBrakeSet(True), c.UltrasonicBrakeSet(True)):
         some.answer(frame)
     some.count(1.0, 1.0)
     some.driver_bits[Side.RIGHT] = 3
     some.power_on()
     assert some.drive() == STOP
-    assert some.lamps == {}
     assert (some.bumper_brake, some.ultrasonic_brake) == (False, False)
     assert some.answer(c.DistanceQuery()) == r.DistanceReport(0, 0)
     assert some.driver(Side.RIGHT) == r.DriverReport(Side.RIGHT, 0)
@@ -244,7 +228,8 @@ def test_a_bumper_brake_may_refuse_all() -> None:
 
 
 def test_velocities_with_noise_and_bias() -> None:
-    some = board(velocity=Velocity(noise=0.02, angular_noise=0.03, bias=0.01, angular_bias=-0.02))
+    error = {"noise": 0.02, "angular_noise": 0.03, "bias": 0.01, "angular_bias": -0.02}
+    some = board(velocity=error)
     some.sense(Twist(0.5, 0.1), CLEAR, pressed=False)
     reports = [some.velocity() for _ in range(2000)]
     linear = [report.linear_mmps / 1000 for report in reports]
@@ -253,3 +238,25 @@ def test_velocities_with_noise_and_bias() -> None:
     assert statistics.stdev(linear) == pytest.approx(0.02, abs=0.002)
     assert statistics.mean(angular) == pytest.approx(0.08, abs=0.003)
     assert statistics.stdev(angular) == pytest.approx(0.03, abs=0.003)
+
+
+def test_one_that_does_not_bounce_is_what_touches_it() -> None:
+    switch = Switch(0.0, 1)
+    for now_ms, touched in ((0, False), (10, True), (10, True), (20, True), (30, False)):
+        switch.touch(touched, now_ms * MS)
+        assert switch.closed is touched
+
+
+def test_after_each_change_it_opens_and_closes_for_its_time() -> None:
+    switch = Switch(0.1, 1)
+    for begin_ms, touched in ((0, True), (1000, False)):
+        switch.touch(touched, begin_ms * MS)
+        assert switch.closed is touched
+        seen = []
+        for after_ms in range(1, 100):
+            switch.touch(touched, (begin_ms + after_ms) * MS)
+            seen.append(switch.closed)
+        assert 30 < sum(seen) < 70
+        for after_ms in (100, 500):
+            switch.touch(touched, (begin_ms + after_ms) * MS)
+            assert switch.closed is touched

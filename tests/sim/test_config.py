@@ -3,21 +3,36 @@ from pathlib import Path
 
 import pytest
 
+from cli.settings import Everything
 from common.config import DEFAULT_FILE, Sources, load
 from common.errors import ConfigError
-from common.settings import Vehicle
-from sim.config import WORLDS, Config, Sim, load_plan, load_script
+from common.settings import Vehicle, Wire
+from common.wire import commands as c
+from sim.config import (
+    IDEAL,
+    WORLDS,
+    Config,
+    Sim,
+    known_profiles,
+    load_model,
+    load_plan,
+    profile_list,
+    read_profile,
+)
 from sim.geometry import Pose, Rectangle
-from sim.requests import Freeze
+from sim.model import Model
 from sim.world import World
+from tests.sim.sim_fixture import SimFixture
 
 VEHICLE = Vehicle()
 BODY = Rectangle(VEHICLE.length / 2, VEHICLE.width / 2)
+PERIOD_S, REQUESTS = 0.05, 80
+STRAIGHT_M = 0.4 * PERIOD_S * REQUESTS  # without any acceleration
 TURNING = 0.66  # m around the middle, what the body sweeps on the spot
 
 
-def written(folder: Path, text: str) -> str:
-    file = folder / "file.toml"
+def written(folder: Path, text: str, name: str = "file") -> str:
+    file = folder / f"{name}.toml"
     file.write_text(text, encoding="utf-8")
     return str(file)
 
@@ -81,16 +96,75 @@ def test_an_unknown_world_is_refused_with_the_known_ones() -> None:
         load_plan("moon", VEHICLE)
 
 
-def test_a_script_is_read(tmp_path: Path) -> None:
-    text = '[[steps]]\nat = 2\nrequest = { do = "freeze", seconds = 0.5 }'
-    (step,) = load_script(Path(written(tmp_path, text))).steps
-    assert (step.at, step.request) == (2.0, Freeze(seconds=0.5))
-
-
-def test_a_missing_script_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"none\.toml: cannot be read"):
-        load_script(tmp_path / "none.toml")
-
-
 def test_the_shipped_settings_are_the_defaults() -> None:
     assert load(Config, Sources((DEFAULT_FILE,), environ={})).config.sim == Sim()
+
+
+# --- profiles -----------------------------------------------------------------------------------
+
+
+def profile(folder: Path, text: str) -> str:
+    return written(folder, f'title = "a"\nsource = "b"\n{text}', "mine")
+
+
+@pytest.mark.parametrize("name", known_profiles())
+def test_each_profile_changes_the_vehicle_which_still_drives_and_brakes(name: str) -> None:
+    vehicle = load_model([name])
+    assert vehicle != IDEAL
+    shown = read_profile(name)
+    assert len(shown.title) < 90
+    assert len(shown.source) > 60
+    load(Everything, Sources(environ={}, sets=shown.stack.split()))
+    sim = SimFixture(vehicle=vehicle)
+    for _ in range(REQUESTS):
+        sim.run(0.4)
+        sim.say(c.BumperQuery(), c.DistanceQuery(), c.UltrasonicQuery())
+        sim.after(PERIOD_S)
+    assert 0.8 * STRAIGHT_M < sim.truth.distance < STRAIGHT_M
+    for _ in range(10):  # one of them may be lost
+        sim.say(c.MotionCommand(c.MotionKind.BREAK))
+        sim.after(0.1)
+    assert (sim.truth.linear, sim.truth.angular) == (0.0, 0.0)
+
+
+def test_several_profiles_add_up_over_the_settings() -> None:
+    given = Model(wire=Wire(crc="xmodem"), vehicle=Vehicle(length=2.0))
+    vehicle = load_model(["short-sonar", "centimetre-sonar", "unlike-units"], given)
+    assert (vehicle.sonar.saturation, vehicle.sonar.quantum) == (3.0, 0.01)
+    assert (vehicle.wire.crc, vehicle.wire.command_angular_unit) == ("xmodem", "milliradian")
+    assert vehicle.vehicle == given.vehicle
+    assert load_model([], given) == given
+
+
+def test_two_profiles_that_contradict_are_refused(tmp_path: Path) -> None:
+    steep = profile(tmp_path, "[drive]\nslope = 0.2")
+    with pytest.raises(ConfigError, match=r"mine.*: drive\.slope = 0\.2, but profile slope"):
+        load_model(["slope", steep])
+    assert load_model(["slope", "slope"]) == load_model(["slope"])
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("[drive]\nslop = 0.1", r"profile .*mine\.toml: drive\.slop: unknown; did you"),
+        ("[drive]\ncoast = 0", r"mine\.toml: drive\.coast = 0: Expected .*; allowed is 0\.01\.\."),
+        ("[safety]\nmargin = 0.1", r"mine\.toml: safety: unknown"),
+        ("drive = 1", r"profile .*mine\.toml: drive = 1: Expected `object`"),
+        ("stack = 1", r"mine\.toml: Expected `str`, got `int` - at `\$\.stack`"),
+        ("wire = {crc = 'x'}", r"profile .*mine\.toml: wire: "),
+    ],
+)
+def test_a_wrong_profile_is_refused_with_its_name(tmp_path: Path, text: str, error: str) -> None:
+    with pytest.raises(ConfigError, match=error):
+        load_model([profile(tmp_path, text)])
+
+
+def test_an_unknown_profile_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ConfigError, match=r"--profile moon: no such file.*short-sonar, slope"):
+        load_model(["moon"])
+
+
+def test_the_list_has_each_title_and_what_the_services_need() -> None:
+    text = profile_list()
+    assert all(read_profile(name).title in text for name in known_profiles())
+    assert "stack: --set wire.command_angular_unit=milliradian" in text

@@ -10,7 +10,7 @@ from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame
 from sim import trace as t
-from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, config, room
+from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, model, room
 
 STEP_AHEAD = room({"name": "step", "x": 2.0, "y": 0.0, "length": 0.4, "width": 0.4, "low": True})
 
@@ -21,18 +21,6 @@ def test_run_is_held_for_ever() -> None:
     sim.after(60.0)
     assert sim.truth.linear == 0.5
     assert sim.truth.x == pytest.approx(0.5 * 60, abs=0.2)
-
-
-def test_stop_ramps_and_break_does_not() -> None:
-    sim = SimFixture()
-    sim.run(0.8)
-    sim.after(2.0)
-    sim.stop()
-    sim.after(0.5)
-    assert sim.truth.linear == pytest.approx(0.4, abs=0.02)
-    sim.say(c.MotionCommand(c.MotionKind.BREAK))
-    sim.after(0.01)
-    assert sim.truth.linear == 0.0
 
 
 def test_counters_are_what_was_really_driven() -> None:
@@ -144,7 +132,7 @@ def test_it_never_penetrates_and_is_always_finite(
 
 
 def test_a_body_rebounds_from_a_wall_and_is_driven_at_it_again() -> None:
-    sim = SimFixture(WALL_AHEAD, config(sim={"body": {"rebound": 0.3}}))
+    sim = SimFixture(WALL_AHEAD, model(body={"rebound": 0.3}))
     sim.run(0.5)
     sim.after(6.0)
     speeds = [line.linear for line in sim.of(t.Truth)]

@@ -1,12 +1,13 @@
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import pytest
 
 from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
-from sim.requests import Port, Wire
+from sim.model import Line
+from sim.requests import Wire
 
 MANY = [Datagram(bytes([k % 256, k // 256, 7]), 4002) for k in range(1000)]
 
@@ -14,7 +15,7 @@ MANY = [Datagram(bytes([k % 256, k // 256, 7]), 4002) for k in range(1000)]
 def through(datagrams: Sequence[Datagram] = MANY, seed: int = 1, **faults: Any) -> list[Datagram]:
     """Send at 50 Hz and return all in the order of arrival."""
     cable = Cable(seed)
-    cable.faults = Wire(**faults)
+    cable.faults = Line(**faults)
     arrived, now_ns = [], 0
     for datagram in datagrams:
         cable.put(datagram, now_ns)
@@ -55,20 +56,9 @@ def test_an_empty_datagram_has_no_bits_to_flip() -> None:
     assert through([Datagram(b"", 4002)], corrupt=1.0) == [Datagram(b"", 4002)]
 
 
-def test_joining_puts_one_before_the_next_of_the_same_port() -> None:
-    cable = Cable(1)
-    cable.faults = Wire(join=1.0)
-    cable.put(Datagram(b"a", 4002), 0)
-    cable.put(Datagram(b"b", 4001), 0)
-    cable.faults = Wire()
-    cable.put(Datagram(b"c", 4002), 0)
-    cable.put(Datagram(b"d", 4002), 0)
-    assert [d.payload for d in cable.take(0)] == [b"ac", b"d"]
-
-
 @pytest.mark.parametrize(("port", "hit"), [("first", 4002), ("second", 4001)])
-def test_faults_may_be_those_of_one_port(port: Port, hit: int) -> None:
-    cable = Cable(1, Wire(port=port, drop=1.0), (4002, 4001))
+def test_faults_may_be_those_of_one_port(port: Literal["first", "second"], hit: int) -> None:
+    cable = Cable(1, Line(port=port, drop=1.0), (4002, 4001))
     for each in (4002, 4001):
         cable.put(Datagram(b"a", each), 0)
     assert [d.port for d in cable.take(0)] == [each for each in (4002, 4001) if each != hit]
@@ -80,16 +70,17 @@ def test_foreign_ones_are_marked() -> None:
 
 @pytest.mark.parametrize("at_ns", [0, NS_PER_S // 2 - 1])
 def test_a_delayed_one_is_not_there_before_its_time(at_ns: int) -> None:
-    cable = Cable(1)
-    cable.faults = Wire(delay=0.5)
+    cable = Cable(1, Line(delay=0.5))
     cable.put(MANY[0], 0)
+    assert cable.due_ns == NS_PER_S // 2
     assert cable.take(at_ns) == []
     assert cable.take(NS_PER_S // 2) == [MANY[0]]
+    assert Cable(1).due_ns is None
 
 
 def test_jitter_is_at_most_that_much_more() -> None:
     cable = Cable(1)
-    cable.faults = Wire(delay=0.1, jitter=0.1)
+    cable.faults = Line(delay=0.1, jitter=0.1)
     for datagram in MANY:
         cable.put(datagram, 0)
     assert cable.take(NS_PER_S // 10 - 1) == []
@@ -100,7 +91,7 @@ def test_jitter_is_at_most_that_much_more() -> None:
 
 def test_a_thin_cable_lets_one_after_the_other_through() -> None:
     cable = Cable(1)
-    cable.faults = Wire(rate=8e3, delay=1.0)  # a byte in a millisecond
+    cable.faults = Line(rate=8e3, delay=1.0)  # a byte in a millisecond
     for datagram in MANY[:2]:
         cable.put(datagram, 0)
     assert cable.take(1_003_000_000 - 1) == []
@@ -112,7 +103,7 @@ def test_a_thin_cable_lets_one_after_the_other_through() -> None:
 
 def test_what_the_queue_of_a_thin_cable_does_not_hold_is_lost() -> None:
     cable = Cable(1)
-    cable.faults = Wire(rate=8e6, queue=2048)
+    cable.faults = Line(rate=8e6, queue=2048)
     big = [Datagram(bytes([k]) * 1000, 4002) for k in range(4)]
     for datagram in big[:3]:
         cable.put(datagram, 0)
@@ -122,7 +113,7 @@ def test_what_the_queue_of_a_thin_cable_does_not_hold_is_lost() -> None:
 
 def test_the_same_seed_does_the_same() -> None:
     faults: dict[str, Any] = {
-        "drop": 0.1, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.1, "join": 0.1, "jitter": 0.05,
+        "drop": 0.1, "duplicate": 0.1, "reorder": 0.1, "corrupt": 0.1, "jitter": 0.05,
     }  # fmt: skip
     assert through(seed=7, **faults) == through(seed=7, **faults)
     assert through(seed=7, **faults) != through(seed=8, **faults)
@@ -132,14 +123,3 @@ def test_the_same_seed_does_the_same() -> None:
 def test_wrong_chances_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(msgspec.ValidationError):
         msgspec.convert({"do": "wire", **wrong}, Wire)
-
-
-def test_it_tells_when_the_next_one_arrives() -> None:
-    assert Cable(1).due_ns is None
-    cable = Cable(1)
-    cable.faults = Wire(delay=0.2)
-    cable.put(Datagram(b"x", 4002), 5)
-    cable.put(Datagram(b"y", 4002), 9)
-    assert cable.due_ns == 5 + NS_PER_S // 5
-    cable.take(5 + NS_PER_S // 5)
-    assert cable.due_ns == 9 + NS_PER_S // 5

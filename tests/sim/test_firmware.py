@@ -2,28 +2,26 @@
 
 import pytest
 
+from common.motion import Command
 from common.wire import commands as c
 from common.wire import reports as r
-from sim.requests import Firmware
-from tests.sim.sim_fixture import SimFixture, config
+from sim import requests as q
+from sim.model import Where
+from tests.sim.sim_fixture import SimFixture, model
 
 
 def sim_with(**firmware: object) -> SimFixture:
-    return SimFixture(settings=config(sim={"firmware": firmware}))
+    return SimFixture(vehicle=model(firmware=firmware))
 
 
-def test_what_the_settings_say_holds_from_power_on() -> None:
+def test_a_request_replaces_the_model_s_firmware() -> None:
     sim = sim_with(answers="second", echoes=False)
     assert sim.say(c.BumperBrakeSet(True)) == []
     sim.say(c.BumperQuery())
     assert sim.datagrams[-1].port == 4001
-
-
-def test_a_request_changes_what_it_names_and_keeps_the_rest() -> None:
-    sim = sim_with(answers="second", watchdog=0.5)
-    sim.do(Firmware())
-    assert sim.simulation.output.settings.answers == "asked"
-    assert sim.simulation.output.settings.watchdog == 0.5
+    sim.do(q.Firmware())
+    sim.say(c.BumperQuery())
+    assert sim.datagrams[-1].port == 4002
 
 
 def test_a_split_frame_comes_in_two_datagrams() -> None:
@@ -65,3 +63,56 @@ def test_a_watchdog_stops_a_vehicle_that_gets_no_commands() -> None:
     sim.run(0.5)
     sim.after(0.4)
     assert sim.truth.linear > 0.4
+
+
+@pytest.mark.parametrize(
+    ("where", "ports"),
+    [("asked", [4001]), ("first", [4002]), ("second", [4001]), ("both", [4002, 4001])],
+)
+def test_answers_go_where_the_firmware_sends_them(where: Where, ports: list[int]) -> None:
+    sim = SimFixture()
+    sim.do(q.Firmware(answers=where))
+    before = len(sim.datagrams)
+    sim.say(c.BumperQuery(), port=4001)
+    assert [datagram.port for datagram in sim.datagrams[before:]] == ports
+
+
+def test_hits_may_be_reported_on_the_other_port() -> None:
+    sim = SimFixture()
+    sim.do(q.Firmware(hits="second"))
+    for pressed, port in ((False, 4002), (True, 4001)):
+        sim.do(q.Bumper(pressed=pressed))
+        before = len(sim.datagrams)
+        assert sim.say(c.BumperQuery()) == [r.BumperReport(pressed)]
+        assert [datagram.port for datagram in sim.datagrams[before:]] == [port]
+
+
+def test_a_firmware_without_echoes_sets_its_brakes_and_says_nothing() -> None:
+    sim = SimFixture()
+    sim.do(q.Firmware(echoes=False))
+    assert sim.say(c.BumperBrakeSet(True), c.UltrasonicBrakeSet(True)) == []
+    assert (sim.truth.bumper_brake, sim.truth.ultrasonic_brake) == (True, True)
+
+
+def test_a_board_that_ignores_stop_drives_on_and_obeys_break() -> None:
+    sim = SimFixture()
+    sim.run(0.3)
+    sim.after(1.0)
+    sim.do(q.Firmware(ignores=(Command.STOP,)))
+    sim.stop()
+    sim.after(1.0)
+    assert sim.truth.linear == pytest.approx(0.3)
+    assert sim.truth.command.kind == "stop"
+    sim.say(c.MotionCommand(c.MotionKind.BREAK))
+    sim.after(0.1)
+    assert sim.truth.linear == 0.0
+
+
+def test_every_third_report_of_a_kind_is_lost() -> None:
+    sim = SimFixture()
+    sim.do(q.Mute(reports=("bumper",), every=3))
+    counts = [len(sim.say(c.BumperQuery())) for _ in range(9)]
+    assert counts == [1, 1, 0] * 3
+    assert [len(sim.say(c.DistanceQuery())) for _ in range(3)] == [1, 1, 1]
+    sim.do(q.Mute())
+    assert [len(sim.say(c.BumperQuery())) for _ in range(3)] == [1, 1, 1]

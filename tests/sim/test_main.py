@@ -21,10 +21,9 @@ from common.wire.commands import BumperQuery, MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
 from sim.__main__ import main
-from sim.requests import AddBox, Bumper, Place, PowerCycle, Wire
+from sim.requests import Bumper, Place, PowerCycle, Wire
 from sim.sockets import Control
 from sim.trace import read
-from sim.world import Box
 from tests.common.rights import needs_right
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -110,14 +109,6 @@ def test_a_process_streams_drives_and_ends_on_sigterm(bench: Bench) -> None:
     assert bench.lines("truth")[-1]["x"] > 0.0
 
 
-def test_a_process_ends_on_sigint(bench: Bench) -> None:
-    with process(bench) as running:
-        running.send_signal(signal.SIGINT)
-        assert running.wait(PATIENCE_S) == 0
-        assert running.stderr is not None
-        assert b"Traceback" not in running.stderr.read()
-
-
 @needs_right
 @pytest.mark.parametrize(("asked", "priority"), [("true", realtime.BOARD), ("false", 0)])
 def test_nobody_on_board_keeps_it_waiting(bench: Bench, asked: str, priority: int) -> None:
@@ -166,7 +157,6 @@ def disturb(bench: Bench, control: Control) -> None:
     bench.send(BumperQuery())
     wait_until(lambda: BumperReport(True) in bench.received(), "the same from elsewhere")
     control.do(Wire())
-    control.do(AddBox(box=Box(name="crate", x=0.0, y=-1.0, length=0.4, width=0.4)))
     control.do(Place(x=0.0, y=0.2))
     control.do(PowerCycle(seconds=0.1))
     wait_until(lambda: len(bench.lines("power")) == 2, "power again")
@@ -174,16 +164,12 @@ def disturb(bench: Bench, control: Control) -> None:
 
 @pytest.mark.parametrize("command", ["sim", "t2 sim"])
 def test_it_is_disturbed_while_it_runs(bench: Bench, command: str) -> None:
-    bench.trace.with_name("faults.toml").write_text(
-        '[[steps]]\nat = 0.0\nrequest = { do = "sonar", name = "rear", fault = true }'
-    )
-    words = [*bench.arguments, "--faults", str(bench.trace.with_name("faults.toml"))]
+    words = bench.arguments
     with meanwhile(bench) as errors:
         assert (main(words) if command == "sim" else t2(["sim", *words])) == 0
     assert errors == []
     done = [line["request"]["do"] for line in bench.lines("fault")]
-    done.remove("sonar")  # the script's; by hand may be as early
-    assert done == ["bumper", "wire", "wire", "add_box", "place", "power_cycle"]
+    assert done == ["bumper", "wire", "wire", "place", "power_cycle"]
     assert [line["pressed"] for line in bench.lines("bumper_sent")] == [True]
     assert [line["on"] for line in bench.lines("power")] == [False, True]
 
@@ -210,9 +196,8 @@ def test_a_taken_port_ends_it_with_a_clear_sentence(
     [
         (["--world", "moon"], "sim.world = 'moon'"),
         (["--profile", "moon"], "--profile moon: no such file"),
-        (["--set", "sim.drive.coast=0"], "sim.drive.coast = 0"),
+        (["--set", "sim.drive.coast=0"], "sim.drive: is no setting any more"),
         (["--set", "sim.sed=1"], "did you mean 'seed'"),
-        (["--faults", "nowhere.toml"], "nowhere.toml: cannot be read"),
         (["--trace", "nowhere/trace.jsonl"], "--trace nowhere/trace.jsonl: cannot be written"),
     ],
 )

@@ -5,9 +5,9 @@ from common.wire import commands as c
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
 from sim import trace as t
-from sim.requests import Driver, Flood, Freeze, Mute, PowerCycle, Sonar
+from sim.requests import Driver, Flood, Freeze, Mute, PowerCycle
 from sim.simulation import CATCH_UP_NS
-from tests.sim.sim_fixture import EMPTY, PORTS, START_NS, WALL_AHEAD, SimFixture, config
+from tests.sim.sim_fixture import PORTS, START_NS, WALL_AHEAD, SimFixture, model
 
 LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)
 
@@ -108,7 +108,7 @@ def test_a_power_cycle_stops_it_and_clears_counters_and_switches() -> None:
 def test_a_late_tick_is_caught_up() -> None:
     sim = SimFixture()
     sim.run(1.0)
-    sim.injection.advance(START_NS + CATCH_UP_NS)
+    sim.simulation.advance(START_NS + CATCH_UP_NS)
     assert sim.simulation.now_ns == START_NS + CATCH_UP_NS
     assert sim.simulation.counters["holes"] == 0
 
@@ -116,45 +116,18 @@ def test_a_late_tick_is_caught_up() -> None:
 def test_a_hole_is_left_out() -> None:
     sim = SimFixture()
     sim.run(1.0)
-    sim.injection.advance(START_NS + 60 * NS_PER_S)
+    sim.simulation.advance(START_NS + 60 * NS_PER_S)
     assert sim.simulation.now_ns == START_NS + 60 * NS_PER_S
     assert sim.simulation.counters["holes"] == 1
     assert sim.truth.x < 1.0
 
 
-def test_the_angular_unit_of_the_wire_is_obeyed() -> None:
-    sim = SimFixture(
-        EMPTY,
-        config(
-            wire={"command_angular_unit": "milliradian", "feedback_angular_unit": "milliradian"}
-        ),
-    )
-    sim.say(c.MotionCommand(c.MotionKind.RUN, 0, 500))
-    said = sim.after(1.0)
-    assert sim.truth.angular == pytest.approx(0.5)
-    assert said[-1] == r.VelocityReport(0, 500)
-
-
 def test_the_crc_of_the_wire_is_obeyed() -> None:
-    sim = SimFixture(EMPTY, config(wire={"crc": "xmodem", "crc_covers": "header_and_payload"}))
+    sim = SimFixture(vehicle=model(wire={"crc": "xmodem", "crc_covers": "header_and_payload"}))
     assert sim.say(c.BumperQuery()) == [r.BumperReport(False)]
     plain = SimFixture().framing.pack(c.BumperQuery())
     sim.simulation.receive(plain, 4002, sim.now_ns)
     assert sim.simulation.counters["rejected_bad_crc"] == 1
-
-
-def test_a_stuck_sonar_reports_its_last_range() -> None:
-    sim = SimFixture(WALL_AHEAD)
-    sim.after(0.1)
-    before = sim.say(c.UltrasonicQuery())
-    sim.do(Sonar(name="front", stuck=True))
-    sim.run(0.5)
-    sim.after(1.0)
-    after = sim.say(c.UltrasonicQuery())
-    assert isinstance(before[0], r.UltrasonicReport)
-    assert isinstance(after[0], r.UltrasonicReport)
-    assert after[0].ranges_mm[2] == before[0].ranges_mm[2]
-    assert after[0].ranges_mm[1] < before[0].ranges_mm[1]
 
 
 def test_what_is_muted_is_not_said_and_the_rest_is() -> None:

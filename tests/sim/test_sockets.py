@@ -1,15 +1,20 @@
 import socket
-from collections.abc import Iterator
-from contextlib import closing
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 
+import msgspec
 import pytest
 
-from common.errors import LinkError
+from common.errors import LinkError, MessageError
 from common.settings import Board
 from sim.faults import Datagram
-from sim.sockets import BURST, BoardSocket, bound, drain
+from sim.injection import Reply
+from sim.requests import Bumper, Place
+from sim.sockets import BURST, HOST, BoardSocket, Control, ControlSocket, bound, drain
+from tests.sim.sim_fixture import WALL_AHEAD, SimFixture
 from verification.harness.ports import free_port
-from verification.harness.waiting import wait_until
+from verification.harness.waiting import PATIENCE_S, wait_until
 
 
 @pytest.fixture
@@ -63,15 +68,6 @@ def test_it_sends_from_its_own_address_or_from_a_foreign_one(pc: socket.socket) 
     assert sender[0] not in ("127.0.0.1", "0.0.0.0")
 
 
-@pytest.mark.parametrize("address", ["127.0.0.2", "0.0.0.0"])
-def test_the_foreign_address_is_always_another(address: str) -> None:
-    port = free_port(socket.SOCK_DGRAM)
-    board = BoardSocket(Board(address=address, listen_address=address, port=port))
-    with closing(board):
-        board.send(Datagram(b"nobody listens", 4001, foreign=True))
-        assert board._foreign.getsockname()[:2] != board.sock.getsockname()[:2]
-
-
 def test_what_cannot_be_sent_is_counted(pc: socket.socket) -> None:
     board, port = board_for(pc)
     with closing(board):
@@ -79,15 +75,68 @@ def test_what_cannot_be_sent_is_counted(pc: socket.socket) -> None:
     assert board.unsent == 1
 
 
-def test_a_taken_port_is_named_with_its_setting(pc: socket.socket) -> None:
-    port = pc.getsockname()[1]
-    settings = Board(port=port, listen_ports=(free_port(socket.SOCK_DGRAM),))
-    with pytest.raises(LinkError, match=rf"board.port: cannot listen on UDP port {port} of 127"):
-        BoardSocket(settings)
-
-
 def test_a_flood_is_read_in_bursts(pc: socket.socket) -> None:
     with bound("127.0.0.1", 0, "test") as sender:
         for _ in range(BURST + 10):
             sender.sendto(b"x", pc.getsockname())
         assert len(list(drain(pc))) <= BURST
+
+
+# --- the control socket -------------------------------------------------------------------------
+
+
+@contextmanager
+def served(sim: SimFixture) -> Iterator[int]:
+    """Serve a sim's control socket in a thread, and name its port."""
+    port = free_port(socket.SOCK_DGRAM)
+    control = ControlSocket(port, sim.simulation)
+    control.sock.settimeout(0.05)  # waits a little instead of turning at full speed
+    ended = threading.Event()
+    with closing(control):
+        thread = threading.Thread(target=_serve, args=(control, sim, ended.is_set))
+        thread.start()
+        try:
+            yield port
+        finally:
+            ended.set()
+            thread.join(PATIENCE_S)
+
+
+def _serve(control: ControlSocket, sim: SimFixture, ended: Callable[[], bool]) -> None:
+    while not ended():
+        try:
+            control.serve(sim.now_ns)
+        except TimeoutError:
+            continue
+
+
+def test_a_client_does_and_asks() -> None:
+    with served(SimFixture()) as port:
+        control = Control(port, PATIENCE_S)
+        assert not control.truth().pressed
+        assert control.do(Bumper(pressed=True)) == Reply(ok=True)
+        assert control.truth().pressed
+
+
+def test_a_client_is_told_why_it_is_refused() -> None:
+    with (
+        served(SimFixture(WALL_AHEAD)) as port,
+        pytest.raises(MessageError, match="an obstacle is at x 3, y 0"),
+    ):
+        Control(port, PATIENCE_S).do(Place(x=3.0, y=0.0))
+
+
+@pytest.mark.parametrize("text", [b"", b"\xff", b"{", b'{"do": "dance"}', b"[" * 60_000])
+def test_what_is_no_request_is_answered_with_the_reason(text: bytes) -> None:
+    with served(SimFixture()) as port, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.settimeout(PATIENCE_S)
+        sock.sendto(text, (HOST, port))
+        reply = msgspec.json.decode(sock.recv(4096), type=Reply)
+    assert not reply.ok
+    assert reply.error
+
+
+def test_nobody_there_is_a_link_error() -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    with pytest.raises(LinkError, match="control socket"):
+        Control(port, timeout_s=0.2).truth()

@@ -1,14 +1,15 @@
 import math
 import statistics
+from typing import Any
 
 import pytest
 
 from common.messages import SONAR_NAMES
 from common.settings import Vehicle
-from sim.config import Sonar as Settings
+from sim import model
 from sim.geometry import Pose
 from sim.requests import Sonar, SonarName
-from sim.sonar import Sonars
+from sim.sonar import Echoes, Sonars
 from sim.world import World
 from tests.sim.sim_fixture import room
 
@@ -16,10 +17,13 @@ VEHICLE = Vehicle(length=1.0, width=0.6, sonar_min=0.05, sonar_max=4.0)
 # x from -2 to 3, y from -1 to 2: every side at another distance.
 ROOM = World.of(room(walls=[{"points": [[-2, -1], [3, -1], [3, 2], [-2, 2], [-2, -1]]}]))
 HERE = Pose(0.0, 0.0, 0.0)
+FAR = [4.0] * 8
+WALL_LEFT = [0.6, *[4.0] * 7]  # the manual's order: left, front left, front, ...
+LEFT, FRONT_LEFT, FRONT, REAR_LEFT = 0, 1, 2, 7
 
 
 def sonars(cone: float = 0.0, noise: float = 0.0, seed: int = 1) -> Sonars:
-    return Sonars(VEHICLE, Settings(cone=cone, noise=noise), seed)
+    return Sonars(VEHICLE, model.Sonar(cone=cone, noise=noise), seed)
 
 
 def measured(sonars: Sonars, name: str, pose: Pose = HERE, world: World = ROOM) -> int:
@@ -43,11 +47,6 @@ def test_each_looks_its_own_way(name: str, expected: float) -> None:
     assert measured(sonars(), name) == round(expected * 1000)
 
 
-def test_they_turn_with_the_vehicle() -> None:
-    assert measured(sonars(), "front", Pose(0.0, 0.0, math.pi / 2)) == 1500
-    assert measured(sonars(), "left", Pose(0.0, 0.0, math.pi / 2)) == 1700
-
-
 def test_a_cone_sees_what_a_ray_would_miss() -> None:
     post = {"name": "post", "x": 2.5, "y": 0.4, "length": 0.1, "width": 0.1}
     world = World.of(room(post))
@@ -65,10 +64,6 @@ def test_a_cone_that_meets_a_flat_wall_measures_its_nearest_point() -> None:
 def test_the_ends_of_the_range(gap: float, expected: int) -> None:
     wall = room(walls=[{"points": [[0.5 + gap, -9], [0.5 + gap, 9]]}])
     assert measured(sonars(), "front", world=World.of(wall)) == expected
-
-
-def test_nothing_at_all_is_the_greatest_range() -> None:
-    assert set(sonars().measure(World.of(room()), HERE)) == {4000}
 
 
 def test_low_boxes_are_not_seen() -> None:
@@ -128,10 +123,58 @@ def test_requests_name_the_sonars_as_messages_do() -> None:
 @pytest.mark.parametrize(("gap", "expected"), [(1.234, 1230), (1.236, 1240), (9.0, 3000)])
 def test_coarse_ones_that_saturate_early(gap: float, expected: int) -> None:
     wall = room(walls=[{"points": [[0.5 + gap, -9], [0.5 + gap, 9]]}])
-    some = Sonars(VEHICLE, Settings(noise=0.0, cone=0.0, quantum=0.01, saturation=3.0), 1)
+    some = Sonars(VEHICLE, model.Sonar(noise=0.0, cone=0.0, quantum=0.01, saturation=3.0), 1)
     assert measured(some, "front", world=World.of(wall)) == expected
 
 
 def test_false_echoes_are_reported() -> None:
-    some = Sonars(VEHICLE, Settings(noise=0.0, floor_chance=1.0, floor_range=1.5), 1)
+    some = Sonars(VEHICLE, model.Sonar(noise=0.0, floor_chance=1.0, floor_range=1.5), 1)
     assert measured(some, "front") == 1500
+
+
+def rounds(
+    distances: list[float], count: int = 1000, seed: int = 1, **what: Any
+) -> list[list[float]]:
+    echoes = Echoes(model.Sonar(**what), seed)
+    return [echoes.taken(distances) for _ in range(count)]
+
+
+def share(found: list[list[float]], index: int, value: float) -> float:
+    return sum(each[index] == value for each in found) / len(found)
+
+
+def test_kind_ones_take_the_first_echo() -> None:
+    assert rounds(WALL_LEFT) == [WALL_LEFT] * 1000
+
+
+def test_the_floor_echoes_at_its_range() -> None:
+    found = rounds(FAR, floor_chance=0.1, floor_range=1.4)
+    assert {value for each in found for value in each} == {4.0, 1.4}
+    assert share(found, FRONT, 1.4) == pytest.approx(0.1, abs=0.03)
+
+
+def test_a_neighbour_s_echo_is_taken_half_of_the_times_if_one_of_two_is_nearer() -> None:
+    found = rounds(WALL_LEFT, cross_talk=0.2)
+    assert share(found, FRONT_LEFT, 0.6) == pytest.approx(0.1, abs=0.03)
+    assert share(found, REAR_LEFT, 0.6) == pytest.approx(0.1, abs=0.03)  # the ring is closed
+    assert share(found, FRONT, 4.0) == 1.0  # no neighbour of it is near
+    assert share(found, LEFT, 0.6) == 1.0
+
+
+def test_an_echo_vanishes() -> None:
+    found = rounds(FAR, vanish=0.3)
+    assert share(found, FRONT, math.inf) == pytest.approx(0.3, abs=0.05)
+
+
+def test_a_vanished_echo_stays_lost_for_its_readings() -> None:
+    found = [each[FRONT] == math.inf for each in rounds(FAR, vanish=0.01, vanish_readings=20)]
+    text = "".join("x" if lost else "." for lost in found).rstrip("x").lstrip("x")
+    runs = [len(run) for run in text.split(".") if run]
+    assert len(runs) > 3
+    assert all(run % 20 == 0 for run in runs)  # two of them may follow each other
+
+
+def test_each_effect_draws_for_itself_and_the_same_seed_draws_the_same() -> None:
+    what: dict[str, Any] = {"floor_chance": 0.1, "cross_talk": 0.1, "vanish": 0.1}
+    assert rounds(WALL_LEFT, **what) == rounds(WALL_LEFT, **what)
+    assert rounds(WALL_LEFT, **what) != rounds(WALL_LEFT, seed=2, **what)

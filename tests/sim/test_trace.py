@@ -1,28 +1,121 @@
-import json
+"""The trace of a simulation: its contents, and equality for equal seeds."""
+
+import itertools
+import math
 
 import msgspec
+import pytest
 
-from sim.requests import Freeze
-from sim.trace import BumperSent, Disturbed, Line, Power, read
-from tests.sim.sim_fixture import START_NS, SimFixture
+from common.freshness import NS_PER_S
+from common.wire import commands as c
+from sim import trace as t
+from sim.requests import Asked, Freeze, PowerCycle, Wire
+from tests.sim.sim_fixture import START_NS, WALL_AHEAD, SimFixture, model, room
 
 
-def test_truth_is_one_json_object_with_all_that_tests_judge_by() -> None:
-    line = json.loads(msgspec.json.encode(SimFixture().truth))
-    assert line["event"] == "truth"
-    assert line["mono_ns"] == START_NS
-    names = {"x", "y", "heading", "linear", "angular", "distance", "clearance", "contact"}
-    assert names <= line.keys()
+def test_commands_are_traced_in_si_and_queries_only_counted() -> None:
+    sim = SimFixture()
+    sim.after(0.25)
+    sim.say(
+        c.BumperQuery(),
+        c.MotionCommand(c.MotionKind.RUN, -250, 900),
+        c.MotionCommand(c.MotionKind.STOP),
+        c.MotionCommand(c.MotionKind.BREAK),
+    )
+    lines = [msgspec.to_builtins(line) for line in sim.of(t.Command)]
+    assert [line["kind"] for line in lines] == ["run", "stop", "brake"]
+    assert lines[0] == {
+        "event": "command",
+        "mono_ns": START_NS + NS_PER_S // 4,
+        "kind": "run",
+        "linear": -0.25,
+        "angular": pytest.approx(math.pi / 2),
+    }
+    assert sim.simulation.counters["BumperQuery"] == 1
+
+
+def test_the_trace_knows_when_the_first_frame_said_so() -> None:
+    sim = SimFixture(WALL_AHEAD)
+    sim.run(1.0)
+    sim.after(4.0)
+    assert sim.of(t.BumperSent) == []
+    for linear in (0.0, -0.5):
+        sim.say(c.BumperQuery())
+        sim.say(c.BumperQuery())
+        sim.run(linear)
+        sim.after(1.0)
+    sim.say(c.BumperQuery())
+    assert [line.pressed for line in sim.of(t.BumperSent)] == [True, False]
+
+
+@pytest.mark.parametrize("lost", [Wire(foreign=1.0), Wire(drop=1.0)])
+def test_a_frame_that_does_not_arrive_said_nothing(lost: Wire) -> None:
+    sim = SimFixture()
+    sim.simulation.pressed_by_hand = True
+    sim.simulation.update_bumper(sim.now_ns)
+    sim.simulation.to_pc.faults = lost
+    sim.say(c.BumperQuery())
+    assert sim.of(t.BumperSent) == []
+    sim.simulation.to_pc.faults = Wire()
+    sim.say(c.BumperQuery())
+    assert len(sim.of(t.BumperSent)) == 1
+
+
+def test_a_delayed_command_is_obeyed_when_it_arrives() -> None:
+    sim = SimFixture()
+    sim.simulation.to_board.faults = Wire(delay=0.2)
+    sim.run(0.5)
+    sim.after(0.19)
+    assert sim.of(t.Command) == []
+    sim.after(0.02)
+    assert [line.kind for line in sim.of(t.Command)] == ["run"]
+
+
+def test_truth_comes_at_20_hz() -> None:
+    sim = SimFixture(WALL_AHEAD)
+    sim.after(1.0)
+    lines = sim.of(t.Truth)
+    assert len(lines) == 20
+    assert {b.mono_ns - a.mono_ns for a, b in itertools.pairwise(lines)} == {NS_PER_S // 20}
+    assert lines[-1].clearance == pytest.approx(3.0 - 0.55)
+
+
+LAP = (
+    (0.8, 0.0, 3.0), (0.0, 1.0, 1.6), (0.6, 0.4, 4.0), (-0.3, -0.5, 2.0), (1.2, 0.1, 5.0),
+)  # fmt: skip
+LOSSY = Wire(drop=0.1, duplicate=0.1, reorder=0.1, corrupt=0.1, delay=0.02)
+REQUESTS: tuple[Asked, ...] = Wire(), LOSSY, LOSSY, PowerCycle(), LOSSY
+
+
+def lap(seed: int) -> tuple[bytes, bytes]:
+    """Drive around a noisy room on a bad cable; return the trace and all bytes for the PC."""
+    boxes = ({"name": "step", "x": 2.0, "y": 1.0, "length": 0.4, "width": 0.4, "low": True},)
+    walls = [{"points": [[-2, -2], [4, -2], [4, 3], [-2, 3], [-2, -2]]}]
+    sim = SimFixture(room(*boxes, walls=walls), model(sonar={"noise": 0.01}), seed)
+    for (linear, angular, seconds), request in zip(LAP, REQUESTS, strict=True):
+        sim.do(request)
+        for _ in range(round(seconds * 10)):
+            sim.run(linear, angular)
+            sim.say(c.UltrasonicQuery(), c.BumperQuery())
+            sim.after(0.1)
+    trace = b"\n".join(msgspec.json.encode(line) for line in sim.records)
+    return trace, b"".join(datagram.payload for datagram in sim.datagrams)
+
+
+def test_the_same_seed_gives_the_same_trace_and_the_same_bytes() -> None:
+    first = lap(1)
+    assert first == lap(1)
+    assert first[1] != lap(2)[1]
 
 
 def test_lines_can_be_read_back_by_their_event() -> None:
-    lines: list[Line] = [
+    lines: list[t.Line] = [
         SimFixture().truth,
-        BumperSent(mono_ns=1, pressed=True),
-        Power(mono_ns=2, on=False),
-        Disturbed(mono_ns=3, request=Freeze(seconds=1.0)),
+        t.BumperSent(mono_ns=1, pressed=True),
+        t.Power(mono_ns=2, on=False),
+        t.Disturbed(mono_ns=3, request=Freeze(seconds=1.0)),
     ]
     text = b"".join(msgspec.json.encode(line) + b"\n" for line in lines)
-    assert read(text) == lines
-    assert read(text + b'{"event": "tru') == lines
-    assert read(b"") == []
+    assert t.read(text) == lines
+    assert t.read(text + b'{"event": "tru') == lines
+    assert t.read(b"") == []

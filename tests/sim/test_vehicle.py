@@ -1,3 +1,5 @@
+"""Ramps of the motors, arcs and obstacles; and each weakness of the motors, with figures."""
+
 import math
 
 import pytest
@@ -5,14 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.motion import Twist
-from common.settings import Vehicle
 from common.wire.commands import MotionKind
-from sim.config import Drive
 from sim.geometry import Pose
-from sim.vehicle import move, moved, next_twist, wheel_angles
+from sim.model import Drive
+from sim.vehicle import Motors, move, moved, next_twist
 
 DRIVE = Drive()
 DT = 0.01
+TRACK = 0.56
+RUN, STOP, BREAK = MotionKind.RUN, MotionKind.STOP, MotionKind.BREAK
 AT_SPEED = Twist(1.0, -1.0)
 STANDING = Twist()
 twists = st.builds(Twist, st.floats(-5.0, 5.0), st.floats(-3.0, 3.0))
@@ -54,12 +57,9 @@ def test_the_motors_have_a_greatest_speed() -> None:
     assert end == Twist(DRIVE.max_linear, -DRIVE.max_angular)
 
 
-def test_a_straight_way() -> None:
+def test_a_straight_way_and_a_quarter_circle_are_exact() -> None:
     pose = moved(Pose(1.0, 1.0, math.pi / 2), Twist(2.0), 0.5)
     assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 2.0, math.pi / 2))
-
-
-def test_a_quarter_circle_in_one_step_is_exact() -> None:
     pose = moved(Pose(0.0, 0.0, 0.0), Twist(math.pi, math.pi / 2), 1.0)
     assert (pose.x, pose.y, pose.heading) == pytest.approx((2.0, 2.0, math.pi / 2))
 
@@ -93,25 +93,101 @@ def test_a_way_that_is_blocked_at_once_stays() -> None:
     assert (way.pose, way.distance, way.turn) == (start, 0.0, 0.0)
 
 
-def test_wheels_are_straight_on_a_straight_way() -> None:
-    assert set(wheel_angles(Twist(0.5), Vehicle())) == {0.0}
+class Ride:
+    """Motors with the velocity that they reach, and the distance."""
+
+    def __init__(self, **drive: float) -> None:
+        self.motors = Motors(Drive(**drive), TRACK)
+        self.twist = Twist()
+        self.distance = self.turn = 0.0
+
+    def after(
+        self, seconds: float, kind: MotionKind, linear: float = 0.0, angular: float = 0.0
+    ) -> Twist:
+        for _ in range(round(seconds / DT)):
+            self.twist = self.motors.follow(self.twist, kind, Twist(linear, angular), DT)
+            self.distance += self.twist.linear * DT
+            self.turn += self.twist.angular * DT
+        return self.twist
+
+    def stopping(self, kind: MotionKind) -> float:
+        """Return the distance until standstill."""
+        before = self.distance
+        while self.twist != Twist():
+            self.after(DT, kind)
+        return self.distance - before
 
 
-def test_wheels_stand_across_the_radius_when_turning_on_the_spot() -> None:
-    vehicle = Vehicle(wheelbase=0.6, track=0.6)
-    quarter = math.pi / 4
-    angles = wheel_angles(Twist(0.0, 1.0), vehicle)
-    assert angles == pytest.approx((-quarter, quarter, quarter, -quarter))
+def test_kind_motors_reach_what_is_commanded() -> None:
+    ride = Ride()
+    assert ride.after(1.0, RUN, 0.5, 0.3) == Twist(0.5, 0.3)
+    assert ride.after(DT, BREAK) == Twist()
 
 
-@given(twists)
-def test_every_wheel_rolls_the_way_its_place_moves(twist: Twist) -> None:
-    vehicle = Vehicle()
-    x, y = vehicle.wheelbase / 2, vehicle.track / 2
-    places = ((x, y), (x, -y), (-x, y), (-x, -y))
-    for angle, (px, py) in zip(wheel_angles(twist, vehicle), places, strict=True):
-        assert abs(angle) <= math.pi / 2
-        forward, left = twist.linear - twist.angular * py, twist.angular * px
-        speed = forward * math.cos(angle) + left * math.sin(angle)
-        rolling = speed * math.cos(angle), speed * math.sin(angle)
-        assert rolling == pytest.approx((forward, left), abs=1e-9)
+def test_nothing_happens_within_the_dead_time_not_even_brake() -> None:
+    ride = Ride(dead_time=0.15)
+    assert ride.after(0.15, RUN, 0.5) == Twist()
+    assert ride.after(DT, RUN, 0.5).linear > 0
+    ride.after(2.0, RUN, 0.5)
+    assert ride.after(0.15, BREAK).linear == 0.5
+    assert ride.after(DT, BREAK) == Twist()
+
+
+def test_a_lag_makes_the_way_to_stop_longer() -> None:
+    ways = []
+    for lag in (0.0, 0.3):
+        ride = Ride(lag=lag)
+        ride.after(4.0, RUN, 0.5)
+        assert ride.twist == Twist(0.5)
+        ways.append(ride.stopping(STOP))
+    assert ways[0] == pytest.approx(0.5**2 / (2 * 0.8), abs=0.01)
+    # At 0.8 m/s^2 down to 0.24 m/s, and from there by the time constant.
+    assert ways[1] == pytest.approx((0.5**2 - 0.24**2) / (2 * 0.8) + 0.24 * 0.3, abs=0.01)
+
+
+def test_a_brake_has_a_deceleration() -> None:
+    ride = Ride(brake=2.0)
+    ride.after(2.0, RUN, 0.8)
+    assert ride.stopping(BREAK) == pytest.approx(0.8**2 / (2 * 2.0), abs=0.01)
+
+
+def test_slower_than_the_dead_zone_stands_still() -> None:
+    ride = Ride(dead_zone=0.06)
+    assert ride.after(1.0, RUN, 0.05) == Twist()
+    assert ride.after(1.0, RUN, 0.0, 0.2) == Twist()  # 0.056 m/s of each side
+    assert ride.after(1.0, RUN, 0.1) == Twist(0.1)
+    # The inner side stands: 0.1 - 0.056 is in the dead zone.
+    twist = ride.after(1.0, RUN, 0.1, 0.2)
+    assert (twist.linear, twist.angular) == pytest.approx((0.078, 0.156 / TRACK))
+
+
+def test_unlike_sides_curve_a_straight_line() -> None:
+    ride = Ride(asymmetry=0.04)
+    twist = ride.after(2.0, RUN, 0.5)
+    assert twist.linear == pytest.approx(0.5)
+    assert twist.angular == pytest.approx(0.5 * 0.04 / TRACK)
+    ride = Ride(asymmetry=-0.04)
+    assert ride.after(2.0, RUN, 0.5).angular == pytest.approx(-0.5 * 0.04 / TRACK)
+
+
+def test_a_weak_left_wheel_slows_and_pulls_to_the_left() -> None:
+    ride = Ride(weak_wheel=0.3)
+    twist = ride.after(3.0, RUN, 0.5)
+    assert twist.linear == pytest.approx(0.5 * (1 - 0.3 / 4))
+    assert twist.angular == pytest.approx(0.5 * 0.15 / TRACK)
+    assert ride.stopping(STOP) == pytest.approx(twist.linear**2 / (2 * 0.8 * 0.925), abs=0.01)
+
+
+def test_on_a_slope_stop_ramps_down_and_then_lets_roll() -> None:
+    ride = Ride(slope=math.radians(2))
+    assert ride.after(1.0, RUN) == Twist()  # the speed loop holds
+    ride.after(1.0, RUN, 0.4)
+    assert ride.after(0.5, STOP).linear == pytest.approx(0.0, abs=0.02)
+    assert ride.after(1.0, STOP).linear == pytest.approx(0.342, abs=0.02)  # g sin 2 degrees
+    assert ride.after(DT, BREAK) == Twist()
+    assert ride.after(1.0, BREAK) == Twist()
+    assert ride.after(1.0, STOP).linear == pytest.approx(0.342, abs=0.02)
+
+
+def test_a_slope_that_rises_ahead_lets_roll_backward_to_the_greatest_speed() -> None:
+    assert Ride(slope=-0.2).after(5.0, STOP) == Twist(-1.5)

@@ -55,20 +55,6 @@ def test_the_strip_goes_all_around(heading: float) -> None:
     assert World.of(room(BOX)).contact(BODY, at(reach - 0.001, heading=heading))
 
 
-def test_a_box_is_added_replaced_and_removed() -> None:
-    world = World.of(room())
-    box = msgspec.convert(BOX, type_of_box())
-    assert world.with_box(box).boxes == (box,)
-    moved = msgspec.structs.replace(box, x=9.0)
-    assert world.with_box(box).with_box(moved).boxes == (moved,)
-    assert world.with_box(box).without("box") == world
-    assert world.boxes == ()
-
-
-def type_of_box() -> Any:
-    return type(room(BOX).boxes[0])
-
-
 @pytest.mark.parametrize(
     ("plan", "error"),
     [

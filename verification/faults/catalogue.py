@@ -8,7 +8,7 @@ from functools import partial
 from zenoh import CongestionControl
 
 from common.motion import Command
-from sim.requests import Driver, Firmware, Flood, Freeze, Lose, Mute, PowerCycle, Sonar, Wire
+from sim.requests import Driver, Firmware, Flood, Freeze, Mute, PowerCycle, Sonar, Wire
 from verification.faults import injectors
 from verification.faults.fault import NOTICE_S, Budget, Fault, Outcome, by_limit, within
 from verification.faults.independent_client import BUMPER, MOTION, VELOCITY, Client
@@ -206,7 +206,7 @@ BOARD = [
           ON, hold_s=4.8),
     # Other firmware behaviour.
     Fault("contact while every third answer is lost",
-          steps(do(Lose(reports=("bumper",))), hit(0.06)), RESET, within(0.02)),
+          steps(do(Mute(reports=("bumper",), every=3)), hit(0.06)), RESET, within(0.02)),
     Fault("contact reported on the other port",
           steps(do(Firmware(hits="second")), hit(0.3)), RESET, within(0.02)),
     # The bridge changes to the other port after 0.1 s without an answer.

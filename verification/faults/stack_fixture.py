@@ -14,7 +14,7 @@ from typing import Literal, Self
 import msgspec
 
 from cli.settings import Everything
-from sim.requests import Bumper, Driver, Firmware, Lose, Mute, Place, Sonar, Wire
+from sim.requests import Bumper, Driver, Firmware, Mute, Place, Sonar, Wire
 from verification.faults.independent_client import Client, session
 from verification.faults.namespaces import (
     RELAY_CABLES,
@@ -36,18 +36,15 @@ Requirement = Literal[
     "site",
 ]  # fmt: skip
 # Reach the speed sooner. No time limit changes.
-QUICK = [
-    "safety.unsafe_overrides=linear_acceleration",
-    "safety.linear_acceleration=5",
-    "sim.drive.acceleration=10",
-]
+QUICK = ["safety.unsafe_overrides=linear_acceleration", "safety.linear_acceleration=5"]
+QUICK_MOTORS = str(Path(__file__).with_name("quick_motors.toml"))
 ROOM_M = 900.0  # from here the vehicle is put back to the origin
 READY_S = 60.0  # on a shared host
 SPEED_MPS = 0.8  # of every fault
 LIMIT_LEASE_S = 0.5
 CLOCKS = ("robot", "driver")
 NORMAL = (
-    Wire(), Mute(), Firmware(), Lose(), Bumper(pressed=False), Driver(side="left", bits=0),
+    Wire(), Mute(), Firmware(), Bumper(pressed=False), Driver(side="left", bits=0),
     Driver(side="right", bits=0), Sonar(name="front"), Sonar(name="rear"),
 )  # fmt: skip
 MODULE = [sys.executable, "-m"]
@@ -225,6 +222,7 @@ def stack_fixture(
                 folder,
                 shipped=shipped,
                 sets=[*QUICK, *_settings(need)],
+                profiles=[QUICK_MOTORS],
                 sim_sets=SIM_BEHIND_RELAY if need == "relay" else (),
                 beside=partial(_beside, need, folder),
                 log="disk/log.jsonl" if need == "small disk" else "log.jsonl",

@@ -34,7 +34,7 @@ SETS = (
     "safety.sources={new={priority=5,lease=0.2}}",
     "safety.unsafe_overrides=margin\0safety.margin=0",
     "odom.hold=5e-2\0log.level=debug",
-    "sim.drive.coast=nan",
+    "odom.hold=nan",
     "robot.id=t2 \0robot=5",
     "wire.crc=xmodem\0wire.crc_covers=header",
     "board.address=10.7.5.224\0board.port",

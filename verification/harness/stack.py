@@ -88,6 +88,7 @@ def running_stack(
     world: str = "empty",
     *,
     sets: Sequence[str] = (),
+    profiles: Sequence[str] = (),
     shipped: bool = False,
     listen: str = "tcp/127.0.0.1:{port}",
     log: str = "log.jsonl",
@@ -99,16 +100,16 @@ def running_stack(
     """Run the stack; on a host with scheduling stalls its time limits are relaxed.
 
     ``shipped`` keeps the shipped limits on any host, and ``sets``, additional settings, stay as
-    they are. ``listen`` is where the router listens, the endpoint of the services first; ``log`` is
-    a file in the folder. ``route`` returns the command of another router, zenohd, for these
-    settings. ``sim_sets`` are settings of the simulator alone. ``beside`` returns the commands of
-    further processes, which are not waited for.
+    they are. ``profiles`` are those of the simulated vehicle, ``sim_sets`` settings of the
+    simulator alone. ``listen`` is where the router listens, the endpoint of the services first;
+    ``log`` is a file in the folder. ``route`` returns the command of another router, zenohd, for
+    these settings. ``beside`` returns the commands of further processes, which are not waited for.
     """
     control = free_port(socket.SOCK_DGRAM)
     sets = _all_settings(sets, shipped, listen, control)
     config = load(Everything, Sources(sets=sets)).config
     files = [file for file in (folder / SETTINGS_FILE,) if file.exists()]
-    options = Namespace(no_sim=False, world=world, config=files, sets=sets)
+    options = Namespace(no_sim=False, world=world, profile=profiles, config=files, sets=sets)
     made = {name: list(command) for name, command in commands(options)}
     if route:
         made["router"] = route(sets)

@@ -9,16 +9,18 @@ import random
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import msgspec
 from msgspec import Struct
 
+from common.config import Setting, build
 from common.settings import Vehicle
 from sim.geometry import Rectangle
+from sim.model import Model
 from sim.world import Box, Plan, Spot, Wall, World
 
 FILE = Path(__file__).with_name("ranges.toml")
+SIM = "sim."  # prefix of the parameters of the simulated vehicle
 FAULTY = 0.5  # share of the runs with faults
 MOST_FAULTS = 3
 ATTEMPTS = 200
@@ -66,17 +68,11 @@ class Draw(Struct, frozen=True):
         """Return the draw with the default of one parameter."""
         return Draw(self.seed, {key: self.values[key] for key in self.values if key != name})
 
-    def settings(self) -> dict[str, Any]:
-        """Return the settings of the simulated vehicle as nested tables."""
-        tables: dict[str, Any] = {"sim": {"seed": self.seed}}
-        for name, value in self.values.items():
-            if name.startswith("sim."):
-                *sections, last = name.split(".")
-                table = tables
-                for section in sections:
-                    table = table.setdefault(section, {})
-                table[last] = value
-        return tables
+    def model(self) -> Model:
+        """Return the simulated vehicle."""
+        own = {name: value for name, value in self.values.items() if name.startswith(SIM)}
+        given = {name.removeprefix(SIM): Setting(value, name) for name, value in own.items()}
+        return build(Model, given)
 
 
 @cache

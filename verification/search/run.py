@@ -7,14 +7,12 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-import msgspec
 from msgspec import Struct
 
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from sim import requests as q
-from sim.config import Config
 from verification.search.bus import MS, Disturbance
 from verification.search.draw import Draw, Value, room
 from verification.search.draw import draw as drawn
@@ -106,8 +104,9 @@ class Trial:
     """The run under way."""
 
     def __init__(self, draw: Draw) -> None:
-        config = msgspec.convert(draw.settings(), Config)
-        self.stack = Stack(config, room(draw, config.vehicle), step_ns=STEP_NS)
+        model = draw.model()
+        plan = room(draw, model.vehicle)
+        self.stack = Stack(model, plan, seed=draw.seed, step_ns=STEP_NS)
         self.operator = Operator(self.stack, draw)
         self.stack.sources["teleop"] = self.operator
         self.judge = Judge(START_NS)

@@ -9,6 +9,7 @@ from unittest.mock import patch
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
+from common.settings import Board
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.framing import Framing
 from services.bridge.bridge import Bridge
@@ -18,9 +19,9 @@ from services.odom.odometer import Odometer
 from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
 from sim import trace as t
-from sim.config import Config
-from sim.injection import Injection
-from sim.requests import Asked, Script
+from sim.injection import handle
+from sim.model import Model
+from sim.requests import Asked
 from sim.simulation import Simulation
 from sim.world import Plan
 from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
@@ -30,6 +31,7 @@ from verification.search.oracle import STEP_NS, Oracle
 START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
 BREAK_NS = 50 * MS
+IDEAL = Model()
 PLANE = Plan(title="an empty plane")
 PENDANT = "pendant"
 CONFIGS = {
@@ -50,18 +52,17 @@ CONFIGS = {
 class Vehicle:
     """The simulated vehicle at the other end of the cable."""
 
-    def __init__(self, net: Net, config: Config, plan: Plan) -> None:
-        self.simulation = Simulation(config, plan, net.now_ns)
-        self.ports = config.board.listen_ports
+    def __init__(self, net: Net, model: Model, plan: Plan, seed: int) -> None:
+        self.ports = Board().listen_ports
+        self.simulation = Simulation(model, plan, net.now_ns, seed, self.ports)
         self.inboxes: tuple[deque[bytes], ...] = tuple(deque() for _ in self.ports)  # the bridge's
         self.truth = self.simulation.truth(net.now_ns)  # the newest, 20 times a second
         self.records: list[t.Line] = []
-        self._injection = Injection(self.simulation, Script(), net.now_ns)
         self._net = net
 
     def inject(self, request: Asked) -> None:
         """Inject a fault of the simulator."""
-        self._injection.handle(request, self._net.now_ns)
+        handle(self.simulation, request, self._net.now_ns)
 
     def receive(self, datagram: bytes, port: int) -> None:
         """Send a datagram to the board, from a port of the bridge."""
@@ -120,16 +121,15 @@ class Stack:
     """
 
     def __init__(
-        self, config: Config | None = None, plan: Plan = PLANE, *, step_ns: int = STEP_NS
+        self, model: Model = IDEAL, plan: Plan = PLANE, *, seed: int = 1, step_ns: int = STEP_NS
     ) -> None:
-        config = config or Config()
         self.net = Net(START_NS)
         self.oracle = Oracle(START_NS)
         # Lost and late datagrams may take the STOP that would have been in time.
-        for line in (config.sim.cable.to_board, config.sim.cable.to_pc):
+        for line in (model.cable.to_board, model.cable.to_pc):
             self.oracle.slack_ns += round((line.delay + line.jitter) * 1e9)
             self.oracle.slack_ns += 150 * MS if line.drop or line.corrupt else 0
-        self.vehicle = Vehicle(self.net, config, plan)
+        self.vehicle = Vehicle(self.net, model, plan, seed)
         self._step_ns = step_ns
         self._boots = 1000
         self._brake_ns = 0  # when the guard brakes next

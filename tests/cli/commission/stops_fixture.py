@@ -14,7 +14,7 @@ from common.wire.commands import DistanceQuery, MotionCommand, MotionKind
 from common.wire.frame import Frame
 from common.wire.reports import DistanceReport, VelocityReport
 from sim.requests import Wire
-from tests.sim.sim_fixture import SimFixture, config
+from tests.sim.sim_fixture import SimFixture, model
 
 KINDS = {Command.STOP: MotionKind.STOP, Command.BRAKE: MotionKind.BREAK}
 TICK_NS = NS_PER_S // 100
@@ -47,8 +47,8 @@ class StopMaker:
         """Drive at this speed (m/s) and stop, after a random part of a tick."""
         slowness = (1 + self.scatter * self._random.gauss(0, 1)) / self.coast
         drive = {"coast": 1 / slowness, "acceleration": 100.0}
-        sim = {"drive": drive, "seed": self._random.randrange(10**6)}
-        it = SimFixture(settings=config(sim=sim, board={"listen_ports": [4002]}))
+        seed = self._random.randrange(10**6)
+        it = SimFixture(vehicle=model(drive=drive), seed=seed, ports=(4002,))
         self._add(it, Motion(command=Command.RUN, linear=speed))
         it.run(speed)
         self._drive(it, DRIVE_S)
