@@ -18,7 +18,7 @@ from common.bus.bus import Arrival
 from common.bus.calls import Caller
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
-from common.motion import BRAKE
+from common.motion import BRAKE, STOP
 from common.service import Node, run
 from services.bridge.config import BridgeConfig
 from services.bridge.core.core import Core, tick_s
@@ -90,12 +90,14 @@ class Bridge:
             "link": drive.publisher(keys.LINK),
             "switches": drive.publisher(keys.SWITCHES),
         }
-        self._send(self._core.start())
+        self._send(self._core.motions.order(STOP))
         drive.subscribe(keys.MOTION, self._on_motion, depth=MOTIONS)
         node.bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
         # Safety receives it, too, unless it hangs, restarts or is cut off.
         estop_key = keys.estop_key(node.config.robot.id)
-        node.bus.on_any(estop_key, lambda received_ns: self._do(self._core.estop(received_ns)))
+        node.bus.on_any(
+            estop_key, lambda received_ns: self._do(self._core.motions.on_estop(received_ns))
+        )
         node.bus.serve(keys.SET_SWITCHES, self._on_switches)
         node.bus.serve(keys.SET_LED, self._on_led)
         self._begin()
@@ -126,16 +128,17 @@ class Bridge:
             self._do(self._core.datagram(datagram, port, read_ns))
 
     def _on_motion(self, arrival: Arrival[m.Motion]) -> None:
-        self._do(self._core.motion(arrival.message, arrival.received_ns, clock.now_ns()))
+        motion, received_ns = arrival.message, arrival.received_ns
+        self._do(self._core.motions.on_motion(motion, received_ns, clock.now_ns()))
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
-        self._core.safety(arrival.message, arrival.received_ns)
+        self._core.calls.on_safety(arrival.message, arrival.received_ns)
 
     def _on_switches(self, request: m.SwitchesRequest, caller: Caller[m.Switches]) -> None:
-        self._do(self._core.switches(request, caller, clock.now_ns()))
+        self._do(self._core.calls.on_switches(request, caller, clock.now_ns()))
 
     def _on_led(self, request: m.LedRequest, caller: Caller[m.Done]) -> None:
-        self._do(self._core.led(request, caller, clock.now_ns()))
+        self._do(self._core.calls.on_led(request, caller, clock.now_ns()))
 
     def _on_tick(self, now_ns: int) -> None:
         if now_ns - self._ticked_ns > self._late_ns:
@@ -201,11 +204,11 @@ class Bridge:
     def _is_stopped(self) -> bool:
         """Stop the vehicle; return True at standstill, or after one second."""
         now_ns = clock.now_ns()
-        self._do(self._core.stop(now_ns))
+        self._do(self._core.motions.stop(now_ns))
         return self._core.motions.is_stopped(now_ns)
 
     def _on_exit(self) -> None:
-        self._send(self._core.exit(clock.now_ns()))
+        self._send(self._core.motions.on_exit(clock.now_ns()))
         if self._heartbeat is not None:
             self._heartbeat.end()
 

@@ -10,7 +10,7 @@ from msgspec import Struct
 from common import messages as m
 from common.config import Sources, load
 from common.freshness import NS_PER_S
-from common.motion import RUN, Command
+from common.motion import RUN, STOP, Command
 from common.wire import reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
@@ -40,7 +40,7 @@ class Bench:
         self.now_ns = NOW
         self.seq = 0
         self.outputs: list[Output] = []
-        self.carried_out([self.core.start()])
+        self.carried_out([self.core.motions.order(STOP)])
 
     def carried_out(self, outputs: Iterable[Output]) -> list[Output]:
         """Carry out outputs as the shell does; return them."""
@@ -76,20 +76,22 @@ class Bench:
         self.seq += 1
         values = {"seq": self.seq, "boot": SAFETY, "linear": linear} | fields
         motion = m.Motion(command=command, **values)
-        return self.carried_out(self.core.motion(motion, self.now_ns, self.now_ns))
+        return self.carried_out(self.core.motions.on_motion(motion, self.now_ns, self.now_ns))
 
     def estop(self) -> list[Output]:
         """Receive an emergency stop."""
-        return self.carried_out(self.core.estop(self.now_ns))
+        return self.carried_out(self.core.motions.on_estop(self.now_ns))
 
     def switch(self, caller: "Caller", **request: Any) -> list[Output]:
         """Receive a call that sets the brakes."""
         call = m.SwitchesRequest(**request)
-        return self.carried_out(self.core.switches(call, caller, self.now_ns))
+        return self.carried_out(self.core.calls.on_switches(call, caller, self.now_ns))
 
     def lamp(self, caller: "Caller") -> list[Output]:
         """Receive a call that sets a lamp."""
-        return self.carried_out(self.core.led(m.LedRequest(channel=1, mode=0), caller, self.now_ns))
+        return self.carried_out(
+            self.core.calls.on_led(m.LedRequest(channel=1, mode=0), caller, self.now_ns)
+        )
 
     def arm(self) -> None:
         """Receive all answers and echoes of the board, then a stop from safety."""
@@ -97,7 +99,7 @@ class Bench:
         self.answer(VelocityReport(0, 0), BumperReport(False), DistanceReport(1000, 0), *echoes)
         self.receive(CLEAR, CLEAR, CLEAR)
         self.tick()
-        self.move(Command.STOP)
+        self.move(STOP)
         assert self.link().waiting == ""
 
     def link(self) -> m.Link:

@@ -350,8 +350,8 @@ def test_a_bridge_that_ends_does_not_take_a_brake_back(bench: Bench, command: Co
     bench.arm()
     bench.move(command)
     kind = MotionKind.BREAK if command is BRAKE else MotionKind.STOP
-    assert motions(bench.carried_out(bench.core.stop(bench.now_ns))) == [kind]
-    assert bench.carried_out(bench.core.stop(bench.now_ns)) == [], "once"
+    assert motions(bench.carried_out(bench.core.motions.stop(bench.now_ns))) == [kind]
+    assert bench.carried_out(bench.core.motions.stop(bench.now_ns)) == [], "once"
     bench.tick()
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
 
@@ -363,13 +363,13 @@ def test_the_last_frame_brakes_unless_the_vehicle_stands(
     bench.arm()
     core = bench.core
     assert not core.motions.is_stopped(bench.now_ns + 9 * NS_PER_S), "nobody has asked"
-    assert motions([core.exit(bench.now_ns)]) == [MotionKind.BREAK]
-    bench.carried_out(core.stop(bench.now_ns))
+    assert motions([core.motions.on_exit(bench.now_ns)]) == [MotionKind.BREAK]
+    bench.carried_out(core.motions.stop(bench.now_ns))
     assert not core.motions.is_stopped(bench.now_ns), "measured before the stop"
     bench.now_ns += MS
     bench.answer(VelocityReport(speed, 0))
     assert core.motions.is_stopped(bench.now_ns) is (speed == 0)
-    assert motions([core.exit(bench.now_ns)]) == [kind]
+    assert motions([core.motions.on_exit(bench.now_ns)]) == [kind]
     assert not core.motions.is_stopped(bench.now_ns + NS_PER_S - MS) or speed == 0
     assert core.motions.is_stopped(bench.now_ns + NS_PER_S), "it waits no longer"
 
@@ -419,7 +419,7 @@ def test_a_call_is_answered_by_the_boards_echo(
     bench: Bench, call: Call, then: Callable[[Bench], object], reply: object, refusal: str | None
 ) -> None:
     bench.arm()
-    bench.core.safety(safety_state(heartbeat=7), bench.now_ns)
+    bench.core.calls.on_safety(safety_state(heartbeat=7), bench.now_ns)
     caller = Caller()
     sent = [*call(bench, caller), *bench.tick()]
     assert {type(frame) for frame in frames(sent)} & {commands.LedSet, commands.BumperBrakeSet}
@@ -443,7 +443,7 @@ def test_a_call_is_refused_with_the_reason(
     bench: Bench, before: Callable[[Bench], None], call: Call, refusal: str
 ) -> None:
     before(bench)
-    bench.core.safety(safety_state(heartbeat=7), bench.now_ns)
+    bench.core.calls.on_safety(safety_state(heartbeat=7), bench.now_ns)
     caller = Caller()
     assert frames(call(bench, caller)) == []
     assert refusal in caller.refusals[0]
@@ -452,7 +452,7 @@ def test_a_call_is_refused_with_the_reason(
 @pytest.mark.parametrize(("call", "what"), [(lamp, "lamps"), (brakes, "switches")])
 def test_one_call_of_each_is_pending(bench: Bench, call: Call, what: str) -> None:
     bench.arm()
-    bench.core.safety(safety_state(heartbeat=7), bench.now_ns)
+    bench.core.calls.on_safety(safety_state(heartbeat=7), bench.now_ns)
     first, second = Caller(), Caller()
     call(bench, first)
     call(bench, second)

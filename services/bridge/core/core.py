@@ -1,22 +1,22 @@
 """The bridge's core: datagrams, motions, calls and ticks in; outputs in their order out. Pure.
 
-============ ================================== ==================================================
-entry        called by the shell for            yields
-============ ================================== ==================================================
-datagram     each datagram of the board         BRAKE for a new hit, before all else; then the
+================== ============================ ==================================================
+entry              called by the shell for      yields
+================== ============================ ==================================================
+datagram           each datagram of the board   BRAKE for a new hit, before all else; then the
                                                 report of the hit; then what its frames lead to
-motion       each message on ``@cmd/motion``    the frame that the lease allows
-estop        an emergency stop                  BRAKE
-safety       each state of safety               nothing: calls echo its heartbeat
-switches,    an operator's call                 a frame or a refusal; the board's echo answers it
-led                                             later
-relay_report a report of the relay              nothing
-start        the start of the process           STOP
-tick         every 20 ms                        STOP or BRAKE if due; queries; events; the link
+tick               every 20 ms                  STOP or BRAKE if due; queries; events; the link
                                                 message, 5 times a second and on a change
-second       once a second                      the brakes' message
-stop, exit   the end of the process             STOP or BRAKE
-============ ================================== ==================================================
+second             once a second                the brakes' message
+relay_report       a report of the relay        nothing
+motions.on_motion  a message on ``@cmd/motion`` the frame that the lease allows
+motions.on_estop   an emergency stop            BRAKE
+motions.stop,      the end of the process       STOP or BRAKE
+motions.on_exit
+calls.on_switches, an operator's call           a frame or a refusal; the board's echo answers it
+calls.on_led                                    later
+calls.on_safety    each state of safety         nothing: calls echo its heartbeat
+================== ============================ ==================================================
 
 An entry changes the state while its outputs are carried out one by one: take all of them. Times are
 of the monotonic clock.
@@ -29,7 +29,6 @@ from typing import Any
 from common import messages as m
 from common.errors import WireError
 from common.freshness import NS_PER_S, Latest
-from common.motion import STOP
 from common.wire import commands, reports
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received
@@ -89,7 +88,7 @@ class Core:
             settings, self._framing, self._translator, boot=boot, counters=counters, now_ns=now_ns
         )
         self.readiness = readiness = Readiness(settings, config.board)
-        self._calls = Calls(readiness, settings.echo_timeout, self._ask)
+        self.calls = Calls(readiness, settings.echo_timeout, self._ask)
         failover_ns = round(settings.failover * NS_PER_S)
         self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
         self._polling = Polling(
@@ -118,7 +117,7 @@ class Core:
             reports.BumperBrakeReport: lambda frame, *_: readiness.on_echo(
                 readiness.bumper, frame.on
             ),
-            reports.LedReport: lambda frame, *_: self._calls.on_led_echo(frame.done),
+            reports.LedReport: lambda frame, *_: self.calls.on_led_echo(frame.done),
         }
 
     # --- input from the board ----------------------------------------------------------
@@ -241,33 +240,7 @@ class Core:
         if not self.readiness.relay.take(report, now_ns):
             self.rejected["relay_report"] += 1
 
-    # --- input from the bus ------------------------------------------------------------
-
-    def motion(self, motion: m.Motion, received_ns: int, now_ns: int) -> Outputs:
-        """Process a motion message of safety."""
-        return self.motions.on_motion(motion, received_ns, now_ns)
-
-    def estop(self, received_ns: int) -> Outputs:
-        """Process an emergency stop."""
-        return self.motions.on_estop(received_ns)
-
-    def safety(self, state: m.SafetyState, received_ns: int) -> None:
-        """Process a state of safety, with its heartbeat."""
-        self._calls.on_safety(state, received_ns)
-
-    def switches(self, request: m.SwitchesRequest, caller: Any, now_ns: int) -> Outputs:
-        """Process a call that sets the board's emergency brakes; the answer names ``caller``."""
-        return self._calls.on_switches(request, caller, now_ns)
-
-    def led(self, request: m.LedRequest, caller: Any, now_ns: int) -> Outputs:
-        """Process a call that sets a lamp channel; the answer names ``caller``."""
-        return self._calls.on_led(request, caller, now_ns)
-
     # --- timers ----------------------------------------------------------------
-
-    def start(self) -> Send:
-        """Return the first frame: STOP."""
-        return self.motions.order(STOP)
 
     def tick(self, now_ns: int) -> Outputs:
         """Yield what is due."""
@@ -280,7 +253,7 @@ class Core:
         for frame in frames:
             yield self._ask(frame, now_ns)
         yield from self.readiness.changes()
-        yield from self._calls.on_tick(now_ns)
+        yield from self.calls.on_tick(now_ns)
         if self._link_state(now_ns) != self._linked or now_ns - self._linked_ns >= LINK_NS:
             yield Publish("link", self.link(now_ns))
 
@@ -295,14 +268,6 @@ class Core:
         for name, count in self._polling.missed().items():
             self._counters[f"missed_{name}"] = count
         yield Publish("switches", self.readiness.message())
-
-    def stop(self, now_ns: int) -> Outputs:
-        """Stop the vehicle before exit; ``motions.is_stopped`` reports standstill."""
-        return self.motions.stop(now_ns)
-
-    def exit(self, now_ns: int) -> Send:
-        """Return the last frame: STOP at standstill, otherwise BRAKE."""
-        return self.motions.on_exit(now_ns)
 
     # --- the link message ----------------------------------------------------------------
 
