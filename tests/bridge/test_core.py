@@ -13,7 +13,7 @@ from common.wire.commands import MotionKind
 from common.wire.frame import HEADER, Frame, Side
 from common.wire.framing import crc_function
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
-from services.bridge.core.output import Event, Output, Publish, Reacted, Send
+from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Send
 from tests.bridge.core_fixture import (
     BOOT,
     CLEAR,
@@ -288,9 +288,19 @@ def test_the_link_message_comes_at_5_hz_and_on_a_change(bench: Bench) -> None:
 
 def test_a_second_authority_is_an_event_once(bench: Bench) -> None:
     bench.arm()
-    names = [events(bench.move(STOP, boot=boot)) for boot in (SAFETY, 2, 2, SAFETY, 2, 3)]
-    assert names == [[], ["second_authority"], [], [], [], ["second_authority"]]
+    for boot in (SAFETY, 2, 2, SAFETY, 2, 3):
+        bench.move(STOP, boot=boot)
+    text = "a second sender on @cmd/motion is refused"
+    assert [one for one in bench.outputs if isinstance(one, Event) and one.name != "link_up"] == [
+        Event("second_authority", "error", text, {"boot": boot}) for boot in (2, 3)
+    ]
     assert bench.counters["motion_second_authority"] == 4
+
+
+def test_a_run_carries_the_velocities(bench: Bench) -> None:
+    bench.arm()
+    (frame,) = frames(bench.move(linear=0.3, angular=-math.radians(30)))
+    assert frame == commands.MotionCommand(MotionKind.RUN, 300, -300)
 
 
 def test_a_run_that_is_not_finite_is_dropped_and_counted(bench: Bench) -> None:
@@ -387,9 +397,11 @@ def echo(frame: Frame) -> Callable[[Bench], object]:
 
 def late(bench: Bench) -> None:
     """Keep the board connected until the echo is overdue."""
-    for _ in range(30):
+    for step in (*[20 * MS] * 24, 10 * MS):
         bench.receive(STANDS)
-        bench.tick(20 * MS)
+        bench.tick(step)
+    assert not any(isinstance(one, Refuse) for one in bench.outputs)
+    bench.tick(1)
 
 
 def lamp(bench: Bench, caller: Caller) -> list[Output]:

@@ -10,6 +10,7 @@ from common.motion import BRAKE, STOP, Command
 from common.settings import Vehicle, Wire
 from common.wire.framing import Framing
 from services.bridge.config import Bridge
+from services.bridge.core.lease import Lease
 from services.bridge.core.motion_output import MotionOutput
 from services.bridge.core.output import Event, Send
 from services.bridge.core.translate import Translator
@@ -17,6 +18,7 @@ from tests.bridge.core_fixture import BOOT, MS, NOW, SAFETY
 
 SETTINGS = Bridge(deceleration=0.6, angular_deceleration=2.0)
 END = NOW + 200 * MS + 1  # of a lease from NOW on
+UNCOMMANDED = Event("uncommanded_motion", "error", "moved from standstill without a command: BRAKE")
 
 
 class Output:
@@ -28,7 +30,7 @@ class Output:
             SETTINGS, Framing(), translator, boot=BOOT, counters=Counter(), now_ns=NOW
         )
         self.seq = 0
-        self.events: list[str] = []
+        self.events: list[Event] = []
         self.renew(NOW)
 
     def renew(self, now_ns: int) -> None:
@@ -46,7 +48,7 @@ class Output:
     def tick(self, now_ns: int) -> list[Command]:
         """Return the orders of a tick."""
         outputs = list(self.made.on_tick(now_ns))
-        self.events += [one.name for one in outputs if isinstance(one, Event)]
+        self.events += [one for one in outputs if isinstance(one, Event)]
         return [one.order for one in outputs if isinstance(one, Send) and one.order]
 
 
@@ -89,9 +91,35 @@ def test_it_must_stand_by_then(
     assert output.events == []
 
 
+def test_without_a_velocity_it_is_taken_to_stand(output: Output) -> None:
+    for after_s in (0, 2, 4):
+        assert output.tick(END + after_s * NS_PER_S) == [STOP]
+
+
+def test_a_hit_counts_for_the_period_of_stop(output: Output) -> None:
+    list(output.made.on_hit(1, NOW))
+    assert output.tick(NOW + 30 * MS - 1) == []
+    assert output.tick(NOW + 30 * MS) == [BRAKE]
+
+
+def test_a_frame_leaves_from_the_port_of_the_commands(output: Output) -> None:
+    for port in (output.made.port, 1):
+        output.made.port = port
+        assert [output.made.order(order).port for order in Command] == [port] * 3
+    assert Output().made.port == 0
+
+
+@pytest.mark.parametrize("order", [STOP, BRAKE])
+def test_standstill_must_be_measured_after_the_stop(output: Output, order: Command) -> None:
+    output.moves(0.0, NOW)
+    list(output.made.stop(NOW))
+    output.moves(0.0, NOW + (order is STOP))
+    assert output.made.on_exit(NOW + 1).order is order
+
+
 def test_before_the_first_lease_the_coast_limit_counts() -> None:
     made = Output()
-    made.made.lease = type(made.made.lease)(over_since_ns=NOW)
+    made.made.lease = Lease(over_since_ns=NOW)
     made.moves(0.5, NOW)
     assert made.tick(NOW + 40 * MS) == [STOP]
     made.moves(0.5, NOW + NS_PER_S)
@@ -105,10 +133,10 @@ def test_away_by_the_counters(stood: Output, distance: float, left: bool) -> Non
     stood.counts(3.0 + distance, END + 40 * MS)
     stood.counts(9.0, END + 40 * MS, epoch=1)  # a restart of the board is no motion
     stood.moves(0.0, END + 40 * MS)
-    assert stood.tick(END + 40 * MS) == ([BRAKE, STOP] if left else [STOP])
-    assert stood.events == ["uncommanded_motion"] * left
+    assert stood.tick(END + 40 * MS) == [BRAKE if left else STOP]
+    assert stood.events == [UNCOMMANDED] * left
     assert stood.tick(END + 80 * MS) == [BRAKE if left else STOP]
-    assert stood.events == ["uncommanded_motion"] * left, "once"
+    assert stood.events == [UNCOMMANDED] * left, "once"
 
 
 def test_away_by_the_velocities(stood: Output) -> None:
@@ -116,7 +144,7 @@ def test_away_by_the_velocities(stood: Output) -> None:
         assert stood.events == []
         stood.moves(0.5, END + number * 20 * MS)
         stood.tick(END + number * 20 * MS)
-    assert stood.events == ["uncommanded_motion"]
+    assert stood.events == [UNCOMMANDED]
 
 
 def test_what_it_did_before_it_stood_does_not_count(output: Output) -> None:
@@ -149,4 +177,4 @@ def test_while_the_lease_is_valid_safety_supervises_it(stood: Output) -> None:
     assert stood.events == []
     stood.counts(11.06, over + 40 * MS)
     stood.tick(over + 80 * MS)
-    assert stood.events == ["uncommanded_motion"]
+    assert stood.events == [UNCOMMANDED]

@@ -52,11 +52,14 @@ class MotionOutput:
         self._packed = {order: framing.pack(translator.command(order)) for order in (STOP, BRAKE)}
         self._counters = counters
         self._velocity: Latest[Twist] | None = None
+        # 2 equivalent mutants: it is read after a hit only.
         self._hit_ns = 0  # when the hit was read that the lease waits for
         self._stopping_ns: int | None = None
+        # 1 equivalent mutant: no ``boot`` is an empty text.
         self._refused: int | None = None  # ``boot`` of the second authority that was reported
         self._settings = settings
         self._valid_ns = round(settings.lease * NS_PER_S)
+        # 1 equivalent mutant: the first tick begins anew.
         self._over_since_ns: int | None = None  # the end of the lease that is supervised
         self._limit_ns = round(settings.coast * NS_PER_S)  # from then until it must stand
         self._displacement: Displacement | None = None  # None until standstill after that end
@@ -100,7 +103,7 @@ class MotionOutput:
         if self._displacement is not None:
             self._displacement = self._displacement.with_velocity(measured)
         elif measured.value.is_standing:
-            self._displacement = Displacement().with_velocity(measured)
+            self._displacement = Displacement()
 
     def on_mileage(self, mileage: Mileage, now_ns: int) -> None:
         """Process the board's counters."""
@@ -113,16 +116,16 @@ class MotionOutput:
 
     def on_tick(self, now_ns: int) -> Outputs:
         """Send the order that is due."""
+        if self._displacement is not None and self._displacement.has_left:
+            self.lease, order = leases.on_uncommanded(self.lease, now_ns, self._boot)
+            if order is not None:
+                yield self.order(order)
+                text = "moved from standstill without a command: BRAKE"
+                yield Event("uncommanded_motion", "error", text)
         self.lease, order = leases.on_tick(
             self.lease, now_ns, self._valid_ns, self._limit_ns, self._standing(now_ns)
         )
         self._supervise(self.lease.over_since_ns)
-        if self._displacement is not None and self._displacement.has_left:
-            self.lease, brake = leases.on_uncommanded(self.lease, now_ns, self._boot)
-            if brake is not None:
-                yield self.order(brake)
-                text = "moved from standstill without a command: BRAKE"
-                yield Event("uncommanded_motion", "error", text)
         if order is not None:
             yield self.order(order)
 
@@ -144,6 +147,7 @@ class MotionOutput:
         """Stop the vehicle before exit; only the first call sends a frame."""
         if self._stopping_ns is None:
             self._stopping_ns = now_ns
+            # 2 equivalent mutants: a stopping bridge is never ready.
             self.on_ready(False)
             yield self.order(BRAKE if self.lease.braking else STOP)
 
