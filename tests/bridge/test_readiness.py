@@ -12,7 +12,7 @@ from common.motion import STOP
 from common.wire import reports
 from common.wire.commands import BumperBrakeSet, MotionKind, UltrasonicBrakeSet
 from services.bridge.config import BridgeConfig
-from services.bridge.core.output import Output
+from services.bridge.core.output import Event, Output
 from services.bridge.core.readiness import (
     AGAIN_NS,
     ASK_NS,
@@ -37,23 +37,40 @@ def bench() -> Bench:
 # --- the link -------------------------------------------------------------------------------------
 
 
+def link_up(before: str) -> Event:
+    return Event("link_up", "info", "the board is connected", {"before": before})
+
+
+def of_type(kind: type[Event], outputs: list[Output]) -> list[Output]:
+    return [output for output in outputs if isinstance(output, kind)]
+
+
+def test_a_restart_of_the_board_is_an_event(bench: Bench) -> None:
+    bench.arm()
+    out = bench.answer(reports.DistanceReport(0, 0))
+    text = "the board has restarted"
+    assert of_type(Event, out) == [Event("board_restarted", "warning", text, {"epoch": 1})]
+    assert settings_sent(bench.tick(0)) == 2
+
+
 @pytest.mark.parametrize(("age", "state"), [(SILENCE, "up"), (SILENCE + 1, "lost")])
 def test_silence_loses_the_link(bench: Bench, age: int, state: str) -> None:
     readiness = bench.core.readiness
     bench.tick(9 * NS_PER_S)
     assert bench.link().state == "never"
     assert bench.link().waiting == "nothing received from the board yet on UDP port 4002, 4001"
-    assert events(bench.receive(STANDS)) == ["link_up"]
+    assert bench.receive(STANDS)[-1] == link_up("never")
     up_ns = bench.now_ns
     bench.now_ns += 60 * MS
     assert events(bench.receive(STANDS)) == []
     assert (readiness.up_ns, readiness.gap_ns) == (up_ns, 0)
-    assert events(bench.tick(age)) == ([] if state == "up" else ["link_lost"])
+    lost = [Event("link_lost", "error", "the board is silent")]
+    assert of_type(Event, bench.tick(age)) == ([] if state == "up" else lost)
     assert bench.link().state == state
     if state == "lost":
         assert events(bench.tick(age)) == []
         assert (bench.link().waiting, bench.link().state) == ("link lost", "lost")
-        assert events(bench.receive(STANDS)) == ["link_up"]
+        assert bench.receive(STANDS)[-1] == link_up("lost")
         assert (readiness.up_ns, readiness.gap_ns) == (bench.now_ns, 0)
 
 
@@ -170,8 +187,10 @@ def test_a_board_without_echoes_is_reported_once_with_the_setting_that_helps(ben
         assert events(bench.tick(20 * MS)) == []
         assert hint not in bench.link().waiting
     bench.receive(STANDS)
-    assert events(bench.tick(1)) == ["switches_unverified"]
-    assert hint in bench.link().waiting
+    text = "the board's emergency brakes are not both on and echoed"
+    unverified = Event("switches_unverified", "error", f"no motion: {text}")
+    assert of_type(Event, bench.tick(1)) == [unverified]
+    assert bench.link().waiting.startswith(f"{text}{hint}")
     assert events(bench.tick(20 * MS)) == []
     bench.answer(reports.BumperBrakeReport(False))
     assert hint not in bench.link().waiting
@@ -194,11 +213,19 @@ def report(braking: str = "", **fields: Any) -> bytes:
     return json.dumps(usual | fields).encode()
 
 
-def take(bench: Bench, datagram: bytes) -> list[str]:
+UP = Event("relay_up", "info", "the relay passes commands")
+LOST = Event("relay_lost", "error", "the relay is silent")
+
+
+def braking(why: str) -> Event:
+    return Event("relay_braking", "warning", f"the relay brakes: {why}")
+
+
+def take(bench: Bench, datagram: bytes) -> list[Output]:
     """Take a report, and tick; return the events."""
     bench.core.relay_report(datagram, bench.now_ns)
     assert not bench.core.rejected
-    return events(bench.tick(0))
+    return of_type(Event, bench.tick(0))
 
 
 def armed() -> Bench:
@@ -207,7 +234,7 @@ def armed() -> Bench:
     assert bench.link().waiting.startswith("nothing received from the board")
     bench.receive(STANDS)
     assert bench.link().waiting.startswith("nothing received from the relay yet")
-    assert take(bench, report()) == ["relay_up"]
+    assert take(bench, report()) == [UP]
     bench.arm()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
     return bench
@@ -223,11 +250,11 @@ def test_without_the_setting_reports_change_nothing(bench: Bench) -> None:
 @pytest.mark.parametrize("why", ["start", "silent", "hit"])
 def test_while_the_relay_brakes_stop_is_sent_and_a_neutral_motion_re_arms(why: str) -> None:
     bench = armed()
-    assert take(bench, report(why)) == ["relay_braking"]
+    assert take(bench, report(why)) == [braking(why)]
     assert bench.link().waiting.startswith(f"the relay brakes: {why}")
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]  # neutral to the relay
     assert take(bench, report(why)) == []
-    assert take(bench, report()) == ["relay_up"]
+    assert take(bench, report()) == [UP]
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
     bench.move(STOP)
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
@@ -242,11 +269,11 @@ def test_a_silent_relay_is_lost_after_five_reports_and_comes_back() -> None:
         bench.tick(10 * MS)
     assert not bench.link().waiting.startswith("the relay is silent")
     bench.receive(STANDS)
-    assert "relay_lost" in events(bench.tick(10 * MS))
+    assert LOST in bench.tick(10 * MS)
     assert bench.link().waiting.startswith("the relay is silent")
     assert bench.link().relay.state == "lost"  # type: ignore[union-attr]
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
-    assert take(bench, report()) == ["relay_up"]
+    assert take(bench, report()) == [UP]
 
 
 def test_the_link_message_has_the_newest_report() -> None:
@@ -285,7 +312,7 @@ def test_an_invalid_report_is_refused(datagram: bytes) -> None:
 
 def test_the_relays_own_report_is_valid() -> None:
     (own,) = (datagram for to, _, datagram in Relay(0).tick(0) if to == REPORT)
-    assert take(Bench(CONFIGURED), own) == ["relay_braking"]
+    assert take(Bench(CONFIGURED), own) == [braking("start")]
 
 
 @pytest.mark.parametrize(
