@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Direction, Mileage
+from common.messages import Direction, Mileage, ReleaseRequest
 from services.safety.core.causes import BY_NAME, latched
 from services.safety.core.operator_requests import BUMPER_FREE, LET_GO, room
 from tests.safety.policy_fixture import (
@@ -257,7 +257,8 @@ def test_late_and_repeated_requests_move_nothing() -> None:
     assert fixture.verdict.command == "run"
 
 
-def test_a_higher_source_ends_a_release_and_goes_before_it() -> None:
+@pytest.mark.parametrize("asked", ["none", *DIRECTIONS])
+def test_a_higher_source_ends_a_release_and_continues_none(asked: ReleaseRequest) -> None:
     fixture = hit()
     fixture.tick()
     fixture.driver_boot = 5
@@ -269,8 +270,9 @@ def test_a_higher_source_ends_a_release_and_goes_before_it() -> None:
     assert fixture.hold("backward", 3, source="web") == ""
     assert fixture.verdict.source == "web"
     fixture.driver_boot = 99
-    assert fixture.let_go().command == "brake"
+    assert fixture.request(release=asked).command == "brake"
     assert fixture.verdict.source == "teleop"
+    assert fixture.state.release.refusal == ("" if asked == "none" else LET_GO)
 
 
 @pytest.mark.parametrize("rear", [0.1, None])

@@ -23,6 +23,7 @@ from services.safety.core.causes import (
 )
 from services.safety.core.inputs import Inputs, Reset
 from services.safety.core.release import SIGN, Release, stopping_distance
+from services.safety.core.sources import DriveChannel
 from services.safety.core.state import Reply, State
 
 BY_HAND = "Push the vehicle off by hand, then reset."
@@ -140,18 +141,20 @@ def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Rel
         ("" if source in settings.operators else f"{source} may not release: {NO_OPERATOR}")
         or _no_release(state, inputs, settings)
         or _direction_refusal(release, asked)
-        or _not_let_go(release, asked, state.arbiter.channels[source].neutral_ns)
+        or _not_let_go(release, source, state.arbiter.channels[source])
     )
     if reason:
         return replace(release, direction=None, refusal=reason, barred_ns=now_ns)
     moves = "" if release.direction else _not_standing(inputs, settings, now_ns)
-    return replace(release, direction=None if moves else asked, refusal=moves)
+    return replace(release, source=source, direction=None if moves else asked, refusal=moves)
 
 
-def _not_let_go(release: Release, asked: Direction, neutral_ns: int | None) -> str:
-    """Return that a neutral request is due: before each release, also in the other direction."""
+def _not_let_go(release: Release, source: str, channel: DriveChannel) -> str:
+    """Return that a neutral request is due: before each release of a source in a direction."""
     if release.direction is not None:
-        return "" if release.direction == asked else LET_GO
+        continues = (release.source, release.direction) == (source, channel.release)
+        return "" if continues else LET_GO
+    neutral_ns = channel.neutral_ns
     return "" if neutral_ns is not None and neutral_ns > release.barred_ns else LET_GO
 
 
