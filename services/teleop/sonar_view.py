@@ -109,10 +109,11 @@ class SonarView:
                 for each in range(1, len(BODY) - 1):
                     self._put(self._top + each, column, "┃", style)
         gap, length = 7 + 2 * self._bands, len(shown.label)
-        row = self._row(ahead, self._bands - 1) if ahead else self._top + 2
-        if not side:
-            row, gap, side = self._row(ahead, self._bands), -(length // 2), 1
-        column = self._middle + (gap if side > 0 else 1 - gap - length)
+        if side:
+            row = self._row(ahead, self._bands - 1) if ahead else self._top + 2
+            column = self._middle + (gap if side > 0 else 1 - gap - length)
+        else:
+            row, column = self._row(ahead, self._bands), self._middle - length // 2
         self._put(row, column, shown.label, shown.style)
 
     def text(self) -> Text:
