@@ -51,6 +51,7 @@ class Node(Generic[C]):
         self.log = log.Logger()
         self.buses: list[Bus] = []
         self.bus = self.open_bus()
+        self.loop.every(QUERY_PERIOD_S, lambda _: self._answer_queries())
         self.counters: Counter[str] = Counter()
         self.is_stopped: Callable[[], bool] = lambda: True  # polled while stopping
         self.on_exit: Callable[[], None] = lambda: None  # on every exit path, crashes included
@@ -65,7 +66,6 @@ class Node(Generic[C]):
         """Return a bus with a session of its own; all open and close together."""
         bus = Bus(self.config.bus, self.config.robot.id, self.loop.post)
         self.buses.append(bus)
-        self.loop.every(QUERY_PERIOD_S, lambda _: bus.answer_queries())
         return bus
 
     def open(self) -> None:
@@ -109,6 +109,10 @@ class Node(Generic[C]):
         for part, make in parts.items():
             bus.answer(keys.info_key(robot, self.name, part), make, "application/json")
         self.loop.every(1.0, self._report)
+
+    def _answer_queries(self) -> None:
+        for bus in self.buses:
+            bus.answer_queries()
 
     def _report(self, now_ns: int) -> None:
         counts = Counter(self.bus.counts)
