@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 
+import zenoh
+
 from cli.keys import access
 from cli.keys.access import Rights, Verb
 from common import keys
-from common.bus.probe import includes
 from common.members import OPERATORS_SOURCES
 from services.ros2 import names
 from services.ros2.config import Ros2
@@ -75,7 +76,8 @@ WORDS: Mapping[Verb, str] = {
 
 def may(given: Rights, verb: Verb, key: str) -> bool:
     """Return whether permissions include a verb on a key, or on every key of an expression."""
-    return any(includes(expression, key) for expression in given.get(verb, ()))
+    wanted = zenoh.KeyExpr(key)
+    return any(zenoh.KeyExpr(each).includes(wanted) for each in given.get(verb, ()))
 
 
 def table() -> str:

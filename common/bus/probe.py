@@ -139,18 +139,17 @@ class Probe:
 def probe(where: BusSettings) -> Iterator[Probe]:
     """Connect to the bus for the context; raise ``LinkError`` when no router answers."""
     check_files(where, where.endpoints)
-    with _opened(where) as session:
-        yield Probe(session)
-
-
-def _opened(where: BusSettings) -> zenoh.Session:
-    for turn in range(len(where.endpoints)):
+    for attempt in range(len(where.endpoints)):
         with suppress(zenoh.ZError):
-            return zenoh.open(client_config(where, turn))
-    raise LinkError(
-        f"no router answers at {', '.join(where.endpoints)}: is `t2 up` running there? "
-        "Run `t2 doctor`, or choose another router: --set bus.connect=tcp/HOST:7447"
-    )
+            session = zenoh.open(client_config(where, attempt))
+            break
+    else:
+        raise LinkError(
+            f"no router answers at {', '.join(where.endpoints)}: is `t2 up` running there? "
+            "Run `t2 doctor`, or choose another router: --set bus.connect=tcp/HOST:7447"
+        )
+    with session:
+        yield Probe(session)
 
 
 def _matches(*declared: Any) -> bool:
@@ -175,11 +174,6 @@ def valid(expression: str) -> bool:
 def intersects(one: str, other: str) -> bool:
     """Return whether some key matches both expressions."""
     return bool(zenoh.KeyExpr(one).intersects(zenoh.KeyExpr(other)))
-
-
-def includes(wide: str, narrow: str) -> bool:
-    """Return whether the first expression includes the second."""
-    return bool(zenoh.KeyExpr(wide).includes(zenoh.KeyExpr(narrow)))
 
 
 def _answer(reply: zenoh.Reply) -> Answer:
