@@ -60,6 +60,7 @@ def test_the_golden_bytes_name_their_source() -> None:
     [
         (c.MotionCommand(c.MotionKind.STOP), "0000000000"),
         (RUN(500, -32767), "01f401ffff"),
+        (RUN(-32767, 32767), "01ffffff7f"),
         (c.DistanceQuery(), ""),
         (c.UltrasonicBrakeSet(True), "01"),
         (c.UltrasonicBrakeSet(False), "00"),
@@ -67,6 +68,7 @@ def test_the_golden_bytes_name_their_source() -> None:
         (c.LedSet(0, 0, 10, 255, 0, 0, 0, 0, 0), "00000aff0000000000"),
         (r.VelocityReport(500, -300), "f4012c81"),
         (r.VelocityReport(-1, 1), "01800100"),
+        (r.VelocityReport(32767, -32767), "ff7fffff"),
         (r.DistanceReport(1, -1), "01000000ffffffff"),
         (r.DistanceReport(-(2**31), -1800), "00000080f8f8ffff"),
         (r.DistanceReport(2**31 - 1, 1800), "ffffff7f08070000"),
@@ -78,6 +80,7 @@ def test_the_golden_bytes_name_their_source() -> None:
         (r.UltrasonicBrakeReport(False), "00"),
         (r.BumperBrakeReport(True), "01"),
         (r.DriverReport(Side.RIGHT, 0x80000010), "0110000080"),
+        (r.DriverReport(Side.LEFT, 2**32 - 1), "00ffffffff"),
         (r.LedReport(True), "55"),
         (r.LedReport(False), "aa"),
     ],
