@@ -27,11 +27,11 @@ class Source(Generic[M]):
     No method blocks: without a bus a message is dropped.
     """
 
-    def __init__(
-        self, bus: Bus, topic: Topic[M], source: str, on_denied: Callable[[], None] = lambda: None
-    ) -> None:
+    topic: Topic[M]
+
+    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
         self.name = source
-        self._publisher = bus.publisher(topic, source=source)
+        self._publisher = bus.publisher(self.topic, source=source)
         self._access = Access()
         self._on_denied = on_denied
         bus.subscribe(keys.SAFETY, self._on_safety)
@@ -54,8 +54,7 @@ class Source(Generic[M]):
 class DriveSource(Source[Drive]):
     """A source of drive requests."""
 
-    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
-        super().__init__(bus, keys.DRIVE, source, on_denied)
+    topic = keys.DRIVE
 
     def request(self, linear: float, angular: float) -> Drive:
         """Request a motion (m/s, rad/s, in ``base_link``) until the source's lease expires."""
@@ -71,8 +70,7 @@ class DriveSource(Source[Drive]):
 class LimitPublisher(Source[Limit]):
     """A source of speed limits."""
 
-    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
-        super().__init__(bus, keys.LIMIT, source, on_denied)
+    topic = keys.LIMIT
 
     def limit(
         self, linear: float | None = None, angular: float | None = None, reason: str = ""
@@ -91,8 +89,7 @@ class LimitPublisher(Source[Limit]):
 class KeepalivePublisher(Source[EstopKeepalive]):
     """A source of signs of life of an emergency stop."""
 
-    def __init__(self, bus: Bus, source: str, on_denied: Callable[[], None] = lambda: None) -> None:
-        super().__init__(bus, keys.ESTOP_KEEPALIVE, source, on_denied)
+    topic = keys.ESTOP_KEEPALIVE
 
     def beat(self, echo: int | None = None) -> EstopKeepalive:
         """Send one, with the heartbeat that an operator's screen showed; the newest by default."""
