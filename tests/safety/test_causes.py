@@ -5,6 +5,7 @@ import pytest
 from common.freshness import NS_PER_S
 from common.messages import Action
 from services.safety.core.causes import (
+    BARRING,
     FAILURES,
     GOOD_SAMPLES,
     RULES,
@@ -13,7 +14,6 @@ from services.safety.core.causes import (
     Held,
     Latches,
     Observation,
-    bars_motion,
     begun,
     latched,
     named,
@@ -72,7 +72,7 @@ def test_order_and_groups_of_the_table() -> None:
     assert worst["brake"] < worst["stop"] < worst["slow"]
     lasting = {name for name, _, clears in TABLE if clears is not AT_ONCE}
     assert {name for name in names if wants_neutral(name)} == lasting
-    assert {name for name in names if bars_motion(name)} == lasting | {"two_publishers"}
+    assert lasting | {"two_publishers"} == BARRING
 
 
 # --- held causes ----------------------------------------------------------------------------

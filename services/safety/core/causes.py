@@ -122,12 +122,7 @@ def wants_neutral(name: str) -> bool:
     return clears(name) is not Clears.AT_ONCE
 
 
-def bars_motion(name: str) -> bool:
-    """Return whether the cause forbids every motion."""
-    return name in BARRING
-
-
-BARRING = frozenset(
+BARRING = frozenset(  # causes that forbid every motion
     rule.name for rule in RULES if wants_neutral(rule.name) or rule.name == "two_publishers"
 )
 
@@ -145,7 +140,7 @@ class Observation(Struct, frozen=True):
 
     name: str
     present: bool
-    token: Token
+    token: Token | None = None  # None: this decision, without a sample
     text: str = ""
 
 
@@ -173,18 +168,18 @@ def observe(
     """
     result = dict(held)
     for one in seen:
-        old = held.get(one.name)
+        old, token = held.get(one.name), one.token or (0, now_ns)
         if one.present:
             text = one.text or BY_NAME[one.name].text
             since_ns, id_ = now_ns, decision * len(RULES) + _ROW[one.name]
             if old and old.good < GOOD_SAMPLES:
                 since_ns, id_ = old.since_ns, old.id
-            result[one.name] = Held(since_ns, now_ns, 0, one.token, text, id_)
+            result[one.name] = Held(since_ns, now_ns, 0, token, text, id_)
         elif old and _is_over(one.name, old, now_ns, settle_ns):
             del result[one.name]
         elif old:
-            good = old.good + (one.token != old.token)
-            result[one.name] = replace(old, good=good, token=one.token)
+            good = old.good + (token != old.token)
+            result[one.name] = replace(old, good=good, token=token)
     return result
 
 

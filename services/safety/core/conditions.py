@@ -28,33 +28,32 @@ def observe_inputs(
     inputs: Inputs, settings: Safety, state: State, now_ns: int
 ) -> Iterator[Observation]:
     """Yield each cause that depends on inputs and state, present or not."""
-    tick = (0, now_ns)
     acked = state.verdict.acked if state.verdict.acked != (0, 0) else None
-    yield _contact(inputs, tick)
-    yield Observation("estop", _estop_received(inputs, state), tick)
+    yield _contact(inputs)
+    yield Observation("estop", _estop_received(inputs, state))
     if state.keepalives.names:
         yield state.keepalives.observation(now_ns)
     yield _estop_reader(inputs, state, now_ns)
-    yield _driver("left", inputs.left, tick)
-    yield _driver("right", inputs.right, tick)
-    yield Observation("leaving", inputs.leaving, tick)
-    yield _starting(inputs, settings, state.keepalives.missing, tick)
-    yield from _link(inputs, tick)
-    yield _switches(inputs, settings, tick)
+    yield _driver("left", inputs.left)
+    yield _driver("right", inputs.right)
+    yield Observation("leaving", inputs.leaving)
+    yield _starting(inputs, settings, state.keepalives.missing)
+    yield from _link(inputs)
+    yield _switches(inputs, settings)
     yield _bumper(inputs, settings, acked, now_ns)
-    yield _bumper_lossy(inputs, "bumper_lossy" in state.latches, tick)
+    yield _bumper_lossy(inputs, "bumper_lossy" in state.latches)
     yield _silent(inputs, settings, state, now_ns)
     yield from _motion(state.motion, now_ns)
     yield from state.speed_limits.observations(now_ns)
     conflicts = ", ".join(state.arbiter.conflict(now_ns) + state.speed_limits.conflicts(now_ns))
     text = f"Two publishers use {conflicts}."
-    yield Observation("two_publishers", bool(conflicts), tick, text)
+    yield Observation("two_publishers", bool(conflicts), text=text)
 
 
-def _contact(inputs: Inputs, tick: Token) -> Observation:
+def _contact(inputs: Inputs) -> Observation:
     bumper = inputs.bumper
     if bumper is None:
-        return Observation("contact", False, tick)
+        return Observation("contact", False)
     sample = bumper.value
     return Observation("contact", sample.pressed, (sample.boot, sample.seq))
 
@@ -67,21 +66,20 @@ def _estop_received(inputs: Inputs, state: State) -> bool:
 
 def _estop_reader(inputs: Inputs, state: State, now_ns: int) -> Observation:
     """Observe whether an emergency stop may have been missed."""
-    tick = (0, now_ns)
     if _stalled(state, STALL_S, now_ns):
         text = "Safety was stalled: an emergency stop may have been missed."
-        return Observation("estop_reader", True, tick, text)
+        return Observation("estop_reader", True, text=text)
     lost = state.estop_connection not in (0, inputs.estop_connection)
-    return Observation("estop_reader", lost, tick)
+    return Observation("estop_reader", lost)
 
 
 def _stalled(state: State, age_s: float, now_ns: int) -> bool:
     return state.decided_ns is not None and now_ns - state.decided_ns > age_s * NS_PER_S
 
 
-def _driver(side: str, latest: Latest[Driver] | None, tick: Token) -> Observation:
+def _driver(side: str, latest: Latest[Driver] | None) -> Observation:
     if latest is None:
-        return Observation(f"driver_{side}", False, tick)
+        return Observation(f"driver_{side}", False)
     sample = latest.value
     faulty = bool(sample.bits or sample.faults)
     names = ", ".join(sample.faults) or f"bits {sample.bits:#x}"
@@ -89,7 +87,7 @@ def _driver(side: str, latest: Latest[Driver] | None, tick: Token) -> Observatio
     return Observation(f"driver_{side}", faulty, (sample.boot, sample.seq), text)
 
 
-def _starting(inputs: Inputs, settings: Safety, keepalives: list[str], tick: Token) -> Observation:
+def _starting(inputs: Inputs, settings: Safety, keepalives: list[str]) -> Observation:
     needed: dict[str, Latest[Any] | None] = {
         "velocity": inputs.velocity,
         "ultrasonic": inputs.ultrasonic,
@@ -105,60 +103,59 @@ def _starting(inputs: Inputs, settings: Safety, keepalives: list[str], tick: Tok
         missing.append("emergency stop")
     missing += [f"emergency stop keepalive of {name}" for name in keepalives]
     text = f"Waiting for the first sample of: {', '.join(missing)}."
-    return Observation("starting", bool(missing), tick, text)
+    return Observation("starting", bool(missing), text=text)
 
 
-def _link(inputs: Inputs, tick: Token) -> Iterator[Observation]:
+def _link(inputs: Inputs) -> Iterator[Observation]:
     if inputs.link is None:
         return
     link = inputs.link.value
     texts = {"lost": "The link to the board is lost.", "never": "No frame came from the board yet."}
-    yield Observation("link", link.state != "up", tick, texts.get(link.state, ""))
+    yield Observation("link", link.state != "up", text=texts.get(link.state, ""))
     text = f"The bridge is not armed yet: {link.waiting}." if link.waiting else ""
-    yield Observation("unarmed", link.state == "up" and not link.armed, tick, text)
+    yield Observation("unarmed", link.state == "up" and not link.armed, text=text)
     # The bridge stores a latch until safety confirms it, so that a latch survives a restart of
     # safety. The bridge's own boot means a motion that it braked without a safety service.
     due = link.latched_by not in (None, inputs.boot)
     text = MOVED_ALONE if due and link.latched_by == link.boot else ""
-    yield Observation("predecessor", due, tick, text)
+    yield Observation("predecessor", due, text=text)
 
 
-def _switches(inputs: Inputs, settings: Safety, tick: Token) -> Observation:
+def _switches(inputs: Inputs, settings: Safety) -> Observation:
     if inputs.switches is None or not settings.require_switches:
-        return Observation("switches", False, tick)
+        return Observation("switches", False)
     switches = inputs.switches.value
     verified = switches.ultrasonic_brake is True and switches.bumper_brake is True
-    return Observation("switches", not verified, tick)
+    return Observation("switches", not verified)
 
 
 def _bumper(inputs: Inputs, settings: Safety, acked: Token | None, now_ns: int) -> Observation:
-    tick = (0, now_ns)
     if inputs.bumper is None:
-        return Observation("bumper", False, tick)
+        return Observation("bumper", False)
     if not fresh(inputs.bumper, now_ns, settings.bumper_age):
-        return Observation("bumper", True, tick, "The bumper is not being read.")
+        return Observation("bumper", True, text="The bumper is not being read.")
     boot, seq = inputs.bumper.value.boot, inputs.bumper.value.seq
     polls = inputs.bumper.value.lost
     if polls > LOST_POLLS:
-        return Observation("bumper", True, tick, f"{polls} bumper polls of 0.2 s were lost.")
+        return Observation("bumper", True, text=f"{polls} bumper polls of 0.2 s were lost.")
     if acked is not None and boot != acked[0]:
-        return Observation("bumper", True, tick, "The bridge has restarted.")
+        return Observation("bumper", True, text="The bridge has restarted.")
     lost = acked is not None and seq - acked[1] > LOST_SAMPLES
-    return Observation("bumper", lost, tick, "Samples of the bumper were lost.")
+    return Observation("bumper", lost, text="Samples of the bumper were lost.")
 
 
-def _bumper_lossy(inputs: Inputs, held: bool, tick: Token) -> Observation:
+def _bumper_lossy(inputs: Inputs, held: bool) -> Observation:
     polls = inputs.bumper.value.lost if inputs.bumper else 0
     lossy = polls >= LOST_POLLS or (held and polls > FEW_POLLS)
     text = f"Creeping: {polls} bumper polls of 0.2 s were lost."
-    return Observation("bumper_lossy", lossy, tick, text)
+    return Observation("bumper_lossy", lossy, text=text)
 
 
 def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Observation:
     # A sample counts from its reception; samples queued during a stall seem new afterwards.
     if _stalled(state, settings.bumper_age, now_ns):
         text = "Safety was stalled: samples received meanwhile may be old."
-        return Observation("silent", True, (0, now_ns), text)
+        return Observation("silent", True, text=text)
     too_old = {
         "velocity": _is_old(inputs.velocity, settings.velocity_age, now_ns),
         "link": _is_old(inputs.link, settings.link_age, now_ns),
@@ -172,19 +169,18 @@ def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Obse
         "a finite velocity": inputs.velocity is not None and inputs.measured is None,
     }
     old = [name for name, is_old in too_old.items() if is_old]
-    return Observation("silent", bool(old), (0, now_ns), f"No recent data: {', '.join(old)}.")
+    return Observation("silent", bool(old), text=f"No recent data: {', '.join(old)}.")
 
 
 def _motion(motion: MotionWatch, now_ns: int) -> Iterator[Observation]:
-    standstill, tick = motion.standstill, (0, now_ns)
+    standstill = motion.standstill
     twist = standstill.displacement.steady
     text = "Standstill is not confirmed: no velocity is received."
     if twist is not None:
         text = f"The vehicle does not stop: {twist.linear:.2f} m/s, {twist.angular:.2f} rad/s."
-    yield Observation("runaway", motion.runs_away, tick)
-    yield Observation("uncommanded_motion", standstill.left, tick)
-    # 1 equivalent mutant: this cause clears by time, without a token.
-    yield Observation("not_stopping", standstill.is_late(now_ns), tick, text)
+    yield Observation("runaway", motion.runs_away)
+    yield Observation("uncommanded_motion", standstill.left)
+    yield Observation("not_stopping", standstill.is_late(now_ns), text=text)
 
 
 def _is_old(latest: Latest[T] | None, age_s: float, now_ns: int) -> bool:

@@ -12,8 +12,8 @@ from common.freshness import NS_PER_S
 from common.messages import Direction
 from services.safety.config import Safety
 from services.safety.core.causes import (
+    BARRING,
     FaultBudget,
-    bars_motion,
     begun,
     latched,
     named,
@@ -164,7 +164,7 @@ def _no_release(state: State, inputs: Inputs, settings: Safety) -> str:
         return "There is no contact to release."
     if not _is_pressed(inputs):
         return BUMPER_FREE
-    others = ordered(n for n in state.latches if bars_motion(n) and n != "contact")
+    others = ordered((BARRING & state.latches.keys()) - {"contact"})
     if others:
         due = others[0] in latched(state.latches) and others[0] not in still_present(state.latches)
         return state.latches[others[0]].text + (" Reset first." if due else "")

@@ -194,7 +194,7 @@ def _overlap(measured: float, target: float) -> float:
 
 
 def observations(
-    state: State, requested: RequestedTwist | None, plan: Plan, now_ns: int
+    state: State, requested: RequestedTwist | None, plan: Plan
 ) -> Iterator[Observation]:
     """Yield the causes that depend on a request, present or not."""
     present = {
@@ -207,7 +207,7 @@ def observations(
         "sonar": state.sonar_array.is_doubted,
     }
     for name, is_present in present.items():
-        yield Observation(name, is_present, (0, now_ns))
+        yield Observation(name, is_present)
 
 
 def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:

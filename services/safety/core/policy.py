@@ -151,7 +151,7 @@ class Policy:
         held = observe(state.latches, seen, now_ns, settle_ns, state.decision)
         was_good, is_good = not _failing(state.latches), not _failing(held)
         budget = state.fault_budget.updated(now_ns, was_good and not is_good, is_good)
-        flapping = Observation("flapping", budget.is_spent, (0, now_ns))
+        flapping = Observation("flapping", budget.is_spent)
         held = observe(held, [flapping], now_ns, decision=state.decision)
         release = state.release
         if "contact" in held:
@@ -180,7 +180,7 @@ class Policy:
             known = inputs.known_velocity(now_ns, self.settings.velocity_age)
             measured = known.value if known else STILL
             plan = self.planner.plan(state, measured, requested, step_s)
-        seen = observations(state, requested, plan, now_ns)
+        seen = observations(state, requested, plan)
         held = observe(state.latches, seen, now_ns, decision=state.decision)
         worst = _worst(held.keys() - suspended)
         command = COMMANDS[worst]

@@ -79,7 +79,7 @@ class Axis(Struct, frozen=True):
 
     def approach(self, twist: Twist) -> float:
         """Return the speed (m/s) of approach to what the sonar sees."""
-        along = self.along(twist)
+        along = twist.linear * self.linear + twist.angular * self.angular
         return max(along, abs(twist.angular) * self.swing) if self.swing else along
 
 

@@ -285,13 +285,12 @@ class SpeedLimits(Struct, frozen=True):
         """Yield the causes that forbid motion, present or not; none without sources."""
         if not self.sources:
             return
-        tick = (0, now_ns)
         stopping = [f"{name}{one.because}" for name, one in self._valid(now_ns) if one.stops]
         stopping += [f"{name}: two publishers" for name in self._in_conflict(now_ns)]
         silent = ", ".join(self._silent(now_ns))
         silent_text = f"No speed limit arrives of {silent}."
-        yield Observation("limit_stop", bool(stopping), tick, f"Stopped by {', '.join(stopping)}.")
-        yield Observation("limit_silent", bool(silent), tick, silent_text)
+        yield Observation("limit_stop", bool(stopping), text=f"Stopped by {', '.join(stopping)}.")
+        yield Observation("limit_silent", bool(silent), text=silent_text)
 
     def conflicts(self, now_ns: int) -> list[str]:
         """Return the names of sources with two publishers."""
@@ -386,7 +385,7 @@ class Keepalives(Struct, frozen=True):
         """Return the cause of the names that were received and are lost, present or not."""
         lost = [name for name in self.channels if not self._is_alive(name, now_ns)]
         text = f"The emergency stop is no longer kept alive by {', '.join(lost)}."
-        return Observation("estop_keepalive", bool(lost), (0, now_ns), text)
+        return Observation("estop_keepalive", bool(lost), text=text)
 
     def states(self, now_ns: int) -> tuple[KeepaliveState, ...]:
         """Return the published states."""
