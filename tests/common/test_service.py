@@ -1,8 +1,10 @@
 """A service's life, from its settings to its exit code, as a real process."""
 
 import json
+import os
 import signal
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -10,7 +12,7 @@ import zenoh
 
 from common import codec, keys
 from common.bus.bus import Bus
-from common.bus.session import router
+from common.bus.session import ONE_POOL, RUNTIME_ENV, router
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.config import Sources, load
 from common.messages import Event, Health
@@ -75,6 +77,21 @@ def test_the_schema_and_the_settings_are_encoded_once(monkeypatch: pytest.Monkey
         make = made[keys.info_key(node.config.robot.id, "odom", part)]
         assert make() is make()
     node.loop.close()
+
+
+def test_zenoh_has_a_thread_for_each_session(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A dead TCP link occupies its thread for 10 s: the others must not share it."""
+    monkeypatch.delenv(RUNTIME_ENV, raising=False)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    sets = ["bus.connect=tcp/127.0.0.1:1"]
+    node = Node("safety", load(Shared, Sources(environ={}, sets=sets)))
+    node.open_bus()
+    node.open_drive(listens=False)
+    node.open()
+    node.close()
+    assert os.environ[RUNTIME_ENV] == ONE_POOL.format(links=3)
 
 
 # --- on a router --------------------------------------------------------------------------------
