@@ -1,5 +1,7 @@
 """Which query is due, which answer is overdue, and which polls are lost."""
 
+from collections.abc import Callable
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -83,16 +85,19 @@ def test_the_round_trip_is_the_median_of_the_queries() -> None:
 
 
 @pytest.mark.parametrize(
-    ("polled", "due"),
+    ("queries", "due"),
     [
         # the period is kept while less than a period late; a pause is not caught up in a burst
-        (polling(), ((1000, 1020), (1023, 1040), (1059, 1060), (1080, 1100))),
-        (polling(), ((1000, 1020), (5000, 5020), (5010, 5020), (5020, 5040))),
+        (polling, ((1000, 1020), (1023, 1040), (1059, 1060), (1080, 1100))),
+        (polling, ((1000, 1020), (5000, 5020), (5010, 5020), (5020, 5040))),
         # a late steady poll is not followed at once by the next
-        (steady(), ((1000, 1020), (1025, 1040), (1045, 1060), (1075, 1085), (1105, 1125))),
+        (steady, ((1000, 1020), (1025, 1040), (1045, 1060), (1075, 1085), (1105, 1125))),
     ],
 )
-def test_when_the_next_is_due(polled: Polling, due: tuple[tuple[int, int], ...]) -> None:
+def test_when_the_next_is_due(
+    queries: Callable[[], Polling], due: tuple[tuple[int, int], ...]
+) -> None:
+    polled = queries()
     for tick, next_tick in due:
         polled.due(tick * MS)
         polled.answered("bumper", tick * MS)
