@@ -13,7 +13,20 @@ from common.settings import AngularUnit, Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Side
 from common.wire.reports import DistanceReport, DriverReport, UltrasonicReport, VelocityReport
-from services.bridge.core.translate import BumperFilter, Translator, driver, restarted
+from services.bridge.core.translate import (
+    DRIVEN_MPS,
+    FAST_MPS,
+    FAST_RADPS,
+    STEP,
+    STEP_TO_ZERO,
+    TURNED_RADPS,
+    ZERO_M,
+    ZERO_RAD,
+    BumperFilter,
+    Translator,
+    driver,
+    restarted,
+)
 
 
 @pytest.fixture
@@ -258,3 +271,32 @@ def test_after_a_silence_counters_that_are_nearer_to_zero_have_begun_anew(
 ) -> None:
     assert restarted(before, after, 0.1, unbroken=True, silent=True) is anew
     assert not restarted(before, after, 0.15, unbroken=True)
+
+
+def counted(distance: float, heading: float = 0.0) -> Mileage:
+    return Mileage(distance=distance, heading=heading, epoch=0)
+
+
+NEAR_M, NEAR_RAD = ZERO_M + DRIVEN_MPS * 0.1, ZERO_RAD + TURNED_RADPS * 0.1
+STEP_M, STEP_RAD = STEP_TO_ZERO + DRIVEN_MPS * 0.1, STEP_TO_ZERO + TURNED_RADPS * 0.1
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "silent", "anew"),
+    [
+        (counted(0.3), counted(ZERO_M), False, True),
+        (counted(0.3), counted(0.0, ZERO_RAD), False, True),
+        (counted(STEP_M), counted(0.0), False, False),
+        (counted(0.0, STEP_RAD), counted(0.0), False, False),
+        (counted(0.0), counted(STEP + FAST_MPS * 0.1), False, False),
+        (counted(0.0), counted(0.0, STEP + FAST_RADPS * 0.1), False, False),
+        (counted(5.0, 1.5), counted(5.0, 1.5), False, False),
+        (counted(1.0), counted(NEAR_M), True, True),
+        (counted(1.0, 1.0), counted(0.0, NEAR_RAD), True, True),
+        (counted(0.0, 1.0), counted(0.0, 0.5), True, False),
+        (counted(STEP_M), counted(0.0), True, False),
+        (counted(0.0, STEP_RAD), counted(0.0), True, False),
+    ],
+)
+def test_the_limits_of_a_restart(before: Mileage, after: Mileage, silent: bool, anew: bool) -> None:
+    assert restarted(before, after, 0.1, unbroken=True, silent=silent) is anew
