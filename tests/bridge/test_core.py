@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import msgspec
 import pytest
 
 from common import messages as m
@@ -13,6 +14,8 @@ from common.wire.commands import MotionKind
 from common.wire.frame import HEADER, Frame, Side
 from common.wire.framing import crc_function
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
+from services.bridge.config import Bridge
+from services.bridge.core.core import tick_s
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Send
 from tests.bridge.core_fixture import (
     BOOT,
@@ -286,6 +289,63 @@ def test_the_link_message_comes_at_5_hz_and_on_a_change(bench: Bench) -> None:
     (link,) = published(bench.tick(20 * MS), "link")
     assert (link.state, link.board) == ("up", "127.0.0.1:4003")
     assert link.waiting.endswith("; no answers to: bumper, mileage, ultrasonic")
+
+
+def test_the_link_message(bench: Bench) -> None:
+    link = m.Link(
+        state="never", board="127.0.0.1:4003", epoch=0, armed=False, rates={}, rejected={},
+        waiting="nothing received from the board yet on UDP port 4002, 4001", round_trip=None,
+    )  # fmt: skip
+    assert bench.link() == link
+    bench.tick()
+    bench.arm()
+    bench.counters["send_errors"], bench.core.rejected["wrong_address"] = 3, 0
+    bench.carried_out(bench.core.second())
+    bench.now_ns += 4 * MS
+    bench.answer(DistanceReport(1000, 0))
+    kinds = ("VelocityReport", "DistanceReport", "UltrasonicBrakeReport", "BumperBrakeReport")
+    assert bench.link() == msgspec.structs.replace(
+        link, state="up", armed=True, waiting="", send_errors=3, round_trip=0.0,
+        rates={"BumperReport": 4.0} | dict.fromkeys(kinds, 1.0),
+        ports=dict.fromkeys(("BumperReport", *kinds), 4002),
+    )  # fmt: skip
+    bench.estop()
+    waiting = "safety has not acknowledged the emergency stop; no answers to: ultrasonic"
+    assert (bench.link().waiting, bench.link().estop) == (waiting, bench.now_ns)
+
+
+def test_each_query_finds_its_tick() -> None:
+    assert tick_s(Bridge()) == 0.02
+    assert tick_s(Bridge(bumper_rate=125.0)) == 0.008
+    asked = [type(frame).__name__ for frame in frames(Bench().tick())]
+    assert asked[1:] == [
+        "BumperQuery", "DistanceQuery", "UltrasonicQuery", "DriverQuery", "DriverQuery",
+    ]  # fmt: skip
+
+
+def test_counters_alone_that_were_silent_went_on(bench: Bench) -> None:
+    bench.answer(DistanceReport(1000, 0))
+    for _ in range(40):
+        bench.now_ns += 100 * MS
+        bench.receive(STANDS)
+    assert "board_restarted" not in events(bench.answer(DistanceReport(4200, 0)))
+
+
+def test_a_gap_before_the_last_sample_is_no_gap_behind_it(bench: Bench) -> None:
+    bench.receive(STANDS)
+    bench.now_ns += 100 * MS
+    bench.answer(DistanceReport(100, 0))
+    bench.now_ns += 20 * MS
+    assert "board_restarted" not in events(bench.answer(DistanceReport(30, 0)))
+    bench.now_ns += 61 * MS
+    bench.receive(STANDS)
+    assert "board_restarted" not in events(bench.answer(DistanceReport(30, 0)))
+    bench.now_ns += 100 * MS
+    bench.receive(STANDS)
+    bench.answer(DistanceReport(400, 0))
+    bench.now_ns += 100 * MS
+    bench.receive(STANDS)
+    assert "board_restarted" in events(bench.answer(DistanceReport(100, 0)))
 
 
 # --- motions --------------------------------------------------------------------------------------
