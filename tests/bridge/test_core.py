@@ -12,7 +12,7 @@ from common.motion import BRAKE, STOP, Command
 from common.wire import commands, reports
 from common.wire.commands import MotionKind
 from common.wire.frame import HEADER, Frame, Side
-from common.wire.framing import crc_function
+from common.wire.framing import Framing, crc_function
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
 from services.bridge.config import Bridge
 from services.bridge.core.core import tick_s
@@ -54,7 +54,7 @@ def test_the_first_frame_is_a_stop(bench: Bench) -> None:
 def test_brake_comes_first_then_the_report_of_the_hit_then_the_rest(
     bench: Bench, datagram: bytes
 ) -> None:
-    bench.receive(CLEAR, CLEAR, CLEAR)
+    bench.receive(CLEAR, CLEAR, CLEAR, CLEAR)
     out = bench.receive(datagram, HIT, HIT)
     assert isinstance(out[0], Send)
     assert out[1] == Reacted("reflex", NOW)
@@ -67,7 +67,7 @@ def test_brake_comes_first_then_the_report_of_the_hit_then_the_rest(
     )  # fmt: skip
     assert all(pressed(out))
     assert len(pressed(out)) == 3 + (datagram in (HIT + HIT, CLEAR + HIT))
-    assert bench.core.motions.lease.hit == 2
+    assert bench.core.motions.lease.hit == 3
 
 
 def test_brake_leaves_before_the_rest_is_read(bench: Bench) -> None:
@@ -142,6 +142,7 @@ def test_the_judged_stop_is_a_brake_that_acknowledges_the_hit(
 
 
 def test_each_frame_is_published_with_its_raw_bytes(bench: Bench) -> None:
+    bench.tick()
     for frame, stream in (
         (VelocityReport(100, 0), "velocity"),
         (DistanceReport(1000, 0), "mileage"),
@@ -151,12 +152,14 @@ def test_each_frame_is_published_with_its_raw_bytes(bench: Bench) -> None:
     ):
         (made,) = [out for out in bench.answer(frame) if isinstance(out, Publish)]
         assert (made.stream, made.raw) == (stream, FRAMING.pack(frame))
+    assert published(bench.outputs, "velocity") == [m.Velocity(linear=0.1, angular=0.0)]
+    assert published(bench.outputs, "mileage") == [m.Mileage(distance=1.0, heading=0.0, epoch=0)]
     (ranges,) = published(bench.outputs, "ultrasonic")
     assert ranges.ranges == (1.0, *(2.5,) * 7)
     bench.carried_out(bench.core.second())
     assert bench.link().rates["VelocityReport"] == 1.0
-    bench.carried_out(bench.core.second())
-    assert bench.link().rates == {}
+    out = bench.carried_out(bench.core.second())
+    assert (bench.link().rates, out) == ({}, [Publish("switches", m.Switches())])
 
 
 def test_a_driver_fault_counts_from_either_port(bench: Bench) -> None:
@@ -166,6 +169,8 @@ def test_a_driver_fault_counts_from_either_port(bench: Bench) -> None:
         reported += [message.bits for message in published(out, "driver_left")]
         seen += [out for out in out if isinstance(out, Event) and out.name == "driver_fault"]
     assert reported == [0, 1, 0, 3]
+    (right,) = published(bench.answer(DriverReport(Side.RIGHT, 1), port=1), "driver_right")
+    assert right.bits == 1
     text = "left motor driver: "
     assert seen == [
         Event("driver_fault", "error", f"{text}over_current", {"side": "left", "bits": 1}),
@@ -186,7 +191,9 @@ def test_copies_are_dropped_and_counted(bench: Bench) -> None:
 
 def test_a_dead_port_is_left_and_reported(bench: Bench) -> None:
     bench.receive(STANDS)
-    bench.now_ns += 101 * MS
+    bench.now_ns += 100 * MS
+    assert bench.receive(STANDS, port=1) == []
+    bench.now_ns += MS
     out = bench.receive(STANDS, STANDS, port=1)
     assert len(published(out, "velocity")) == 2
     text = "commands leave from UDP port 4001 now: the velocity comes to it"
@@ -200,11 +207,27 @@ def test_a_dead_port_is_left_and_reported(bench: Bench) -> None:
 
 
 def test_what_no_vehicle_can_mean_is_dropped_and_counted(bench: Bench) -> None:
-    out = bench.receive(b"nonsense", FRAMING.pack(VelocityReport(30_000, 0)))
-    assert out == []
-    bench.core.relay_report(b"nonsense", NOW)
-    assert bench.link().rejected == {"no_magic": 1, "implausible": 1, "relay_report": 1}
+    for count in (1, 2):
+        out = bench.receive(b"nonsense", FRAMING.pack(VelocityReport(30_000, 0)))
+        assert out == []
+        bench.core.relay_report(b"nonsense", NOW)
+        rejected = dict.fromkeys(("no_magic", "implausible", "relay_report"), count)
+        assert bench.link().rejected == rejected
     assert bench.core.readiness.link == "never"
+
+
+def test_the_settings_choose_what_the_crc_covers() -> None:
+    bench = Bench("wire.crc_covers=header_and_payload")
+    made = Framing("crc-16", "header_and_payload").pack(VelocityReport(0, 0))
+    assert len(published(bench.receive(made), "velocity")) == 1
+
+
+def test_clear_samples_count_across_ticks(bench: Bench) -> None:
+    found = []
+    for _ in range(3):
+        found += pressed(bench.receive(CLEAR))
+        bench.tick(20 * MS)
+    assert found == [False]
 
 
 def link_lost(bench: Bench) -> None:
@@ -285,6 +308,7 @@ def test_the_link_message_comes_at_5_hz_and_on_a_change(bench: Bench) -> None:
     assert len(published(bench.tick(), "link")) == 1
     counts = [len(published(bench.tick(20 * MS), "link")) for _ in range(20)]
     assert counts == [*[0] * 9, 1] * 2
+    assert [len(published(bench.tick(ms * MS), "link")) for ms in (189, 1)] == [0, 1]
     bench.receive(STANDS)
     (link,) = published(bench.tick(20 * MS), "link")
     assert (link.state, link.board) == ("up", "127.0.0.1:4003")
@@ -312,15 +336,22 @@ def test_the_link_message(bench: Bench) -> None:
     bench.estop()
     waiting = "safety has not acknowledged the emergency stop; no answers to: ultrasonic"
     assert (bench.link().waiting, bench.link().estop) == (waiting, bench.now_ns)
+    bench.answer(reports.UltrasonicReport((1000,) * 8))
+    assert bench.link().waiting == waiting.partition(";")[0]
 
 
 def test_each_query_finds_its_tick() -> None:
     assert tick_s(Bridge()) == 0.02
     assert tick_s(Bridge(bumper_rate=125.0)) == 0.008
-    asked = [type(frame).__name__ for frame in frames(Bench().tick())]
+    bench = Bench()
+    assert bench.core.motions.lease.over_since_ns == NOW
+    out = bench.tick()
+    assert {send.port for send in out if isinstance(send, Send)} == {0}
+    asked = [type(frame).__name__ for frame in frames(out)]
     assert asked[1:] == [
         "BumperQuery", "DistanceQuery", "UltrasonicQuery", "DriverQuery", "DriverQuery",
     ]  # fmt: skip
+    assert commands.BumperQuery() in frames(bench.tick(11 * MS)), "at the nearest tick"
 
 
 def test_counters_alone_that_were_silent_went_on(bench: Bench) -> None:

@@ -92,17 +92,18 @@ class Core:
         failover_ns = round(settings.failover * NS_PER_S)
         self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
         self._polling = Polling(
-            queries(settings), settings.answer_timeout, STEADY, tick_s(settings)
+            queries(settings), settings.answer_timeout, steady=STEADY, tick_s=tick_s(settings)
         )
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message
         pressed = reports.BumperReport(True)
+        # 1 equivalent mutant: without its bytes a hit is read first.
         self._hit = Received(pressed, self._framing.pack(pressed))
-        self._clear_raw = self._framing.pack(reports.BumperReport(False))
         self._mileage: Latest[m.Mileage] | None = None
         self._faults: dict[Side, int] = {}
         self._frames: Counter[str] = Counter()  # since the last second
         self._rates: dict[str, float] = {}  # of the last second, in Hz
+        # 1 equivalent mutant: the first tick publishes.
         self._linked: tuple[object, ...] = ()  # what the newest link message says
         # 2 equivalent mutants: the first tick publishes.
         self._linked_ns = 0
@@ -130,6 +131,7 @@ class Core:
             yield from self._on_frame(hit, port, now_ns)
         for part in self._framing.read(datagram, reports.FROM_BOARD):
             if part == hit:
+                # 1 equivalent mutant: no part is an empty text.
                 hit = None  # processed already
                 self._bumper.take(True)  # clear samples before it do not count
             elif isinstance(part, Received):
@@ -143,7 +145,7 @@ class Core:
             return None
         if datagram == self._hit.raw:  # the usual one needs no reading
             return self._hit
-        if datagram == self._clear_raw or reports.BumperReport.OPENING not in datagram:
+        if reports.BumperReport.OPENING not in datagram:
             return None
         for part in self._framing.read(datagram, reports.FROM_BOARD):
             if isinstance(part, Received) and part.frame == self._hit.frame:
@@ -165,6 +167,7 @@ class Core:
         self._frames[kind.__name__] += 1
         yield from self.readiness.on_frame(now_ns)
         if not self.readiness.ready:
+            # 1 equivalent mutant: None is as false as False.
             self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
         if self.motions.port != self._ports.main:
             self.motions.port = self._ports.main
@@ -219,6 +222,7 @@ class Core:
         ):
             yield from self.readiness.on_restart(now_ns)
             self._bumper = BumperFilter()
+            # 1 equivalent mutant: None is as false as False.
             self.motions.on_ready(False)  # also where a firmware without echoes stays ready
             after = self._translator.mileage(frame, self.readiness.epoch)
         self._mileage = Latest(after, asked_ns)
