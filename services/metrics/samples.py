@@ -1,15 +1,17 @@
-"""Prometheus samples of the robots, by the table of metric families ``families.toml``.
+"""Prometheus samples of the robots.
 
-Names follow Prometheus' conventions: base units, ``_total`` for counters. Stale values have no
-sample; ``t2_robot_up``, ``t2_service_up`` and the ages report them.
+Each number of a stream is a gauge, ``t2_STREAM_FIELD`` with its base unit. Words and maps of
+numbers have the label ``name``. None and stale values have no sample; ``t2_robot_up``,
+``t2_service_up`` and the ages report them.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import accumulate
-from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
-import msgspec
+from msgspec import Struct
+from msgspec.structs import replace
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -20,51 +22,113 @@ from prometheus_client.core import (
 from common.freshness import fresh
 from common.keys import ROOT
 from common.members import Members
-from common.messages import Health, Link, Message, Odometry, SafetyState, Verdict
+from common.messages import Link, LinkState, Message, Odometry, SafetyState, Verdict
 from services.metrics.robot import FRESH_S, LATENESS_S, RobotState, ServiceState
 
-FILE = Path(__file__).with_name("families.toml")
-Kind = Literal["gauge", "counter", "histogram"]
-KINDS = {"gauge": GaugeMetricFamily, "counter": CounterMetricFamily}
+KINDS = {
+    "gauge": GaugeMetricFamily,
+    "counter": CounterMetricFamily,
+    "histogram": HistogramMetricFamily,
+}
+STREAMS: dict[type[Message], str] = {SafetyState: "safety", Link: "link", Odometry: "odometry"}
+UNITS = {
+    "x": "_meters", "y": "_meters", "residual": "_meters", "heading": "_radians",
+    "linear": "_meters_per_second", "forward": "_meters_per_second",
+    "backward": "_meters_per_second", "angular": "_radians_per_second",
+    "round_trip": "_seconds", "uptime": "_seconds", "lateness": "_seconds", "age": "_seconds",
+    "rss": "_bytes", "rates": "_hertz",
+}  # fmt: skip
+WORDS = {"state": get_args(LinkState), "verdict": get_args(Verdict)}  # 0 or 1 for each of them
+# Sentences, ids and times that say nothing as a number; matrices; labels; the histograms.
+OMITTED = {
+    *Message.__struct_fields__, "text", "waiting", "release_refusal", "heartbeat", "latched_by",
+    "estop", "ports", "frame_id", "child_frame_id", "pose_covariance", "twist_covariance",
+    "service", "reactions", "limit_sources", "estop_keepalives",
+}  # fmt: skip
+OF_SERVICE = "robot", "service"
 
 
-class Family(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class Family(Struct, frozen=True):
     """A metric; its samples differ in their labels."""
 
     name: str
-    kind: Kind
+    kind: str
     labels: tuple[str, ...]
     help: str
 
 
-FAMILIES = msgspec.toml.decode(FILE.read_bytes(), type=dict[str, tuple[Family, ...]])["family"]
+FAMILIES = (
+    Family("t2_bus_connected", "gauge", (), "Whether the exporter is connected to a router"),
+    Family("t2_certificate_expiry_timestamp_seconds", "gauge", ("role", "name"),
+           "Expiry of a member's certificate"),
+    Family("t2_robot_up", "gauge", ("robot",), "Whether the robot is alive"),
+    Family("t2_stream_age_seconds", "gauge", ("robot", "stream"),
+           "Time since a stream's latest message"),
+    Family("t2_service_up", "gauge", OF_SERVICE, "Whether the service is present and healthy"),
+    Family("t2_service_instances", "gauge", OF_SERVICE, "Processes of the service on the bus"),
+    Family("t2_service_health_age_seconds", "gauge", OF_SERVICE,
+           "Time since the latest health message"),
+    Family("t2_service_loop_lateness_seconds", "histogram", OF_SERVICE,
+           "Maximum lateness of the event loop in each second"),
+    Family("t2_reaction_seconds", "histogram", (*OF_SERVICE, "reaction"),
+           "Reactions of the bridge to a hit, from its read: until BRAKE (reflex), until safety's "
+           "BRAKE (judged_stop)"),
+    Family("t2_recorder_disk_full", "gauge", ("robot",),
+           "Whether the recorder stopped: the disk is full"),
+    Family("t2_events_total", "counter", (*OF_SERVICE, "event", "level"),
+           "Events received, including replayed ones"),
+)  # fmt: skip
 
 
 class Scrape:
     """The metric families of one scrape."""
 
     def __init__(self) -> None:
-        self.families: dict[str, Metric] = {}
-        for each in FAMILIES:
-            kind = KINDS.get(each.kind, HistogramMetricFamily)
-            self.families[each.name] = kind(each.name, each.help, labels=each.labels)
+        self.families: dict[str, Metric] = {
+            each.name: KINDS[each.kind](each.name, each.help, labels=each.labels)
+            for each in FAMILIES
+        }
 
     def add(self, name: str, value: float, *labels: str) -> None:
         """Add a sample of a gauge or counter."""
         self.families[name].add_metric(labels, float(value))  # type: ignore[attr-defined]
 
     def add_histogram(
-        self,
-        name: str,
-        bounds: Sequence[float],
-        cumulative: Iterable[int],
-        total: float | None,
+        self, name: str, bounds: Sequence[float], counts: Iterable[int], total: float | None,
         *labels: str,
-    ) -> None:
-        """Add a histogram by the counts up to each bound and the count of all."""
+    ) -> None:  # fmt: skip
+        """Add a histogram by the counts between its bounds, and above the last one."""
         ends = [*(f"{bound:.3g}" for bound in bounds), "+Inf"]
-        buckets = list(zip(ends, cumulative, strict=True))
+        buckets = list(zip(ends, accumulate(counts), strict=True))
         self.families[name].add_metric(labels, buckets, total)  # type: ignore[attr-defined]
+
+    def add_fields(self, prefix: str, part: Struct, labels: Mapping[str, str]) -> None:
+        """Add the fields of a message, also those of the structs inside."""
+        for field in part.__struct_fields__:
+            value = None if field in OMITTED else getattr(part, field)
+            if isinstance(value, Struct):
+                self.add_fields(f"{prefix}_{field}", value, labels)
+                continue
+            name = f"{prefix}_{field}{UNITS.get(field, '')}"
+            help_text = f"Field of {type(part).__name__}, see docs/bus.md"
+            for word, number in _numbers(value, WORDS.get(field)):
+                names = [*labels, *(["name"] if word else [])]
+                family = GaugeMetricFamily(name, help_text, labels=names)
+                self.families.setdefault(name, family)
+                self.add(name, number, *labels.values(), *word)
+
+
+def _numbers(value: Any, words: Sequence[str] | None) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Yield the numbers of a value with their names, if they have any."""
+    if isinstance(value, bool | int | float):
+        yield (), value
+    elif isinstance(value, str) and value:
+        yield from (((word,), word == value) for word in (words or (value,)))
+    elif isinstance(value, dict):
+        yield from (((name,), number) for name, number in sorted(value.items()))
+    elif isinstance(value, tuple):
+        names = (one if isinstance(one, str) else one.name for one in value)
+        yield from (((name,), 1) for name in dict.fromkeys(names))
 
 
 def metric_families(
@@ -91,11 +155,11 @@ def metric_families(
 
 def _robot(scrape: Scrape, name: str, robot: RobotState, now_ns: int) -> None:
     scrape.add("t2_robot_up", robot.is_up(now_ns), name)
-    for message, latest in robot.streams.items():
-        stream, add_samples = OF_STREAM[message]
+    for kind, latest in robot.streams.items():
+        stream = STREAMS[kind]
         scrape.add("t2_stream_age_seconds", latest.age_s(now_ns), name, stream)
         if fresh(latest, now_ns, FRESH_S):
-            add_samples(scrape, name, latest.value)
+            scrape.add_fields(f"t2_{stream}", latest.value, {"robot": name})
     recorder = robot.services.get("recorder")
     if recorder and recorder.is_healthy(now_ns):
         scrape.add("t2_recorder_disk_full", robot.disk_full(), name)
@@ -109,64 +173,18 @@ def _service(scrape: Scrape, labels: tuple[str, str], service: ServiceState, now
     if service.health is None:
         return
     scrape.add("t2_service_health_age_seconds", service.health.age_s(now_ns), *labels)
-    if fresh(service.health, now_ns, FRESH_S):
-        _health(scrape, labels, service.health.value)
-        late, counts = service.lateness, accumulate(service.lateness.counts)
-        scrape.add_histogram(
-            "t2_service_loop_lateness_seconds", LATENESS_S, counts, late.total, *labels
-        )
-
-
-def _health(scrape: Scrape, labels: tuple[str, str], health: Health) -> None:
-    scrape.add("t2_service_info", 1, *labels, health.version)
-    scrape.add("t2_service_uptime_seconds", health.uptime, *labels)
-    scrape.add("t2_service_resident_memory_bytes", health.rss, *labels)
-    scrape.add("t2_service_realtime_priority", health.priority, *labels)
-    for key, rate in sorted(health.rates.items()):
-        short = key.removeprefix(f"{ROOT}/{labels[0]}/")  # is already in the labels
-        scrape.add("t2_service_message_rate_hertz", rate, *labels, short)
-    for counter, count in sorted(health.counters.items()):
-        scrape.add("t2_service_counts_total", count, *labels, counter)
-    for name, each in sorted(health.reactions.items()):
+    if not fresh(service.health, now_ns, FRESH_S):
+        return
+    health, late, own = service.health.value, service.lateness, f"{ROOT}/{labels[0]}/"
+    rates = {key.removeprefix(own): rate for key, rate in health.rates.items()}
+    own_labels = dict(zip(OF_SERVICE, labels, strict=True))
+    scrape.add_fields("t2_service", replace(health, rates=rates), own_labels)
+    name = "t2_service_loop_lateness_seconds"
+    scrape.add_histogram(name, LATENESS_S, late.counts, late.total, *labels)
+    for reaction, each in sorted(health.reactions.items()):
         if len(each.counts) == len(each.bounds) + 1:
-            scrape.add_histogram(
-                "t2_reaction_seconds", each.bounds, accumulate(each.counts), None, *labels, name
-            )
-
-
-def _safety(scrape: Scrape, robot: str, state: SafetyState) -> None:
-    for verdict in get_args(Verdict):
-        scrape.add("t2_safety_verdict", verdict == state.verdict, robot, verdict)
-    scrape.add("t2_safety_latched", len(state.latched), robot)
-    for cause in state.causes:
-        scrape.add("t2_safety_cause_active", 1, robot, cause.name, cause.action)
-    if state.source is not None:
-        scrape.add("t2_safety_drives", 1, robot, state.source)
-
-
-def _link(scrape: Scrape, robot: str, link: Link) -> None:
-    scrape.add("t2_link_up", link.state == "up", robot)
-    scrape.add("t2_link_armed", link.armed, robot)
-    scrape.add("t2_link_board_restarts_total", link.epoch, robot)
-    if link.round_trip is not None:
-        scrape.add("t2_link_round_trip_seconds", link.round_trip, robot)
-    for frame, rate in sorted(link.rates.items()):
-        scrape.add("t2_link_frame_rate_hertz", rate, robot, frame)
-    for reason, count in sorted(link.rejected.items()):
-        scrape.add("t2_link_rejected_total", count, robot, reason)
-
-
-def _odometry(scrape: Scrape, robot: str, odometry: Odometry) -> None:
-    scrape.add("t2_odometry_linear_velocity_meters_per_second", odometry.linear, robot)
-    scrape.add("t2_odometry_angular_velocity_radians_per_second", odometry.angular, robot)
-    scrape.add("t2_odometry_slip", odometry.slip, robot)
-    if odometry.residual is not None:
-        scrape.add("t2_odometry_residual_meters", odometry.residual, robot)
-
-
-OF_STREAM: dict[type[Message], tuple[str, Callable[[Scrape, str, Any], None]]] = {
-    SafetyState: ("safety", _safety), Link: ("link", _link), Odometry: ("odometry", _odometry),
-}  # fmt: skip
+            name = "t2_reaction_seconds"
+            scrape.add_histogram(name, each.bounds, each.counts, None, *labels, reaction)
 
 
 def certificate_expiry(listed: Members) -> dict[tuple[str, str], float]:
@@ -176,6 +194,6 @@ def certificate_expiry(listed: Members) -> dict[tuple[str, str], float]:
     """
     found: dict[tuple[str, str], float] = {}
     for one in listed.welcome:
-        member, expiry = (one.role, one.name), one.expires.timestamp()
-        found[member] = max(expiry, found.get(member, expiry))
+        member = one.role, one.name
+        found[member] = max(one.expires.timestamp(), found.get(member, -math.inf))
     return found

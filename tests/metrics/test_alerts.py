@@ -7,15 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from services.metrics.samples import FAMILIES
+from common.freshness import Latest
+from common.messages import SafetyState
+from services.metrics.samples import metric_families
+from tests.metrics.robots import NOW_NS, health, safety, whole
 
 FOLDER = Path(__file__).parent.parent.parent / "deploy" / "prometheus"
 ALERTS = FOLDER / "alerts.yml"
-PARTS = ("", "_bucket", "_count", "_sum")
+PARTS = ("", "_bucket", "_count", "_sum", "_total")
 
 
 def test_alerts_use_existing_metrics() -> None:
-    exported = {family.name + part for family in FAMILIES for part in PARTS}
+    robot = whole()
+    robot.streams[SafetyState] = Latest(safety("estop"), NOW_NS)
+    robot.on_health("bridge", health(counters={"overrun": 1}), NOW_NS)
+    families = metric_families({"007": robot}, NOW_NS, connected=True, certificates={})
+    exported = {family.name + part for family in families for part in PARTS}
     used = set(re.findall(r"\bt2_\w+", ALERTS.read_text(encoding="utf-8")))
     assert len(used) > 8
     assert used <= exported

@@ -54,7 +54,7 @@ def test_a_viewer_certificate_is_sufficient(loop: Loop, tmp_path: Path) -> None:
         files = {name: getattr(viewer, name) for name in ("ca", "certificate", "private_key")}
         sets = [f"bus.{name}={path}" for name, path in files.items()]
         with exporting(secured, tmp_path, *sets, "metrics.robots=*") as port:
-            wanted = {"t2_safety_latched", "t2_link_up", "t2_odometry_slip"}
+            wanted = {"t2_safety_source", "t2_link_armed", "t2_odometry_slip"}
             wait_until(lambda: wanted <= names(scraped(port)), "the streams")
             wait_until(
                 lambda: value(port, "t2_service_up", robot=ROBOT, service="bridge") == 1,
