@@ -29,7 +29,6 @@ from services.safety.core.state import Reply, State
 BY_HAND = "Push the vehicle off by hand, then reset."
 BUMPER_FREE = "The bumper is free. Next: reset."
 LET_GO = "A release begins with a new hold: let go first."
-NO_OPERATOR = "only a source that an operator holds may."
 
 
 def handle(
@@ -138,7 +137,7 @@ def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Rel
     if source is None or asked == "none":
         return replace(release, direction=None, refusal="")
     reason = (
-        ("" if source in settings.operators else f"{source} may not release: {NO_OPERATOR}")
+        _not_operated(source, settings)
         or _no_release(state, inputs, settings)
         or _direction_refusal(release, asked)
         or _not_let_go(release, source, state.arbiter.channels[source])
@@ -147,6 +146,13 @@ def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Rel
         return replace(release, direction=None, refusal=reason, barred_ns=now_ns)
     moves = "" if release.direction else _not_standing(inputs, settings, now_ns)
     return replace(release, source=source, direction=None if moves else asked, refusal=moves)
+
+
+def _not_operated(source: str, settings: Safety) -> str:
+    """Return why this source may not release; empty when an operator holds it."""
+    if source in settings.operators:
+        return ""
+    return f"{source} may not release: only a source that an operator holds may."
 
 
 def _not_let_go(release: Release, source: str, channel: DriveChannel) -> str:
