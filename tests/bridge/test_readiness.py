@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+from common import messages as m
 from common.config import Sources, load
 from common.errors import ConfigError
 from common.freshness import NS_PER_S
@@ -51,6 +52,8 @@ def test_a_restart_of_the_board_is_an_event(bench: Bench) -> None:
     text = "the board has restarted"
     assert of_type(Event, out) == [Event("board_restarted", "warning", text, {"epoch": 1})]
     assert settings_sent(bench.tick(0)) == 2
+    bench.answer(reports.DistanceReport(1000, 0), reports.DistanceReport(0, 0))
+    assert bench.core.readiness.epoch == 2
 
 
 @pytest.mark.parametrize(("age", "state"), [(SILENCE, "up"), (SILENCE + 1, "lost")])
@@ -198,6 +201,7 @@ def test_a_board_without_echoes_is_reported_once_with_the_setting_that_helps(ben
 
 def test_each_change_is_published(bench: Bench) -> None:
     bench.receive(STANDS)
+    assert published(bench.tick(), "switches") == []
     for frame, count in (
         (reports.BumperBrakeReport(True), 1), (reports.BumperBrakeReport(True), 0),
         (reports.UltrasonicBrakeReport(True), 1), (reports.BumperBrakeReport(False), 1),
@@ -231,11 +235,13 @@ def take(bench: Bench, datagram: bytes) -> list[Output]:
 def armed() -> Bench:
     """Return a bridge that drives through a relay."""
     bench = Bench(CONFIGURED)
+    assert of_type(Event, bench.tick()) == []
     assert bench.link().waiting.startswith("nothing received from the board")
     bench.receive(STANDS)
     assert bench.link().waiting.startswith("nothing received from the relay yet")
     assert take(bench, report()) == [UP]
     bench.arm()
+    assert bench.core.readiness.waiting() == ""
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
     return bench
 
@@ -278,14 +284,12 @@ def test_a_silent_relay_is_lost_after_five_reports_and_comes_back() -> None:
 
 def test_the_link_message_has_the_newest_report() -> None:
     bench = Bench(CONFIGURED)
-    before = bench.link().relay
-    assert before is not None
-    assert (before.state, before.version, before.counters) == ("never", "", {})
+    nothing = m.Relay(state="never", version="", braking="", uptime=0.0, counters={})
+    assert bench.link().relay == nothing
     take(bench, report("hit"))
-    after = bench.link().relay
-    assert after is not None
-    assert (after.state, after.version, after.braking) == ("up", "0.1.0", "hit")
-    assert (after.uptime, after.counters) == (2.5, {"hit": 1})
+    assert bench.link().relay == m.Relay(
+        state="up", version="0.1.0", braking="hit", uptime=2.5, counters={"hit": 1}
+    )
 
 
 @pytest.mark.parametrize(

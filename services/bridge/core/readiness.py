@@ -54,6 +54,7 @@ class Brake:
     def __init__(self, command: Callable[[bool], Frame]) -> None:
         """Set up with the frame that sets it."""
         self._command = command
+        # 2 equivalent mutants: the first frame of the board sets it again.
         self.on_return(0)
 
     def on_return(self, now_ns: int) -> None:
@@ -106,19 +107,22 @@ class Readiness:
 
     def __init__(self, settings: Settings, board: Board) -> None:
         self.link: m.LinkState = "never"
+        # 2 equivalent mutants: the first frame sets it.
         self.up_ns = 0  # start of the current ``up`` phase
         self.gap_ns = 0  # end of the last short silence (no lost link) of the board
         self.epoch = 0
         self.ultrasonic = Brake(UltrasonicBrakeSet)
         self.bumper = Brake(BumperBrakeSet)
-        self.relay = RelayStatus(board.relay_port > 0)
+        self.relay = RelayStatus(bool(board.relay_port))
         self._brakes = self.ultrasonic, self.bumper
+        # 1 equivalent mutant: the first frame sets it.
         self._received_ns = 0
         self._ports = ", ".join(map(str, board.listen_ports))
         self._silence_ns = round(settings.silence * NS_PER_S)
         self._echo_ns = round(settings.echo_timeout * NS_PER_S)
         self._required = settings.require_switches
         self._published = self.message()
+        # 2 equivalent mutants: the first tick sets it.
         self._inhibited = False
 
     @property
