@@ -137,7 +137,7 @@ def measure_here(folder: Path) -> list[Series]:
         made |= {name: outage(hosts, seconds) for name, seconds in OUTAGES_S.items()}
     made["allowed"] = {
         "stop": [round(SHIPPED.sources["teleop"].lease * NS_PER_S) + NOTICE_NS],
-        "gap": [round(SHIPPED.bumper_age * NS_PER_S)],
+        "gap": [round(SHIPPED.times.bumper_age * NS_PER_S)],
     }
     return [Series(name=(n, what), samples=v) for n, one in made.items() for what, v in one.items()]
 

@@ -10,7 +10,23 @@ REPLACED = {
     "teleop.turbo_angular": "gear 5 of teleop.gears_angular",
     "teleop.turbo_button": "the gears",
 }
+LENGTHENED = {
+    "bridge": ("lease", "silence", "heartbeat", "echo_timeout", "coast"),
+    "safety": (
+        "bumper_age", "ultrasonic_age", "velocity_age", "link_age", "switches_age", "driver_age",
+        "estop_path_age", "max_echo_age", "runaway_time",
+    ),
+}  # fmt: skip
 CONSTANT = {
+    "bridge.failover": "0.1 s",
+    "bridge.answer_timeout": "0.1 s",
+    "safety.settle": "0.5 s",
+    "safety.max_call_age": "1 s",
+    "safety.hysteresis": "0.05 m",
+    "safety.stuck_travel": "0.5 m",
+    "safety.runaway_linear": "0.3 m/s",
+    "safety.runaway_angular": "0.5 rad/s",
+    "safety.release_lease": "the lease of the source",
     "ros2.odom_rate": "25 Hz",
     "ros2.bumper_rate": "10 Hz",
     "ros2.diagnostics_rate": "1 Hz",
@@ -21,6 +37,12 @@ SIMULATED = (
 )  # fmt: skip
 REMOVED = {
     **{path: f"was replaced by {other}" for path, other in REPLACED.items()},
+    **{
+        f"{section}.{name}": f"was replaced by {section}.stall: it lengthens every time limit "
+        "for a computer whose processes stall"
+        for section, names in LENGTHENED.items()
+        for name in names
+    },
     **{path: f"is no setting any more, always {value}" for path, value in CONSTANT.items()},
     **{
         f"sim.{name}": "is no setting any more; a profile changes the simulated vehicle: "

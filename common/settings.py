@@ -7,14 +7,17 @@ import math
 import re
 from collections.abc import Mapping
 from ipaddress import ip_address
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, TypeVar
 
+import msgspec
 from msgspec import Meta, Struct
 
 from common.errors import WireError
 from common.wire.framing import Covers, crc_function
 
+T = TypeVar("T", bound=Struct)
 Limits = Mapping[str, tuple[float, float]]
+Stall = Annotated[float, Meta(ge=0.0, le=1.0)]
 AngularUnit = Literal["decidegree", "milliradian"]
 LogLevel = Literal["debug", "info", "warning", "error"]
 
@@ -56,6 +59,15 @@ class ProtectedSection(Section, frozen=True, kw_only=True):
                     f"{name} = {given[name]} takes a protection away; "
                     f"allowed is {low}..{high}, or name it in unsafe_overrides"
                 )
+
+
+def lengthened(limits: T, stall_s: float) -> T:
+    """Return time limits (s) for a computer whose processes stall for this long.
+
+    An age, a lease or a silence may span a stall of the sender, of the receiver, and of the host.
+    """
+    longer = {name: value + 3 * stall_s for name, value in msgspec.structs.asdict(limits).items()}
+    return type(limits)(**longer)
 
 
 class Robot(Section, frozen=True, kw_only=True):

@@ -75,7 +75,7 @@ class Settings:
 
 def present_settings(safety: Safety) -> Settings:
     """Return the settings that safety has."""
-    return Settings(safety.react, safety.deceleration, safety.margin)
+    return Settings(safety.reaction, safety.deceleration, safety.margin)
 
 
 def student(confidence: float, freedom: int) -> float:

@@ -12,14 +12,7 @@ from collections.abc import Iterable
 LIMIT_S = 0.05  # the shipped limits allow stalls up to this
 SAMPLES_S = 0.005
 
-AGES = (
-    "bumper_age", "ultrasonic_age", "velocity_age", "link_age", "max_echo_age", "estop_path_age",
-)  # fmt: skip
-LEASES = (
-    "runaway_time", "sources.demo.lease", "sources.teleop.lease",
-    "sources.checkout.lease",
-)  # fmt: skip
-SLOWER = ("switches_age", "driver_age")
+LEAST_S, MOST_S = 0.3, 1.0  # of the settings
 
 
 def measured(seconds: float = 1.5) -> float:
@@ -37,21 +30,15 @@ def settings(stall_s: float) -> list[str]:
     """Return the settings for stalls of this length, for ``--set``; none for short ones."""
     if stall_s <= LIMIT_S:
         return []
-    longer = min(3.0, max(1.0, 3.0 * stall_s))
-    react = min(1.5, max(0.5, 2.0 * stall_s))
+    allowed_s = min(MOST_S, max(LEAST_S, stall_s))
     return [
         "bus.unsafe_overrides=lease",
         "bus.lease=10",
         "bus.probe_deadline=10",
-        "bridge.unsafe_overrides=lease,silence,heartbeat",
-        f"bridge.lease={longer}",
-        f"bridge.silence={longer}",
-        f"bridge.heartbeat={longer}",
-        f"bridge.echo_timeout={min(2.0, longer)}",
-        f"safety.unsafe_overrides={','.join((*AGES, *LEASES, *SLOWER))}",
-        *(f"safety.{name}={longer}" for name in (*AGES, *LEASES)),
-        *(f"safety.{name}=10" for name in SLOWER),
-        f"safety.react={react}",
+        "bridge.unsafe_overrides=stall",
+        f"bridge.stall={allowed_s}",
+        "safety.unsafe_overrides=stall",
+        f"safety.stall={allowed_s}",
     ]
 
 

@@ -85,7 +85,7 @@ class Guard:
     def __init__(self, config: BridgeConfig, sockets: Sockets, command: Sequence[str]) -> None:
         self._sockets = sockets
         self._command = command
-        self._missed_ms = round(config.bridge.heartbeat * 1000)
+        self._missed_ms = round(config.bridge.times.heartbeat * 1000)
         framing = Framing(config.wire.crc, config.wire.crc_covers)
         self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
         self._port = 0  # index of the port that the bridge uses

@@ -1,7 +1,8 @@
 """The vehicle as it is drawn: the tones of the eight sonar sectors, and the wheel angles.
 
 A sector's tone shows the effect of its reading on safety, by safety's own formula and settings: the
-speed allowed toward a reading d is the v for which v * react + v^2 / (2 a) = d - margin.
+speed allowed toward a reading d is the v for which v * r + v^2 / (2 a) = d - margin, and
+r is react + 2 stall.
 
 ====== ====================================================================================
 tone   when
@@ -37,6 +38,7 @@ class Protection(Struct, frozen=True, kw_only=True):
 
     margin: float = 0.20  # m
     react: float = 0.25  # s
+    stall: float = 0.0  # s
     deceleration: Number = 0.6  # m/s^2
     max_linear: float = 1.0  # m/s
 
@@ -44,7 +46,9 @@ class Protection(Struct, frozen=True, kw_only=True):
     def full_speed_room(self) -> float:
         """The reading at which full speed is allowed, in metres."""
         speed = self.max_linear
-        return self.margin + speed * self.react + speed**2 / (2 * self.deceleration)
+        return (
+            self.margin + speed * (self.react + 2 * self.stall) + speed**2 / (2 * self.deceleration)
+        )
 
 
 def tones(

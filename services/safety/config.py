@@ -1,9 +1,11 @@
 """Settings of the safety service; unsafe values need an explicit override."""
 
+from functools import cache
 from typing import Annotated, ClassVar, Literal
 
 import msgspec
-from msgspec import Meta
+from msgspec import Meta, Struct
+from msgspec.structs import replace
 
 from common import settings
 from common.members import SourceName
@@ -48,11 +50,31 @@ def _sources() -> dict[str, Source]:
     }
 
 
+class TimeLimits(Struct, frozen=True, kw_only=True):
+    """Time limits in seconds: an older sample or request stops the vehicle."""
+
+    bumper_age: float = 0.15  # 7 polls
+    ultrasonic_age: float = 0.3  # 6 polls
+    velocity_age: float = 0.2  # 10 reports
+    link_age: float = 0.6  # 3 messages
+    switches_age: float = 3.0  # 3 messages
+    driver_age: float = 2.0  # 4 polls
+    estop_path_age: float = 0.2  # of the own state, received back through the router
+    max_echo_age: float = 0.4  # of a request to move, by the heartbeat that it echoes
+    runaway_time: float = 0.3  # that the vehicle may move otherwise than commanded
+
+
+@cache
+def _times(stall_s: float) -> TimeLimits:
+    return settings.lengthened(TimeLimits(), stall_s)
+
+
 class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
     """When and how fast the vehicle may move; SI units."""
 
     protective: ClassVar[settings.Limits] = {
         "margin": (0.05, 10.0),
+        "stall": (0.0, 0.0),
         "react": (0.1, 10.0),
         "deceleration": (0.1, 1.0),
         "angular_deceleration": (0.1, 3.0),
@@ -60,27 +82,14 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
         "max_angular": (0.0, 2.0),
         "linear_acceleration": (0.0, 1.5),
         "angular_acceleration": (0.0, 4.0),
-        "bumper_age": (0.0, 0.25),
-        "ultrasonic_age": (0.0, 0.5),
-        "velocity_age": (0.0, 0.5),
-        "link_age": (0.0, 1.5),
-        "switches_age": (0.0, 5.0),
-        "driver_age": (0.0, 5.0),
-        "estop_path_age": (0.0, 0.5),
-        "settle": (0.1, 10.0),
-        "max_echo_age": (0.0, 1.0),
-        "max_call_age": (0.0, 1.5),
-        "runaway_linear": (0.0, 0.5),
-        "runaway_angular": (0.0, 1.0),
-        "runaway_time": (0.0, 1.0),
         "release_speed": (0.0, 0.15),
         "release_distance": (0.0, 0.3),
-        "hysteresis": (0.02, 10.0),
-        "stuck_travel": (0.0, 1.0),
         "creep_speed": (0.0, 0.25),
         "estop_keepalive_timeout": (0.0, 2.0),
         "require_switches": (True, True),
     }
+    # s that processes of this computer stall: every time limit and ``react`` is longer
+    stall: settings.Stall = 0.0
     # sources on @cmd/drive/NAME; operator: a person holds it, and may creep past a faulty sonar
     sources: Annotated[dict[SourceName, Source], Sources] = msgspec.field(default_factory=_sources)
     # names that must be received on @cmd/estop_keepalive/NAME, or the robot brakes and latches
@@ -98,30 +107,30 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
 
     margin: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.20  # m kept free around the vehicle
     react: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25  # s from reading to slowing down
-    # m; a farther reading counts beyond this
-    hysteresis: Annotated[float, Meta(ge=0.01, le=0.5)] = 0.05
-    # m along a sonar's axis with a constant reading, until the sonar is suspect
-    stuck_travel: Annotated[float, Meta(ge=0.1, le=5.0)] = 0.5
     creep_speed: Positive = 0.15  # m/s while a sonar or the bumper is doubtful
 
-    bumper_age: Seconds = 0.15  # s; an older sample stops the vehicle
-    ultrasonic_age: Seconds = 0.3  # s
-    velocity_age: Seconds = 0.2  # s
-    link_age: Seconds = 0.6  # s
-    switches_age: Seconds = 3.0  # s
-    driver_age: Seconds = 2.0  # s
-    estop_path_age: Seconds = 0.2  # s, of the own state, received back through the router
-    settle: Seconds = 0.5  # s of good inputs until a cause clears
-    max_echo_age: Seconds = 0.4  # s, of a request to move
-    max_call_age: Seconds = 1.0  # s, of a reset
     require_switches: bool = True  # requires the board's own emergency brakes
-
-    runaway_linear: Positive = 0.3  # m/s over the commanded speed
-    runaway_angular: Positive = 0.5  # rad/s
-    runaway_time: Seconds = 0.3  # s
 
     release_speed: Positive = 0.1  # m/s
     release_distance: Positive = 0.15  # m in total until a reset
+
+    @property
+    def times(self) -> "TimeLimits":
+        """The time limits on this computer."""
+        return _times(self.stall)
+
+    @property
+    def reaction(self) -> float:
+        """Time from a reading to slowing down, on this computer, s."""
+        return self.react + 2 * self.stall
+
+    @property
+    def leased(self) -> dict[str, Source]:
+        """The sources with their leases on this computer."""
+        return {
+            name: replace(source, lease=source.lease + 3 * self.stall)
+            for name, source in self.sources.items()
+        }
 
     @property
     def operators(self) -> frozenset[str]:
@@ -156,7 +165,9 @@ class SafetyConfig(settings.Shared, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         # Space beyond ``sonar_max`` counts as free, so the vehicle must be able to stop within it.
         one, range_m = self.safety, self.vehicle.sonar_max
-        needed = one.margin + one.react * one.max_linear + one.max_linear**2 / one.deceleration / 2
+        needed = (
+            one.margin + one.reaction * one.max_linear + one.max_linear**2 / one.deceleration / 2
+        )
         if range_m < needed:
             raise ValueError(
                 f"sonar_max {range_m:g} m is too near: from max_linear {one.max_linear:g} m/s "

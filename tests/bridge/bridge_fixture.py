@@ -107,10 +107,8 @@ def bridge_command(made: Board, endpoint: str, *sets: str) -> list[str]:
         f"board.listen_ports={made.ports}",
         f"bus.connect={endpoint}",
         # Long limits: on test machines, processes stall for tenths of a second.
-        "bridge.unsafe_overrides=lease,silence,heartbeat",
-        "bridge.heartbeat=2.0",
-        "bridge.lease=0.8",
-        "bridge.silence=0.8",
+        "bridge.unsafe_overrides=stall",
+        "bridge.stall=0.2",
         *sets,
     ]
     words = [word for setting in settings for word in ("--set", setting)]

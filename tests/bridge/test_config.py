@@ -20,10 +20,7 @@ def test_the_file_holds_the_defaults() -> None:
 @pytest.mark.parametrize(
     ("path", "good", "bad"),
     [
-        ("bridge.lease", 0.5, 0.51),
-        ("bridge.silence", 0.5, 0.51),
-        ("bridge.coast", 3.0, 3.1),
-        ("bridge.heartbeat", 0.2, 0.21),
+        ("bridge.stall", 0.0, 0.01),
         ("bridge.max_linear", 1.5, 1.51),
         ("bridge.max_angular", 2.0, 2.01),
         ("bridge.bumper_rate", 20.0, 19.9),
@@ -43,9 +40,7 @@ def test_what_takes_a_protection_away_must_be_owned_up_to(
     read(f"{path}={bad}", f"{section}.unsafe_overrides={name}")
 
 
-@pytest.mark.parametrize(
-    "path", ["bridge.max_linear", "bridge.max_angular", "bridge.lease", "bus.lease"]
-)
+@pytest.mark.parametrize("path", ["bridge.max_linear", "bridge.max_angular", "bus.lease"])
 def test_a_stricter_limit_wants_no_word(path: str) -> None:
     read(f"{path}=0.25" if path == "bus.lease" else f"{path}=0.1")
 
@@ -54,8 +49,3 @@ def test_a_stricter_limit_wants_no_word(path: str) -> None:
 def test_only_protections_can_be_given_up(section: str) -> None:
     with pytest.raises(ConfigError, match="unsafe_overrides names 'port'"):
         read(f"{section}.unsafe_overrides=port")
-
-
-def test_the_other_port_is_taken_before_the_board_counts_as_lost() -> None:
-    with pytest.raises(ConfigError, match=r"failover 0\.2 s must be under silence"):
-        read("bridge.failover=0.2")

@@ -38,7 +38,7 @@ from verification.harness.waiting import wait_until
 
 
 def test_break_goes_first_then_the_bridges_stop() -> None:
-    with guarded_rig(2.0) as (made, _):
+    with guarded_rig(0.6) as (made, _):
         kinds = [motion.kind for motion in made.motions]
     first_stop = kinds.index(MotionKind.STOP)
     assert first_stop > 0
@@ -62,7 +62,7 @@ def test_a_bridge_that_dies_is_braked_for_and_started_again(
 
 
 def test_a_bridge_that_hangs_is_braked_for_and_killed() -> None:
-    with guarded_rig(0.2) as (made, process):
+    with guarded_rig(0.0) as (made, process):
         first = bridge_pid(process)
         count = len(made.motions)
         os.kill(first, signal.SIGSTOP)
@@ -73,7 +73,7 @@ def test_a_bridge_that_hangs_is_braked_for_and_killed() -> None:
 
 @pytest.mark.timed  # more delay than its own, and the bridge is killed
 def test_a_bridge_that_was_only_held_up_lives_on() -> None:
-    with guarded_rig(0.2) as (made, process):
+    with guarded_rig(0.0) as (made, process):
         first = bridge_pid(process)
         count = len(made.motions)
         os.kill(first, signal.SIGSTOP)
@@ -112,11 +112,11 @@ def test_a_second_bridge_is_refused_with_the_port(bridge: BridgeFixture) -> None
 
 
 @contextmanager
-def guarded_rig(heartbeat_s: float) -> Iterator[tuple[Board, "subprocess.Popen[bytes]"]]:
+def guarded_rig(stall_s: float) -> Iterator[tuple[Board, "subprocess.Popen[bytes]"]]:
     """Run guard and bridge without a router; the bridge sends STOP."""
     with (
         board() as made,
-        bridge_process(made, "tcp/127.0.0.1:1", f"bridge.heartbeat={heartbeat_s}") as process,
+        bridge_process(made, "tcp/127.0.0.1:1", f"bridge.stall={stall_s}") as process,
     ):
         made.wait_for(MotionKind.STOP)
         yield made, process
@@ -271,9 +271,9 @@ def test_a_dead_guard_is_noticed_once(pipe: tuple[int, int]) -> None:
 
 
 def test_a_wrong_setting_ends_it_before_anything_opens(capsys: pytest.CaptureFixture[str]) -> None:
-    assert program.main(["--set", "bridge.heartbeat=0.5"]) == EXIT_CONFIG
-    assert "heartbeat" in capsys.readouterr().err
-    assert program.main(["--set", "bridge.heartbeat=0"]) == EXIT_CONFIG
+    assert program.main(["--set", "bridge.stall=0.1"]) == EXIT_CONFIG
+    assert "stall" in capsys.readouterr().err
+    assert program.main(["--set", "bridge.stall=-1"]) == EXIT_CONFIG
 
 
 def test_the_bridge_alone_says_how_it_is_started(

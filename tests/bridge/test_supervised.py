@@ -32,7 +32,7 @@ def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Watched
     with contextlib.closing(Manager(str(tmp_path / "notify"))) as manager, board() as made:
         monkeypatch.setenv("NOTIFY_SOCKET", manager.environ["NOTIFY_SOCKET"])
         monkeypatch.setenv("WATCHDOG_USEC", str(PATIENCE_US))
-        with bridge_process(made, "tcp/127.0.0.1:1", "bridge.heartbeat=0.5") as process:
+        with bridge_process(made, "tcp/127.0.0.1:1", "bridge.stall=0.1") as process:
             made.wait_for(MotionKind.STOP)
             yield made, process, manager
 

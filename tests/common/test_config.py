@@ -31,11 +31,11 @@ def test_the_lines_of_the_shipped_file_are_the_defaults(tmp_path: Path) -> None:
 
 
 def test_the_later_source_wins(settings_dir: SettingsFixture) -> None:
-    file = "[board]\nport = 1\n[bridge]\nlease = 0.1\n[odom]\nhold = 0.2"
-    env = {"T2__BOARD__PORT": "2", "T2__BRIDGE__LEASE": "0.15", "PATH": "/bin"}
+    file = "[board]\nport = 1\n[bridge]\nmax_linear = 0.1\n[odom]\nhold = 0.2"
+    env = {"T2__BOARD__PORT": "2", "T2__BRIDGE__MAX_LINEAR": "0.15", "PATH": "/bin"}
     loaded = settings_dir.load(file, environ=env, sets=["board.port=3"])
     assert loaded.config.board.port == 3
-    assert loaded.config.bridge.lease == 0.15
+    assert loaded.config.bridge.max_linear == 0.15
     assert loaded.config.odom.hold == 0.2
 
 

@@ -23,13 +23,9 @@ def test_the_file_holds_the_defaults() -> None:
         ("margin", 0.0),
         ("react", 0.09),
         ("angular_deceleration", 0.09),
-        ("hysteresis", 0.019),
         ("max_linear", 1.51),
-        ("bumper_age", 0.26),
-        ("settle", 0.09),
-        ("max_call_age", 1.51),
+        ("stall", 0.01),
         ("release_speed", 0.2),
-        ("runaway_time", 2.0),
         ("require_switches", False),
         ("sources.nav.lease", 0.51),
         ("sources.nav.operator", True),
@@ -57,7 +53,9 @@ def test_an_emergency_stop_is_kept_alive_by_a_source_once() -> None:
         read('safety.estop_keepalive=["pendant", "pendant"]')
 
 
-@pytest.mark.parametrize("name", ["bumper_age", "settle", "max_linear", "sources.teleop.lease"])
+@pytest.mark.parametrize(
+    "name", ["creep_speed", "estop_keepalive_timeout", "max_linear", "sources.teleop.lease"]
+)
 def test_zero_never_means_off(name: str) -> None:
     with pytest.raises(ConfigError, match=name.split(".")[0]):
         read(f"safety.{name}=0", f"safety.unsafe_overrides={name}")

@@ -432,7 +432,7 @@ def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
 @pytest.mark.parametrize(("late_ns", "command"), [(0, "run"), (1, "stop")])
 def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str) -> None:
     fixture = PolicyFixture().running()
-    fixture.now_ns += round(Safety().bumper_age * NS_PER_S) + late_ns
+    fixture.now_ns += round(Safety().times.bumper_age * NS_PER_S) + late_ns
     fixture.feed()
     fixture.state = replace(fixture.state, heartbeat=fixture.state.heartbeat.beat(fixture.now_ns))
     assert fixture.request(0.5).command == command

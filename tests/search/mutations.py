@@ -19,6 +19,7 @@ from common.standstill import Displacement
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing
 from common.wire.reports import BumperBrakeReport, BumperReport
+from services.bridge.config import Bridge
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
 from services.safety.config import LimitSource, Safety
@@ -215,6 +216,11 @@ def configured(service: str, **settings: Any) -> Patch:
     return CONFIGS, service, replace(config, **{service: changed})
 
 
+def timed(section: type[Bridge | Safety], **limits: float) -> Patch:
+    """Change time limits of a service."""
+    return section, "times", replace(section().times, **limits)
+
+
 def received(kind: type[m.Message], change: Callable[[Any], m.Message]) -> Patch:
     """Change each message of a kind on its way from the oracle to its receiver."""
 
@@ -318,7 +324,7 @@ def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
 
 MUTATIONS: dict[str, Mutation] = {
     "the bridge's lease never ends": (
-        configured("bridge", lease=10.0), (lambda s: s.kill("safety", 5000),), "a RUN is held",
+        timed(Bridge, lease=10.0), (lambda s: s.kill("safety", 5000),), "a RUN is held",
     ),
     "no neutral after a lease": (
         (leases, "expire", still_neutral),
@@ -326,7 +332,7 @@ MUTATIONS: dict[str, Mutation] = {
          lambda s: s.net.disturbances.pop("motion")), "no neutral motion came",
     ),
     "silence is not noticed": (
-        configured("bridge", silence=10.0), (*LATE_STREAMS, lambda s: s.freeze(240)),
+        timed(Bridge, silence=10.0), (*LATE_STREAMS, lambda s: s.freeze(240)),
         "the board is silent",
     ),
     "brakes that are off": (
@@ -368,7 +374,7 @@ MUTATIONS: dict[str, Mutation] = {
         "without a BRAKE",
     ),
     "late releases are obeyed": (
-        configured("safety", max_echo_age=10.0), (*STUCK, late_releases), "no fresh request",
+        timed(Safety, max_echo_age=10.0), (*STUCK, late_releases), "no fresh request",
     ),
     "a release needs no neutral request": (
         (operator_requests, "_not_let_go", lambda *_: ""), (held_before,), "was not neutral",
@@ -378,7 +384,7 @@ MUTATIONS: dict[str, Mutation] = {
         "no operator's source",
     ),
     "a late reset is obeyed": (
-        configured("safety", max_call_age=10.0), (*STAND, late_reset, *GO),
+        (operator_requests, "CALL_AGE_NS", 10 * NS_PER_S), (*STAND, late_reset, *GO),
         "safety knows of contact",
     ),
     "a reset clears what it does not name": (
@@ -406,10 +412,10 @@ MUTATIONS: dict[str, Mutation] = {
         "safety knows of driver",
     ),
     "no input is too old": (
-        configured("safety", velocity_age=10.0), (lambda s: s.velocities(False),), "old velocity",
+        timed(Safety, velocity_age=10.0), (lambda s: s.velocities(False),), "old velocity",
     ),
     "an old velocity is as good as a new one": (
-        configured("safety", velocity_age=10.0),
+        timed(Safety, velocity_age=10.0),
         (*STAND, lambda s: s.estop(), lambda s: s.velocities(False, 1000), *RESET,
          lambda s: s.velocities(True, 1000), *GO),
         "safety knows of estop",

@@ -40,20 +40,21 @@ ITSELF: tuple[Outcome, ...] = ("by itself",)
 NEUTRAL: tuple[Outcome, ...] = ("after a neutral",)
 RESET: tuple[Outcome, ...] = ("after a reset",)
 
-MOTION_LEASE = by_limit(lambda config: config.bridge.lease)
-HEARTBEAT = by_limit(lambda config: config.bridge.heartbeat)
-SILENCE = by_limit(lambda config: config.bridge.silence)
-BUMPER_AGE = by_limit(lambda config: config.safety.bumper_age)
-VELOCITY_AGE = by_limit(lambda config: config.safety.velocity_age)
-ULTRASONIC_AGE = by_limit(lambda config: config.safety.ultrasonic_age)
-REQUEST_LEASE = by_limit(lambda config: config.safety.sources["teleop"].lease)
+MOTION_LEASE = by_limit(lambda config: config.bridge.times.lease)
+LEASE_AND_COAST = by_limit(lambda config: config.bridge.times.lease + config.bridge.times.coast)
+HEARTBEAT = by_limit(lambda config: config.bridge.times.heartbeat)
+SILENCE = by_limit(lambda config: config.bridge.times.silence)
+BUMPER_AGE = by_limit(lambda config: config.safety.times.bumper_age)
+VELOCITY_AGE = by_limit(lambda config: config.safety.times.velocity_age)
+ULTRASONIC_AGE = by_limit(lambda config: config.safety.times.ultrasonic_age)
+REQUEST_LEASE = by_limit(lambda config: config.safety.leased["teleop"].lease)
 KEEPALIVE = by_limit(lambda config: config.safety.estop_keepalive_timeout)
 LIMIT_LEASE = within(LIMIT_LEASE_S + NOTICE_S)
 # Teleop sends three zeros, 50 ms apart, when a key is released; the last one has its lease.
-ZEROS = by_limit(lambda config: 0.15 + config.safety.sources["teleop"].lease)
+ZEROS = by_limit(lambda config: 0.15 + config.safety.leased["teleop"].lease)
 # A key is held at most so long without a repeat; then its request has its lease.
 LAST_KEY = by_limit(
-    lambda config: config.teleop.hold_first + 0.15 + config.safety.sources["teleop"].lease
+    lambda config: config.teleop.hold_first + 0.15 + config.safety.leased["teleop"].lease
 )
 
 
@@ -215,7 +216,7 @@ BOARD = [
     # While safety is dead only the bridge detects that STOP has no effect.
     Fault("safety SIGKILL, the board ignores STOP",
           steps(do(Firmware(ignores=(Command.STOP,))), kill("safety")),
-          (*NEUTRAL, *RESET), by_limit(lambda config: config.bridge.lease + config.bridge.coast),
+          (*NEUTRAL, *RESET), LEASE_AND_COAST,
           hold_s=2.0, stops=("brake",)),
 ]  # fmt: skip
 

@@ -88,11 +88,11 @@ class Core:
             settings, self._framing, self._translator, boot=boot, counters=counters, now_ns=now_ns
         )
         self.readiness = readiness = Readiness(settings, config.board)
-        self.calls = Calls(readiness, settings.echo_timeout, self._ask)
-        failover_ns = round(settings.failover * NS_PER_S)
+        self.calls = Calls(readiness, settings.times.echo, self._ask)
+        failover_ns = round(settings.times.failover * NS_PER_S)
         self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
         self._polling = Polling(
-            queries(settings), settings.answer_timeout, steady=STEADY, tick_s=tick_s(settings)
+            queries(settings), settings.times.answer, steady=STEADY, tick_s=tick_s(settings)
         )
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message

@@ -58,10 +58,10 @@ class MotionOutput:
         # 1 equivalent mutant: no ``boot`` is an empty text.
         self._refused: int | None = None  # ``boot`` of the second authority that was reported
         self._settings = settings
-        self._valid_ns = round(settings.lease * NS_PER_S)
+        self._valid_ns = round(settings.times.lease * NS_PER_S)
         # 1 equivalent mutant: the first tick begins anew.
         self._over_since_ns: int | None = None  # the end of the lease that is supervised
-        self._limit_ns = round(settings.coast * NS_PER_S)  # from then until it must stand
+        self._limit_ns = round(settings.times.coast * NS_PER_S)  # from then until it must stand
         self._displacement: Displacement | None = None  # None until standstill after that end
 
     def on_motion(self, motion: Motion, received_ns: int, now_ns: int) -> Outputs:
@@ -136,8 +136,8 @@ class MotionOutput:
         self._over_since_ns = over_since_ns
         self._displacement = None
         settings, velocity = self._settings, self._velocity
-        self._limit_ns = round(settings.coast * NS_PER_S)
-        if velocity and over_since_ns and fresh(velocity, over_since_ns, settings.silence):
+        self._limit_ns = round(settings.times.coast * NS_PER_S)
+        if velocity and over_since_ns and fresh(velocity, over_since_ns, settings.times.silence):
             limit_ns = stopping_ns(
                 velocity.value, settings.deceleration, settings.angular_deceleration
             )
@@ -183,4 +183,4 @@ class MotionOutput:
         velocity = self._velocity
         if velocity is None:
             return True
-        return velocity.value.is_standing and fresh(velocity, now_ns, self._settings.silence)
+        return velocity.value.is_standing and fresh(velocity, now_ns, self._settings.times.silence)

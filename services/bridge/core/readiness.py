@@ -118,8 +118,8 @@ class Readiness:
         # 1 equivalent mutant: the first frame sets it.
         self._received_ns = 0
         self._ports = ", ".join(map(str, board.listen_ports))
-        self._silence_ns = round(settings.silence * NS_PER_S)
-        self._echo_ns = round(settings.echo_timeout * NS_PER_S)
+        self._silence_ns = round(settings.times.silence * NS_PER_S)
+        self._echo_ns = round(settings.times.echo * NS_PER_S)
         self._required = settings.require_switches
         self._published = self.message()
         # 2 equivalent mutants: the first tick sets it.

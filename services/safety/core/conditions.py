@@ -132,7 +132,7 @@ def _switches(inputs: Inputs, settings: Safety) -> Observation:
 def _bumper(inputs: Inputs, settings: Safety, acked: Token | None, now_ns: int) -> Observation:
     if inputs.bumper is None:
         return Observation("bumper", False)
-    if not fresh(inputs.bumper, now_ns, settings.bumper_age):
+    if not fresh(inputs.bumper, now_ns, settings.times.bumper_age):
         return Observation("bumper", True, text="The bumper is not being read.")
     boot, seq = inputs.bumper.value.boot, inputs.bumper.value.seq
     polls = inputs.bumper.value.lost
@@ -153,18 +153,18 @@ def _bumper_lossy(inputs: Inputs, held: bool) -> Observation:
 
 def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Observation:
     # A sample counts from its reception; samples queued during a stall seem new afterwards.
-    if _stalled(state, settings.bumper_age, now_ns):
+    if _stalled(state, settings.times.bumper_age, now_ns):
         text = "Safety was stalled: samples received meanwhile may be old."
         return Observation("silent", True, text=text)
     too_old = {
-        "velocity": _is_old(inputs.velocity, settings.velocity_age, now_ns),
-        "link": _is_old(inputs.link, settings.link_age, now_ns),
+        "velocity": _is_old(inputs.velocity, settings.times.velocity_age, now_ns),
+        "link": _is_old(inputs.link, settings.times.link_age, now_ns),
         "switches": settings.require_switches
-        and _is_old(inputs.switches, settings.switches_age, now_ns),
-        "left driver": _is_old(inputs.left, settings.driver_age, now_ns),
-        "right driver": _is_old(inputs.right, settings.driver_age, now_ns),
+        and _is_old(inputs.switches, settings.times.switches_age, now_ns),
+        "left driver": _is_old(inputs.left, settings.times.driver_age, now_ns),
+        "right driver": _is_old(inputs.right, settings.times.driver_age, now_ns),
         "the emergency stop's path through the router": _is_old(
-            inputs.estop_path, settings.estop_path_age, now_ns
+            inputs.estop_path, settings.times.estop_path_age, now_ns
         ),
         "a finite velocity": inputs.velocity is not None and inputs.measured is None,
     }

@@ -40,6 +40,8 @@ from common.standstill import Displacement, stopping_ns
 from services.safety.config import Safety
 
 GOOD_PER_BAD = 0.5  # a good second subtracts half a bad second
+FASTER_MPS = 0.3  # than commanded
+FASTER_RADPS = 0.5
 AGAINST_MPS = 0.1  # against the command; above noise and lag
 AGAINST_RADPS = 0.2
 LONGEST_STOP_NS = 3 * NS_PER_S  # limit of v / a + grace for any settings
@@ -139,13 +141,13 @@ class Supervisor:
 
     def __init__(self, settings: Safety) -> None:
         self._linear = Bounds(
-            settings.deceleration, settings.runaway_linear, AGAINST_MPS, settings.runaway_time
+            settings.deceleration, FASTER_MPS, AGAINST_MPS, settings.times.runaway_time
         )
         self._angular = Bounds(
             settings.angular_deceleration,
-            settings.runaway_angular,
+            FASTER_RADPS,
             AGAINST_RADPS,
-            settings.runaway_time,
+            settings.times.runaway_time,
         )
         # Assumed while the velocity is unknown.
         self._fastest = Twist(settings.max_linear, settings.max_angular)

@@ -26,6 +26,7 @@ from services.safety.core.release import SIGN, Release, stopping_distance
 from services.safety.core.sources import DriveChannel
 from services.safety.core.state import Reply, State
 
+CALL_AGE_NS = NS_PER_S  # of a reset, by the heartbeat that it echoes
 BY_HAND = "Push the vehicle off by hand, then reset."
 BUMPER_FREE = "The bumper is free. Next: reset."
 LET_GO = "A release begins with a new hold: let go first."
@@ -42,7 +43,7 @@ def handle(
 
 def room(state: State, settings: Safety) -> float:
     """Return the remaining travel of a release in metres, less the stopping distance."""
-    stopping = stopping_distance(settings.release_speed, settings.react, settings.deceleration)
+    stopping = stopping_distance(settings.release_speed, settings.reaction, settings.deceleration)
     return state.release.left(settings.release_distance - stopping)
 
 
@@ -50,7 +51,7 @@ def _reset(
     state: State, inputs: Inputs, call: Reset, settings: Safety, now_ns: int
 ) -> tuple[State, Reply]:
     reason = (
-        state.heartbeat.refusal(call.echo, now_ns, round(settings.max_call_age * NS_PER_S))
+        state.heartbeat.refusal(call.echo, now_ns, CALL_AGE_NS)
         or _not_named(state, call)
         or _no_reset(state, inputs, call, settings)
         or _not_standing(inputs, settings, now_ns)
@@ -199,7 +200,7 @@ def _is_pressed(inputs: Inputs) -> bool:
 
 
 def _not_standing(inputs: Inputs, settings: Safety, now_ns: int) -> str:
-    velocity = inputs.known_velocity(now_ns, settings.velocity_age)
+    velocity = inputs.known_velocity(now_ns, settings.times.velocity_age)
     if velocity is None:
         return "Standstill is not confirmed: no velocity is received."
     return "" if velocity.value.is_standing else "The vehicle still moves."

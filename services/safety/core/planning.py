@@ -78,7 +78,7 @@ class Zones(Struct, frozen=True):
 
 def zones(vehicle: Vehicle, settings: Safety) -> Zones:
     """Return the zones of this vehicle with these settings."""
-    return Zones(axes(vehicle), settings.margin, settings.react, settings.deceleration)
+    return Zones(axes(vehicle), settings.margin, settings.reaction, settings.deceleration)
 
 
 class RequestedTwist(Struct, frozen=True):

@@ -43,10 +43,11 @@ from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, 
 from services.safety.core.motion_watch import Supervisor
 from services.safety.core.operator_requests import answered, handle
 from services.safety.core.planning import Plan, Planner, observations
-from services.safety.core.sonars import Rules, SonarFilter
+from services.safety.core.sonars import SonarFilter
 from services.safety.core.sources import Admission, Arbiter, Keepalives, SpeedLimits
 from services.safety.core.state import State, Verdict
 
+SETTLE_NS = NS_PER_S // 2  # of good inputs until a cause clears
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not skip ahead
 
 COMMANDS: dict[VerdictName, Command] = {"run": RUN, "slow": RUN, "stop": STOP, "brake": BRAKE}
@@ -60,8 +61,7 @@ class Policy:
         self.planner = Planner(settings, vehicle)
         self._sonar_filter = SonarFilter(
             self.planner.zones.axes,
-            Rules(settings.hysteresis, settings.stuck_travel),
-            settings.ultrasonic_age,
+            settings.times.ultrasonic_age,
             self.planner.creep_room,
         )
         self._supervisor = Supervisor(settings)
@@ -70,7 +70,7 @@ class Policy:
         """Return the state of a service that has just started."""
         settings = self.settings
         return State(
-            Arbiter(settings.sources),
+            Arbiter(settings.leased),
             SpeedLimits(settings.limits),
             Keepalives(settings.estop_keepalive, settings.estop_keepalive_timeout),
         )
@@ -102,7 +102,7 @@ class Policy:
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
         event, settings = inputs.event, self.settings
-        max_age_ns = round(settings.max_echo_age * NS_PER_S)
+        max_age_ns = round(settings.times.max_echo_age * NS_PER_S)
         match event:
             case DriveRequest():
                 admission = Admission(state.heartbeat, max_age_ns, now_ns)
@@ -122,7 +122,7 @@ class Policy:
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         sent, counters = state.verdict, inputs.counters
-        velocity = inputs.known_velocity(now_ns, self.settings.velocity_age)
+        velocity = inputs.known_velocity(now_ns, self.settings.times.velocity_age)
         known = velocity.value if velocity else None
         release = state.release
         if "contact" in state.latches:
@@ -146,9 +146,8 @@ class Policy:
         )
 
     def _observe(self, state: State, inputs: Inputs, now_ns: int) -> State:
-        settle_ns = round(self.settings.settle * NS_PER_S)
         seen = observe_inputs(inputs, self.settings, state, now_ns)
-        held = observe(state.latches, seen, now_ns, settle_ns, state.decision)
+        held = observe(state.latches, seen, now_ns, SETTLE_NS, state.decision)
         was_good, is_good = not _failing(state.latches), not _failing(held)
         budget = state.fault_budget.updated(now_ns, was_good and not is_good, is_good)
         flapping = Observation("flapping", budget.is_spent)
@@ -177,7 +176,7 @@ class Policy:
         barred = _worst((BARRING & state.latches.keys()) - suspended) != "run"
         plan = Plan()
         if requested and not barred:
-            known = inputs.known_velocity(now_ns, self.settings.velocity_age)
+            known = inputs.known_velocity(now_ns, self.settings.times.velocity_age)
             measured = known.value if known else STILL
             plan = self.planner.plan(state, measured, requested, step_s)
         seen = observations(state, requested, plan)

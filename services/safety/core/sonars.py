@@ -10,7 +10,7 @@ alongside, or a surface beyond the sensor's range, gives the same. It contradict
 vehicle moved along the sonar's axis or turned, and nothing else explains it:
 
 - from the start, the reading is reduced by the distance that the vehicle came nearer
-- after ``stuck_travel`` along the axis, or half a radian of turning, the sonar is *suspect*
+- after half a metre along the axis, or half a radian of turning, the sonar is *suspect*
 - three consecutive samples with another reading end the suspicion
 
 Suspicion never blocks. It limits the speed toward the sonar's sector (``Sonar.cautious``). A
@@ -43,6 +43,8 @@ from services.safety.core.causes import Token
 
 FARTHER_SAMPLES = 3
 CHANGED_SAMPLES = 3
+HYSTERESIS_M = 0.05  # above the noise of a reading
+STUCK_TRAVEL_M = 0.5
 SAME_M = 0.0015  # the board counts millimetres
 STUCK_TURN = 0.5  # rad; a flat surface does not keep its distance over such a turn
 LONGEST_STEP_S = 0.3  # between two samples; over longer gaps the motion is unknown
@@ -127,21 +129,12 @@ class Moved(Struct, frozen=True):
     alongside: bool = False  # whether a surface alongside explains it
 
 
-class Rules(Struct, frozen=True):
-    """Thresholds in metres."""
-
-    hysteresis: float
-    stuck_travel: float  # along the axis without a change, until the sonar is suspect
-
-
-def read(
-    sonar: Sonar, reading: float | None, status: RangeStatus, moved: Moved, rules: Rules
-) -> Sonar:
+def read(sonar: Sonar, reading: float | None, status: RangeStatus, moved: Moved) -> Sonar:
     """Return the sonar after one sample."""
     distance, fault = _trust(reading, status)
     if fault:
         return Sonar(fault=fault)
-    return _accept(_watch(sonar, distance, moved, rules.stuck_travel), distance, rules.hysteresis)
+    return _accept(_watch(sonar, distance, moved), distance)
 
 
 def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
@@ -155,13 +148,13 @@ def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
     return reading, ""
 
 
-def _accept(sonar: Sonar, distance: float, hysteresis: float) -> Sonar:
+def _accept(sonar: Sonar, distance: float) -> Sonar:
     # A faulty sonar has no distance to compare with: any good readings end the fault. A near one
     # that did not would leave the obstacle unseen, and an operator may creep toward that.
     if not sonar.fault:
         if distance <= sonar.distance:
             return replace(sonar, distance=distance, farther=())
-        if distance < sonar.distance + hysteresis:
+        if distance < sonar.distance + HYSTERESIS_M:
             return replace(sonar, farther=())
     farther = (*sonar.farther, distance)
     if len(farther) < FARTHER_SAMPLES:
@@ -169,7 +162,7 @@ def _accept(sonar: Sonar, distance: float, hysteresis: float) -> Sonar:
     return replace(sonar, distance=min(farther), fault="", farther=())
 
 
-def _watch(sonar: Sonar, distance: float, moved: Moved, stuck_travel: float) -> Sonar:
+def _watch(sonar: Sonar, distance: float, moved: Moved) -> Sonar:
     """Compare the reading with the previous one and with the motion."""
     if math.isinf(distance) or abs(distance - sonar.same) >= SAME_M:
         changed = sonar.changed + 1
@@ -180,7 +173,7 @@ def _watch(sonar: Sonar, distance: float, moved: Moved, stuck_travel: float) -> 
         return _begin(sonar, sonar.same)
     turned = sonar.turned + moved.turn
     nearer, travel = (0.0, 0.0) if moved.alongside else _span(sonar, moved.along)
-    against = travel >= stuck_travel or abs(turned) >= STUCK_TURN
+    against = travel >= STUCK_TRAVEL_M or abs(turned) >= STUCK_TURN
     suspect = against or (sonar.suspect and not moved.alongside)
     return replace(sonar, nearer=nearer, travel=travel, turned=turned, suspect=suspect, changed=0)
 
@@ -273,7 +266,6 @@ class SonarFilter(Struct, frozen=True):
     """Settings and geometry with which samples are processed; holds no state."""
 
     axes: tuple[Axis, ...]
-    rules: Rules
     age_s: float  # limit of a sample's age
     creep_room: float  # m that the creep speed needs
 
@@ -306,7 +298,6 @@ class SonarFilter(Struct, frozen=True):
                     beyond=saturation.explains(readings[n]),
                     alongside=_is_alongside(n, readings),
                 ),
-                self.rules,
             )
             for n, sonar in enumerate(array.sonars)
         )
