@@ -81,5 +81,5 @@ def _disturb_board(
             simulation.freeze(seconds, now_ns)
         case q.PowerCycle(seconds=seconds):
             simulation.power_cycle(seconds, now_ns)
-        case q.Flood(rate=rate, seconds=seconds, garbage=garbage):
+        case q.Flood(rate=rate, seconds=seconds, garbage=garbage):  # pragma: no branch - the last
             simulation.flood(rate, seconds, garbage, now_ns)

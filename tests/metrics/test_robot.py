@@ -88,34 +88,26 @@ def test_disk_full_follows_the_latest_event_of_the_running_recorder() -> None:
     assert not robot.disk_full()
 
 
-def test_a_recorder_without_events_has_room() -> None:
-    assert not whole().disk_full()
-
-
-def test_events_are_counted_by_name() -> None:
+def test_events_are_counted_by_name_and_the_names_are_bounded() -> None:
     robot = RobotState()
-    for _ in range(2):
-        robot.on_event("bridge", event("contact"))
-    robot.on_event("safety", event("contact"))
-    assert robot.events == {
-        ("bridge", "contact", "error"): 2,
-        ("safety", "contact", "error"): 1,
-    }
-
-
-def test_the_number_of_event_names_is_bounded() -> None:
-    robot = RobotState()
-    for number in range(EVENT_NAMES_MAX + 7):
+    for service, name in (("bridge", "contact"), ("bridge", "contact"), ("safety", "contact")):
+        robot.on_event(service, event(name))
+    assert robot.events["bridge", "contact", "error"] == 2
+    assert robot.events["safety", "contact", "error"] == 1
+    for number in range(EVENT_NAMES_MAX + 5):
         robot.on_event("dashboard", event(f"e{number}"))
     assert robot.events["dashboard", "other", "error"] == 7
     assert len(robot.events) == EVENT_NAMES_MAX + 1
 
 
-def test_is_robot_needs_a_service_of_the_robot() -> None:
+def test_a_stream_of_a_robot_makes_and_keeps_a_robot() -> None:
     robot = RobotState()
     robot.on_health("dashboard", health("dashboard"), NOW_NS)
     assert not robot.is_robot
-    assert RobotState(streams={m.Link: Latest(link(), NOW_NS)}).is_robot
+    robot.streams[m.Link] = Latest(link(), NOW_NS)
+    assert robot.is_robot
+    assert not robot.expire(LONG_NS - 1)
+    assert robot.expire(LONG_NS)
 
 
 def test_absent_services_expire_except_expected_ones() -> None:
@@ -139,13 +131,6 @@ def test_a_robot_expires_when_all_its_services_are_gone(name: str) -> None:
     robot.on_live(name, "a", False, LONG_NS)
     assert not robot.expire(LONG_NS + 1)
     assert robot.expire(LONG_NS + round(EXPIRY_S * NS_PER_S) + 1)
-
-
-def test_fresh_streams_keep_a_robot() -> None:
-    robot = RobotState()
-    robot.streams[m.Link] = Latest(link(), NOW_NS)
-    assert not robot.expire(LONG_NS - 1)
-    assert robot.expire(LONG_NS)
 
 
 def test_the_own_robot_never_expires() -> None:

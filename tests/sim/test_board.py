@@ -214,13 +214,6 @@ def test_the_bumper_brake_remembers_the_way_of_the_hit_not_of_the_release() -> N
     assert some.braking()
 
 
-def test_the_bumper_brake_is_over_when_the_bumper_is_clear() -> None:
-    some = hit(0.5)
-    some.answer(FORWARD)
-    some.sense(Twist(), CLEAR, pressed=False)
-    assert some.drive() == FORWARD
-
-
 def test_a_bumper_brake_may_refuse_all() -> None:
     some = hit(0.5, bumper_brake="all")
     some.answer(BACKWARD)

@@ -15,14 +15,6 @@ from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, model, room
 STEP_AHEAD = room({"name": "step", "x": 2.0, "y": 0.0, "length": 0.4, "width": 0.4, "low": True})
 
 
-def test_run_is_held_for_ever() -> None:
-    sim = SimFixture()
-    sim.run(0.5)
-    sim.after(60.0)
-    assert sim.truth.linear == 0.5
-    assert sim.truth.x == pytest.approx(0.5 * 60, abs=0.2)
-
-
 def test_counters_are_what_was_really_driven() -> None:
     sim = SimFixture()
     sim.run(1.0, 0.5)

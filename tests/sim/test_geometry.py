@@ -15,10 +15,6 @@ segments = st.builds(Segment, coordinates, coordinates, coordinates, coordinates
 poses = st.builds(Pose, coordinates, coordinates, st.floats(-7.0, 7.0))
 
 
-def test_points_of_a_pose_are_turned_with_it() -> None:
-    assert Pose(1.0, 2.0, math.pi / 2).outward(3.0, 0.5) == pytest.approx((0.5, 5.0))
-
-
 @given(poses, coordinates, coordinates)
 def test_looking_outward_and_back_is_the_same_point(pose: Pose, x: float, y: float) -> None:
     there = pose.outward(x, y)
@@ -43,10 +39,6 @@ def test_looking_outward_and_back_is_the_same_point(pose: Pose, x: float, y: flo
 def test_gap_beside_a_rectangle(segment: Segment, gap: float) -> None:
     assert BODY.gap(ORIGIN, segment) == pytest.approx(gap)
     assert BODY.touches(ORIGIN, segment) is (gap == 0)
-
-
-def test_the_gap_turns_with_the_body() -> None:
-    assert BODY.gap(NORTH, Segment(3.0, -9.0, 3.0, 9.0)) == pytest.approx(2.5)
 
 
 @given(segments, poses)
@@ -78,10 +70,6 @@ def test_points_inside_a_turned_rectangle(x: float, y: float, inside: bool) -> N
 @pytest.mark.parametrize(("x", "y", "gap"), [(1.0, 2.0, 2.0), (-3.0, 4.0, 5.0), (14.0, 3.0, 5.0)])
 def test_distance_from_a_point_to_a_segment(x: float, y: float, gap: float) -> None:
     assert point_gap(x, y, Segment(0.0, 0.0, 10.0, 0.0)) == pytest.approx(gap)
-
-
-def test_a_segment_may_be_a_point() -> None:
-    assert point_gap(3.0, 4.0, Segment(0.0, 0.0, 0.0, 0.0)) == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,7 @@
-import os
 import signal
 import socket
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -13,10 +11,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from cli.__main__ import main as t2
 from common import realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.errors import LinkError
+from common.errors import LinkError, MessageError
 from common.wire.commands import BumperQuery, MotionCommand, MotionKind
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
@@ -84,9 +81,9 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 
 
 @contextmanager
-def process(bench: Bench, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
+def process(bench: Bench, *words: str, module: str = "sim") -> Iterator["subprocess.Popen[bytes]"]:
     """Run the simulator as a process of its own until the context ends."""
-    command = [sys.executable, "-m", "sim", *bench.arguments, *words]
+    command = [sys.executable, "-m", *module.split(), *bench.arguments, *words]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as running:
         try:
             wait_until(lambda: bench.received(), "the board's first frame")
@@ -95,18 +92,42 @@ def process(bench: Bench, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
             running.kill()
 
 
-def test_a_process_streams_drives_and_ends_on_sigterm(bench: Bench) -> None:
-    with process(bench, "--world", "empty") as running:
+@pytest.mark.parametrize("module", ["sim", "cli sim"])
+def test_a_process_streams_drives_and_is_disturbed(bench: Bench, module: str) -> None:
+    with process(bench, "--world", "empty", module=module) as running:
         wait_until(lambda: VelocityReport(0, 0) in bench.received(1), "the second port's stream")
         bench.send(MotionCommand(MotionKind.RUN, 500))
         wait_until(lambda: VelocityReport(500, 0) in bench.received(), "500 mm/s")
+        control = Control(bench.control_port, PATIENCE_S)
+        control.do(Bumper(pressed=True))
         bench.send(BumperQuery())
-        wait_until(lambda: BumperReport(False) in bench.received(), "the bumper's answer")
+        wait_until(lambda: BumperReport(True) in bench.received(), "a pressed bumper")
+        assert control.truth().pressed
+        control.do(Wire(direction="to_pc", foreign=1.0))
+        bench.send(BumperQuery())
+        wait_until(lambda: BumperReport(True) in bench.received(), "the same from elsewhere")
+        control.do(Wire())
+        control.do(PowerCycle(seconds=0.1))
+        wait_until(lambda: len(bench.lines("power")) == 2, "power again")
         running.send_signal(signal.SIGTERM)
         assert running.wait(PATIENCE_S) == 0
     (command,) = bench.lines("command")
     assert (command["kind"], command["linear"]) == ("run", 0.5)
     assert bench.lines("truth")[-1]["x"] > 0.0
+    done = [line["request"]["do"] for line in bench.lines("fault")]
+    assert done == ["bumper", "wire", "wire", "power_cycle"]
+    assert [line["pressed"] for line in bench.lines("bumper_sent")] == [True]
+    assert [line["on"] for line in bench.lines("power")] == [False, True]
+
+
+def test_a_refused_request_and_ctrl_c(bench: Bench) -> None:
+    with process(bench, "--profile", "slope") as running:
+        with pytest.raises(MessageError, match="an obstacle is at x 4, y 0"):
+            Control(bench.control_port, PATIENCE_S).do(Place(x=4.0, y=0.0))
+        running.send_signal(signal.SIGINT)
+        assert running.wait(PATIENCE_S) == 0
+        assert running.stderr is not None
+        assert b"Traceback" not in running.stderr.read()
 
 
 @needs_right
@@ -114,64 +135,6 @@ def test_a_process_streams_drives_and_ends_on_sigterm(bench: Bench) -> None:
 def test_nobody_on_board_keeps_it_waiting(bench: Bench, asked: str, priority: int) -> None:
     with process(bench, "--set", f"robot.realtime={asked}") as running:
         assert realtime.priority(running.pid) == priority
-
-
-@contextmanager
-def meanwhile(bench: Bench) -> Iterator[list[BaseException]]:
-    """Disturb a simulator that runs in this thread from another one; end it by SIGTERM."""
-    errors: list[BaseException] = []
-
-    def work() -> None:
-        wait_until(lambda: answers(bench.control_port), "the control socket")
-        try:
-            disturb(bench, Control(bench.control_port, PATIENCE_S))
-        except BaseException as error:
-            errors.append(error)
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    before = {name: signal.getsignal(name) for name in (signal.SIGINT, signal.SIGTERM)}
-    thread = threading.Thread(target=work)
-    thread.start()
-    try:
-        yield errors
-    finally:
-        thread.join(PATIENCE_S)
-        for name, handler in before.items():
-            signal.signal(name, handler)
-
-
-def answers(port: int) -> bool:
-    """Return whether a simulator answers at this address."""
-    with suppress(LinkError):
-        Control(port, timeout_s=0.5).truth()
-        return True
-    return False
-
-
-def disturb(bench: Bench, control: Control) -> None:
-    """Do a little of everything, and see it on the wire."""
-    control.do(Bumper(pressed=True))
-    bench.send(BumperQuery())
-    wait_until(lambda: BumperReport(True) in bench.received(), "a pressed bumper")
-    control.do(Wire(direction="to_pc", foreign=1.0))
-    bench.send(BumperQuery())
-    wait_until(lambda: BumperReport(True) in bench.received(), "the same from elsewhere")
-    control.do(Wire())
-    control.do(Place(x=0.0, y=0.2))
-    control.do(PowerCycle(seconds=0.1))
-    wait_until(lambda: len(bench.lines("power")) == 2, "power again")
-
-
-@pytest.mark.parametrize("command", ["sim", "t2 sim"])
-def test_it_is_disturbed_while_it_runs(bench: Bench, command: str) -> None:
-    words = bench.arguments
-    with meanwhile(bench) as errors:
-        assert (main(words) if command == "sim" else t2(["sim", *words])) == 0
-    assert errors == []
-    done = [line["request"]["do"] for line in bench.lines("fault")]
-    assert done == ["bumper", "wire", "wire", "place", "power_cycle"]
-    assert [line["pressed"] for line in bench.lines("bumper_sent")] == [True]
-    assert [line["on"] for line in bench.lines("power")] == [False, True]
 
 
 @pytest.mark.parametrize("setting", ["board.port", "sim.control_port"])
@@ -218,7 +181,8 @@ def test_without_control_port_and_trace_there_is_neither(bench: Bench) -> None:
     command = [sys.executable, "-m", "sim", *words]
     with subprocess.Popen(command, stderr=subprocess.DEVNULL) as running:
         wait_until(lambda: bench.received(), "the board's first frame")
-        assert not answers(bench.control_port)
+        with pytest.raises(LinkError):
+            Control(bench.control_port, timeout_s=0.2).truth()
         running.terminate()
         assert running.wait(PATIENCE_S) == 0
     assert not bench.trace.exists()

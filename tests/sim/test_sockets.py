@@ -1,18 +1,17 @@
 import socket
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Iterator
+from contextlib import closing
+from select import select
 
 import msgspec
 import pytest
 
-from common.errors import LinkError, MessageError
+from common.errors import LinkError
 from common.settings import Board
 from sim.faults import Datagram
 from sim.injection import Reply
-from sim.requests import Bumper, Place
 from sim.sockets import BURST, HOST, BoardSocket, Control, ControlSocket, bound, drain
-from tests.sim.sim_fixture import WALL_AHEAD, SimFixture
+from tests.sim.sim_fixture import SimFixture
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 
@@ -85,53 +84,14 @@ def test_a_flood_is_read_in_bursts(pc: socket.socket) -> None:
 # --- the control socket -------------------------------------------------------------------------
 
 
-@contextmanager
-def served(sim: SimFixture) -> Iterator[int]:
-    """Serve a sim's control socket in a thread, and name its port."""
-    port = free_port(socket.SOCK_DGRAM)
-    control = ControlSocket(port, sim.simulation)
-    control.sock.settimeout(0.05)  # waits a little instead of turning at full speed
-    ended = threading.Event()
-    with closing(control):
-        thread = threading.Thread(target=_serve, args=(control, sim, ended.is_set))
-        thread.start()
-        try:
-            yield port
-        finally:
-            ended.set()
-            thread.join(PATIENCE_S)
-
-
-def _serve(control: ControlSocket, sim: SimFixture, ended: Callable[[], bool]) -> None:
-    while not ended():
-        try:
-            control.serve(sim.now_ns)
-        except TimeoutError:
-            continue
-
-
-def test_a_client_does_and_asks() -> None:
-    with served(SimFixture()) as port:
-        control = Control(port, PATIENCE_S)
-        assert not control.truth().pressed
-        assert control.do(Bumper(pressed=True)) == Reply(ok=True)
-        assert control.truth().pressed
-
-
-def test_a_client_is_told_why_it_is_refused() -> None:
-    with (
-        served(SimFixture(WALL_AHEAD)) as port,
-        pytest.raises(MessageError, match="an obstacle is at x 3, y 0"),
-    ):
-        Control(port, PATIENCE_S).do(Place(x=3.0, y=0.0))
-
-
 @pytest.mark.parametrize("text", [b"", b"\xff", b"{", b'{"do": "dance"}', b"[" * 60_000])
-def test_what_is_no_request_is_answered_with_the_reason(text: bytes) -> None:
-    with served(SimFixture()) as port, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.settimeout(PATIENCE_S)
-        sock.sendto(text, (HOST, port))
-        reply = msgspec.json.decode(sock.recv(4096), type=Reply)
+def test_what_is_no_request_is_answered_with_the_reason(text: bytes, pc: socket.socket) -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    with closing(ControlSocket(port, SimFixture().simulation)) as control:
+        pc.sendto(text, (HOST, port))
+        assert select([control.sock], [], [], PATIENCE_S)[0]
+        control.serve(0)
+        reply = msgspec.json.decode(received(pc)[0], type=Reply)
     assert not reply.ok
     assert reply.error
 

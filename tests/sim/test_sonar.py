@@ -54,10 +54,6 @@ def test_a_cone_sees_what_a_ray_would_miss() -> None:
     assert 1900 < measured(sonars(cone=0.6), "front", world=world) < 2100
 
 
-def test_a_cone_that_meets_a_flat_wall_measures_its_nearest_point() -> None:
-    assert measured(sonars(cone=0.6), "front") == 2500
-
-
 @pytest.mark.parametrize(
     ("gap", "expected"), [(0.049, 0), (0.051, 51), (3.999, 3999), (4.001, 4000)]
 )
