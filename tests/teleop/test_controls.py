@@ -136,6 +136,12 @@ def test_gears_are_chosen_by_number(operator: Operator) -> None:
     assert list(SETTINGS.gears_linear) == sorted(set(SETTINGS.gears_linear))
 
 
+def test_two_keys_that_are_held_add_up(operator: Operator) -> None:
+    operator.press("w")
+    operator.press("a")
+    assert operator.ticks(2)[-1] == request(0.2, 0.3)
+
+
 @pytest.mark.parametrize(("key", "direction"), [("f", "forward"), ("b", "backward")])
 def test_a_release_and_driving_exclude_each_other(
     operator: Operator, key: str, direction: str

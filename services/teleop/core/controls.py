@@ -146,7 +146,6 @@ class Controls:
         """Return the request to send now, or None; ``stick`` is None without a gamepad."""
         if stick is None:
             self.enforce("gamepad_gone", now_ns)
-            self._deadman.lose()
         else:
             self._deadman.update(stick.deadman, stick.events, now_ns)
         return self._requests.tick(self._held(stick, now_ns))

@@ -137,11 +137,6 @@ class Deadman:
         """Release it: it counts again after it was up."""
         self.is_held = self._seen_up = False
 
-    def lose(self) -> None:
-        """Release it without a gamepad: its next state is an event."""
-        self.drop()
-        self._events = None
-
     def is_due(self, now_ns: int) -> bool:
         """Return whether the operator should move the stick to keep driving."""
         return self._quiet_s(now_ns) > self._silence_s / 2
