@@ -341,7 +341,7 @@ def test_the_link_message(bench: Bench) -> None:
 
 
 def test_each_query_finds_its_tick() -> None:
-    assert tick_s(Bridge()) == 0.02
+    assert tick_s(Bridge()) == tick_s(Bridge(bumper_rate=20.0, mileage_rate=20.0)) == 0.02
     assert tick_s(Bridge(bumper_rate=125.0)) == 0.008
     bench = Bench()
     assert bench.core.motions.lease.over_since_ns == NOW
