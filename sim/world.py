@@ -26,16 +26,15 @@ class Part(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Spot(Part, frozen=True, kw_only=True):
-    """A named pose: the start of the vehicle, or a waypoint for a driver."""
+    """A pose, such as the start of the vehicle."""
 
     x: Coordinate  # m
     y: Coordinate  # m
     heading: Angle = 0.0  # rad
-    name: str = ""
 
     @property
     def pose(self) -> Pose:
-        """The pose without its name."""
+        """The pose."""
         return Pose(self.x, self.y, self.heading)
 
 
@@ -73,7 +72,6 @@ class Plan(Part, frozen=True, kw_only=True):
     start: Spot = Spot(x=0.0, y=0.0)
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
-    route: tuple[Spot, ...] = ()  # waypoints for drivers; the simulation does not use them
 
     def __post_init__(self) -> None:
         names = [box.name for box in self.boxes]

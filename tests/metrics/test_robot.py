@@ -104,7 +104,7 @@ def test_a_stream_of_a_robot_makes_and_keeps_a_robot() -> None:
     robot = RobotState()
     robot.on_health("dashboard", health("dashboard"), NOW_NS)
     assert not robot.is_robot
-    robot.streams[m.Link] = Latest(link(), NOW_NS)
+    robot = RobotState(streams={m.Link: Latest(link(), NOW_NS)})
     assert robot.is_robot
     assert not robot.expire(LONG_NS - 1)
     assert robot.expire(LONG_NS)

@@ -205,13 +205,15 @@ def test_the_bumper_brake_lets_it_only_back_off(
     assert some.braking() is brakes
 
 
-def test_the_bumper_brake_remembers_the_way_of_the_hit_not_of_the_release() -> None:
+def test_the_bumper_brake_remembers_the_way_of_the_hit_until_the_release() -> None:
     some = hit(0.5)
     some.answer(BACKWARD)
     some.sense(Twist(-0.1), CLEAR, pressed=True)
     assert not some.braking()
     some.answer(FORWARD)
     assert some.braking()
+    some.sense(Twist(), CLEAR, pressed=False)
+    assert some.drive() == FORWARD
 
 
 def test_a_bumper_brake_may_refuse_all() -> None:

@@ -1,4 +1,3 @@
-import math
 from pathlib import Path
 
 import pytest
@@ -19,16 +18,13 @@ from sim.config import (
     profile_list,
     read_profile,
 )
-from sim.geometry import Pose, Rectangle
+from sim.geometry import Pose
 from sim.model import Model
-from sim.world import World
 from tests.sim.sim_fixture import SimFixture
 
 VEHICLE = Vehicle()
-BODY = Rectangle(VEHICLE.length / 2, VEHICLE.width / 2)
 PERIOD_S, REQUESTS = 0.05, 80
 STRAIGHT_M = 0.4 * PERIOD_S * REQUESTS  # without any acceleration
-TURNING = 0.66  # m around the middle, what the body sweeps on the spot
 
 
 def written(folder: Path, text: str, name: str = "file") -> str:
@@ -44,30 +40,6 @@ def test_every_shipped_world_can_be_started_in(name: str) -> None:
 
 def test_the_office_has_odometry_s_coordinates() -> None:
     assert load_plan("office", VEHICLE).start.pose == Pose(0.0, 0.0, 0.0)
-
-
-def test_the_office_s_route_can_be_stood_on() -> None:
-    plan = load_plan("office", VEHICLE)
-    world = World.of(plan)
-    assert len(plan.route) >= 4
-    for spot in plan.route:
-        assert world.contact(BODY, spot.pose) is (spot.name == "step")
-        touching = Pose(spot.x, spot.y - 1e-4, spot.heading)
-        assert not world.blocks(BODY, touching), spot.name
-
-
-@pytest.mark.parametrize("name", ["corner", "clear of the step", "home"])
-def test_the_office_has_room_to_turn(name: str) -> None:
-    plan = load_plan("office", VEHICLE)
-    (spot,) = (spot for spot in plan.route if spot.name == name)
-    assert World.of(plan).clearance(Rectangle(0.01, 0.01), spot.pose) > TURNING + 0.2
-
-
-def test_the_office_s_step_is_met_before_anything_that_sonar_sees() -> None:
-    plan = load_plan("office", VEHICLE)
-    (spot,) = (spot for spot in plan.route if spot.name == "step")
-    assert World.of(plan).clearance(BODY, spot.pose) > 0.9
-    assert spot.heading == pytest.approx(math.pi / 2, abs=1e-4)
 
 
 def test_a_world_may_be_a_file_anywhere(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ STANDING = Twist()
 twists = st.builds(Twist, st.floats(-5.0, 5.0), st.floats(-3.0, 3.0))
 
 
-def settled(twist: Twist, kind: MotionKind, target: Twist = STANDING) -> tuple[Twist, float]:
+def settled(twist: Twist, kind: MotionKind, target: Twist) -> tuple[Twist, float]:
     """Return where the velocity comes to, and after how many seconds."""
     steps = 0
     while (following := next_twist(twist, kind, target, DRIVE, DT)) != twist:
@@ -29,31 +29,25 @@ def settled(twist: Twist, kind: MotionKind, target: Twist = STANDING) -> tuple[T
     return twist, steps * DT
 
 
-def test_break_stops_at_once() -> None:
-    assert next_twist(AT_SPEED, MotionKind.BREAK, AT_SPEED, DRIVE, DT) == Twist()
-
-
-def test_stop_ramps_down_whatever_velocity_comes_with_it() -> None:
-    end, seconds = settled(AT_SPEED, MotionKind.STOP, AT_SPEED)
-    assert end == Twist()
-    assert seconds == pytest.approx(1.0 / DRIVE.coast, abs=DT)
-
-
-def test_run_follows_by_its_speed_loop_and_stays() -> None:
-    target = Twist(0.6, 0.3)
-    end, seconds = settled(Twist(), MotionKind.RUN, target)
-    assert end == target
-    assert seconds == pytest.approx(0.6 / DRIVE.acceleration, abs=DT)
-
-
-def test_run_at_zero_is_regulated_to_zero() -> None:
-    end, seconds = settled(Twist(-0.6), MotionKind.RUN)
-    assert end == Twist()
-    assert seconds == pytest.approx(0.6 / DRIVE.acceleration, abs=DT)
+@pytest.mark.parametrize(
+    ("start", "kind", "target", "end", "seconds"),
+    [
+        (AT_SPEED, BREAK, AT_SPEED, STANDING, DT),  # whatever velocity comes with it
+        (AT_SPEED, STOP, AT_SPEED, STANDING, 1.0 / DRIVE.coast),
+        (STANDING, RUN, Twist(0.6, 0.3), Twist(0.6, 0.3), 0.6 / DRIVE.acceleration),
+        (Twist(-0.6), RUN, STANDING, STANDING, 0.6 / DRIVE.acceleration),
+    ],
+)
+def test_each_command_reaches_its_velocity_by_its_ramp(
+    start: Twist, kind: MotionKind, target: Twist, end: Twist, seconds: float
+) -> None:
+    reached, after_s = settled(start, kind, target)
+    assert reached == end
+    assert after_s == pytest.approx(seconds, abs=DT)
 
 
 def test_the_motors_have_a_greatest_speed() -> None:
-    end, _ = settled(Twist(), MotionKind.RUN, Twist(30.0, -50.0))
+    end, _ = settled(STANDING, RUN, Twist(30.0, -50.0))
     assert end == Twist(DRIVE.max_linear, -DRIVE.max_angular)
 
 
@@ -116,12 +110,6 @@ class Ride:
         while self.twist != Twist():
             self.after(DT, kind)
         return self.distance - before
-
-
-def test_kind_motors_reach_what_is_commanded() -> None:
-    ride = Ride()
-    assert ride.after(1.0, RUN, 0.5, 0.3) == Twist(0.5, 0.3)
-    assert ride.after(DT, BREAK) == Twist()
 
 
 def test_nothing_happens_within_the_dead_time_not_even_brake() -> None:

@@ -55,7 +55,6 @@ def truth(tick: int, **fields: Any) -> t.Truth:
         "clearance": 1.0,
         "contact": False,
         "pressed": False,
-        "wheels": (0.0,) * 4,
         "command": command(0, STOP),
         "braking": False,
         "ultrasonic_brake": True,
