@@ -138,7 +138,7 @@ class Case:
         """Return the memory of the release."""
         if self.way == "unused":
             return Release()
-        held = Release(moved_ns=now_ns, direction="backward")
+        held = Release(moved_ns=now_ns, source="teleop", direction="backward")
         forbidden: frozenset[Direction] = frozenset({"backward"})
         return replace(held, forbidden=forbidden) if "forbidden" in self.way else held
 
