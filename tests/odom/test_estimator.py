@@ -226,6 +226,14 @@ def test_time_before_and_after_a_valid_velocity_is_unseen() -> None:
     assert [segment.seen for segment in estimator._segments] == [False, True, False]
 
 
+def test_a_velocity_that_is_over_adds_no_time_before_the_last_input() -> None:
+    estimator = Estimator(Odom())
+    estimator.on_velocity(Velocity(linear=0.5, angular=0.0), NS_PER_S)
+    estimator.on_mileage(Board().mileage(), 2 * NS_PER_S)
+    estimator.on_velocity(Velocity(linear=0.5, angular=0.0), 3 * NS_PER_S)
+    assert estimator._segments == [ArcSegment(0.0, 0.0, 1.0, seen=False)]
+
+
 # --- restarts, and a pose that is set -------------------------------------------------------
 
 
@@ -363,3 +371,13 @@ def test_a_motion_without_velocities_and_the_next_one_are_not_compared() -> None
     detector.add(12 * TICK_NS, arc(0.02), arc(0.01))
     detector.update(12 * TICK_NS)
     assert detector.residual == pytest.approx(0.01)
+
+
+def test_counters_that_do_not_follow_the_velocities_are_published_as_slip() -> None:
+    odom = driving()
+    assert odom.odometry().slip is False
+    for _ in range(20):
+        odom.board.now_ns += TICK_NS  # the wheels turn, the counters do not
+        odom.update()
+    assert odom.odometry().slip is True
+    assert odom.odometry().residual == pytest.approx(-0.8 * 0.4, abs=0.03)

@@ -118,7 +118,6 @@ class Estimator:
         self._advance(now_ns)
         self._corrected = self._predicted = PoseEstimate(pose.moved(0.0, 0.0), START)
         self._counters = None
-        self._segments = []
         self.epoch += 1
 
     def estimate(self, now_ns: int) -> m.Odometry | None:
