@@ -66,6 +66,7 @@ class Brake:
         self.wanted = on
         self.since_ns = now_ns
         self._echo: bool | None = None
+        # 1 equivalent mutant: an echo sets it before it counts.
         self._unechoed = 0  # sends since the last echo
         self.send_at_once()
 
@@ -244,7 +245,9 @@ class RelayStatus:
         self._required = required
         self._state: m.LinkState = "never"
         self._report = RelayReport("", "", 0.0, {})
+        # 2 equivalent mutants: a report sets it.
         self._received_ns = 0
+        # 2 equivalent mutants: no event has such a name.
         self._event = ""  # the newest one
 
     def take(self, datagram: bytes, now_ns: int) -> bool:
