@@ -67,6 +67,12 @@ def test_it_is_not_placed_into_something() -> None:
     assert sim.truth.x == 0.0
 
 
+def test_the_truth_leaves_no_line() -> None:
+    sim = SimFixture()
+    assert sim.do(q.GetTruth()).truth == sim.truth
+    assert sim.records == []
+
+
 def test_what_is_asked_for_is_traced_with_its_error() -> None:
     sim = SimFixture(room(BOX))
     sim.do(q.Place(x=3.0, y=0.0))
