@@ -195,8 +195,10 @@ class Controller:
             self._unconfirmed = False
         if step is EstopStep.LAST:
             self._unconfirmed = True
-            name = "estop_denied" if self._source.denied else "estop_unconfirmed"
-            self._node.event(name, "error", self._no_estop)
+            denied = self._source.denied
+            self._node.event(
+                "estop_denied" if denied else "estop_unconfirmed", "error", self._no_estop
+            )
 
     @property
     def _no_estop(self) -> str:

@@ -24,13 +24,19 @@ def words(node: ast.expr) -> list[str]:
     return [node.value] if isinstance(node, ast.Constant) and isinstance(node.value, str) else []
 
 
-def calls(path: Path) -> Iterator[ast.Call]:
-    """Yield the calls that publish an event: ``.event(...)`` and ``Transition(...)``."""
+def calls(path: Path) -> Iterator[tuple[list[str], list[str]]]:
+    """Yield names and levels of the calls that make an event.
+
+    These are ``.event(...)``, ``Event(...)``, ``Transition(...)``, and the rules of teleop.
+    """
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call):
-            name = getattr(node.func, "attr", "") or getattr(node.func, "id", "")
-            if name in ("event", "Transition"):
-                yield node
+        if not isinstance(node, ast.Call) or len(node.args) < 2:
+            continue
+        name = getattr(node.func, "attr", "") or getattr(node.func, "id", "")
+        if name in ("event", "Event", "Transition"):
+            yield words(node.args[0]), words(node.args[1])
+        elif name in ("_report", "_enforce") and "teleop" in path.parts:
+            yield words(node.args[0]), ["warning"]
 
 
 def events_of_the_code() -> Events:
@@ -38,8 +44,7 @@ def events_of_the_code() -> Events:
     found: Events = {}
     for path in sorted((TREE / "services").rglob("*.py")):
         service = path.relative_to(TREE / "services").parts[0]
-        for call in calls(path):
-            names, levels = words(call.args[0]), words(call.args[1])
+        for names, levels in calls(path):
             # Two names and two levels depend on one condition.
             each = [[level] for level in levels] if len(levels) > 1 else [levels] * len(names)
             for name, given in zip(names, each, strict=True):
