@@ -133,8 +133,9 @@ PROCESSES = [
         Fault("pendant SIGKILL", kill("pendant"), RESET, KEEPALIVE, hold_s=1.5),
     ),
     Fault("a second bridge", second("bridge"), ON),
-    # Its heartbeats mix with the first one's in the drivers' echoes; its motions have no effect.
-    Fault("a second safety", second("safety"), (*ON, *ITSELF), hold_s=1.5),
+    # Its heartbeats mix with the first one's in the drivers' echoes; its motions have no effect. A
+    # driver that echoes the second one alone for over a second needs a neutral request.
+    Fault("a second safety", second("safety"), (*ON, *ITSELF, *NEUTRAL), hold_s=1.5),
     Fault("a second driver of one name", second("driver"), (*ON, *ITSELF), hold_s=1.5),
     # Log lines that cannot be written are lost; no service waits for the disk.
     Fault("disk full, then contact", injectors.fill_disk, RESET, within(0.05), harmless=True,
