@@ -45,9 +45,9 @@ demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO)) ## a simulated T2 drives a lap
 up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C
 	$(BIN)/t2 up
 
-# Most tests wait for other processes most of the time. Of the tests that measure times three run at once.
+# Most tests wait for other processes most of the time. Of the tests that measure times two run at once.
 MANY = -n 6 --dist worksteal
-FEW = -n 3 --dist worksteal
+FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/search tests/safety/test_walk.py
