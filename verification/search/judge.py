@@ -45,7 +45,7 @@ class Judge:
     def look(
         self, causes: Sequence[m.Cause], asks_since_ns: int | None, truth: Truth, now_ns: int
     ) -> None:
-        """Judge the causes that an operator sees; who asks for motion since then, or does not."""
+        """Judge the causes that an operator sees, and the requests for motion since then."""
         self._note(truth, now_ns)
         at_s = (now_ns - self._start_ns) / NS_PER_S
         if at_s < READY_S:
