@@ -275,19 +275,21 @@ def test_no_run_later_than_the_timeout_after_the_heartbeat_that_was_echoed(
     fixture = running()
     proven_ns, first, latched = fixture.now_ns, fixture.echo, False
     fixture.keepalive()
+    last = first  # what the last message of the pendant echoed
     for kind, ticks in events:
         for _ in range(ticks):
             fixture.tick()
             if kind == "beat":
                 if fixture.now_ns - proven_ns > NS_PER_S:
                     latched = True
+                last, proven_ns = fixture.echo, fixture.now_ns
                 fixture.keepalive()
-                proven_ns = fixture.now_ns
             elif kind == "old echo":
+                last = first
                 fixture.keepalive(echo=first)
             elif kind == "again":
                 fixture.keepalive_seq -= 1
-                fixture.keepalive()
+                fixture.keepalive(echo=last)
             elif kind == "rival":
                 fixture.keepalive_boot += 1
                 fixture.keepalive()
