@@ -228,7 +228,7 @@ def _limits(policy: Policy, state: State, now_ns: int) -> Limits:
     if not BARRING.isdisjoint(state.latches):
         return Limits(forward=0.0, backward=0.0, angular=0.0)
     planner, settings = policy.planner, policy.settings
-    distances = planner.with_overrides(state.sonar_array.cautious, state, state.verdict.source)
+    distances = planner.cautious(state, state.verdict.source)
 
     def most(asked: Twist) -> Twist:
         twist = planner.limited(asked, state.latches)

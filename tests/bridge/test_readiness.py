@@ -108,7 +108,7 @@ def test_it_is_sent_until_echoed_and_then_again_and_again() -> None:
 def test_an_operator_may_switch_it_off_until_the_board_returns() -> None:
     brake = echoed()
     brake.want(False, NS_PER_S)
-    assert (brake.position, brake.settled, brake.unechoed) == (None, False, False)
+    assert (brake.position, brake.settled, brake.assumed_on) == (None, False, False)
     assert brake.due(NS_PER_S) == BumperBrakeSet(False)
     brake.on_echo(False)
     assert (brake.position, brake.settled) == (False, True)
@@ -123,7 +123,7 @@ def test_an_on_counts_for_five_sends_and_an_off_until_an_on() -> None:
         assert sends(brake, UNECHOED, second * NS_PER_S).position is True
         brake.on_echo(True)
     assert sends(brake, UNECHOED + 1, 9 * NS_PER_S).position is None
-    assert brake.unechoed, "enough where the settings accept that"
+    assert brake.assumed_on, "enough where the settings accept that"
     assert sends(echoed(False), 3 * UNECHOED).position is False
 
 

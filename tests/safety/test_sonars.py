@@ -20,7 +20,8 @@ from services.safety.core.sonars import (
     SonarFilter,
     SonarOverrides,
     axes,
-    read,
+    trusted,
+    updated,
 )
 from services.safety.report import _doubts
 from tests.safety.policy_fixture import FREE, NO_ECHO
@@ -36,6 +37,10 @@ def feed(sonar: Sonar, *readings: float | None, moved: Moved = STILL) -> Sonar:
     for reading in readings:
         sonar = read(sonar, reading, "ok", moved)
     return sonar
+
+
+def read(sonar: Sonar, reading: float | None, status: RangeStatus, moved: Moved) -> Sonar:
+    return updated(sonar, *trusted(reading, status), moved)
 
 
 def along(metres: float) -> Moved:
@@ -96,7 +101,7 @@ def test_a_fault_ends_with_near_readings_too(fault: str, reading: float) -> None
     for expected in (fault, fault, ""):
         sonar = read(sonar, reading, "ok", STILL)
         assert sonar.fault == expected
-    assert (sonar.distance, sonar.is_unseen) == (reading, False)
+    assert sonar.distance == reading
 
 
 def test_no_echo_is_free_space() -> None:
@@ -177,10 +182,6 @@ def test_suspicion_ends_after_three_other_readings_in_a_row() -> None:
 def test_a_fault_ends_a_suspicion_and_is_worse() -> None:
     suspect = feed(feed(GOOD, 2.0, 2.0, 2.0), *[2.0] * 3, moved=along(0.2))
     assert read(suspect, None, "fault", STILL) == Sonar(fault="faulty")
-    assert Sonar(fault="faulty").is_unseen
-    assert Sonar(fault="silent").is_unseen
-    assert not Sonar(fault="too near to measure").is_unseen
-    assert not GOOD.is_unseen
 
 
 readings = st.none() | st.floats(allow_nan=True, allow_infinity=True)
@@ -203,7 +204,7 @@ def test_it_never_believes_more_than_the_newest_sample_shows(
         assert sonar.cautious(ROOM_M) <= sonar.distance
 
 
-FILTER = SonarFilter(axes(Vehicle()), age_s=0.3, creep_room=0.26)
+FILTER = SonarFilter(axes(Vehicle()), age_s=0.3)
 STEP_NS = NS_PER_S // 20
 
 
@@ -222,7 +223,7 @@ def doubts(array: SonarArray) -> str:
     return text
 
 
-def updated(count: int, front: float | None = None, linear: float = 0.0) -> SonarArray:
+def after_samples(count: int, front: float | None = None, linear: float = 0.0) -> SonarArray:
     array = SonarArray()
     for seq in range(1, count + 1):
         array = FILTER.update(array, sample(seq, front), Twist(linear), seq * STEP_NS)
@@ -230,20 +231,20 @@ def updated(count: int, front: float | None = None, linear: float = 0.0) -> Sona
 
 
 def test_three_samples_open_all_sectors() -> None:
-    assert doubts(updated(2)) == "all silent"
-    assert doubts(updated(3)) == ""
-    assert updated(3, 1.0).distances[2] == 1.0
+    assert doubts(after_samples(2)) == "all silent"
+    assert doubts(after_samples(3)) == ""
+    assert after_samples(3, 1.0).distances[2] == 1.0
 
 
 def test_one_sample_is_taken_once() -> None:
-    array = updated(2)
+    array = after_samples(2)
     for _ in range(3):
         array = FILTER.update(array, sample(2), Twist(), 2 * STEP_NS)
     assert doubts(array) == "all silent"
 
 
 def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> None:
-    array, old = updated(3), sample(3)
+    array, old = after_samples(3), sample(3)
     limit_ns = 3 * STEP_NS + round(0.3 * NS_PER_S)
     assert doubts(FILTER.update(array, old, Twist(), limit_ns)) == ""
     array = FILTER.update(array, old, Twist(), limit_ns + 1)
@@ -253,19 +254,19 @@ def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> Non
 
 
 def test_a_constant_sonar_is_suspect_by_the_way_along_its_axis() -> None:
-    assert doubts(updated(13, 2.0, linear=1.0)) == "front suspect"
-    assert doubts(updated(13, 2.0, linear=0.5)) == ""
-    array = updated(13, 2.0, linear=1.0)
+    assert doubts(after_samples(13, 2.0, linear=1.0)) == "front suspect"
+    assert doubts(after_samples(13, 2.0, linear=0.5)) == ""
+    array = after_samples(13, 2.0, linear=1.0)
     assert [math.isinf(one) for one in array.distances].count(True) == 7
     assert array.distances[2] == 2.0
     assert array.unseen == frozenset()
-    assert array.cautious[2] == 0.26
-    assert updated(2).unseen == frozenset(range(8))
+    assert array.cautious(ROOM_M)[2] == ROOM_M
+    assert after_samples(2).unseen == frozenset(range(8))
 
 
 def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
     assert SonarArray().unseen == frozenset()
-    array = FILTER.update(updated(2), sample(2), Twist(), NS_PER_S)
+    array = FILTER.update(after_samples(2), sample(2), Twist(), NS_PER_S)
     assert doubts(array) == "all silent"
     assert array.unseen == frozenset()
 

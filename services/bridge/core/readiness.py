@@ -89,7 +89,7 @@ class Brake:
         return self.position is self.wanted
 
     @property
-    def unechoed(self) -> bool:
+    def assumed_on(self) -> bool:
         """Whether it is commanded on, and the board has echoed no "off"."""
         return self.wanted and self.position is not False
 
@@ -140,11 +140,11 @@ class Readiness:
     def _brakes_on(self) -> bool:
         if all(brake.position for brake in self._brakes):
             return True
-        return not self._required and self._unechoed
+        return not self._required and self._assumed_on
 
     @property
-    def _unechoed(self) -> bool:
-        return all(brake.unechoed for brake in self._brakes)
+    def _assumed_on(self) -> bool:
+        return all(brake.assumed_on for brake in self._brakes)
 
     def waiting(self) -> str:
         """Describe the missing condition; empty when ready."""
@@ -155,7 +155,7 @@ class Readiness:
         if self.relay.waiting or self._brakes_on:
             return self.relay.waiting
         text = "the board's emergency brakes are not both on and echoed"
-        if self._required and self._inhibited and self._unechoed:
+        if self._required and self._inhibited and self._assumed_on:
             text += "; a firmware without echoes needs bridge.require_switches = false"
         return text
 

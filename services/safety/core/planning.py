@@ -129,13 +129,16 @@ class Planner:
         fastest = sweep(twist, self.reach)
         return twist.scaled(min(1.0, self._settings.creep_speed / fastest)) if fastest else twist
 
-    def with_overrides(
+    def cautious(self, state: State, source: str | None) -> tuple[float, ...]:
+        """Return the distances that a source plans with."""
+        distances = state.sonar_array.cautious(self.creep_room)
+        return self._with_overrides(distances, state, source)
+
+    def _with_overrides(
         self, distances: tuple[float, ...], state: State, source: str | None
     ) -> tuple[float, ...]:
         """Return the distances, with creep room toward faulty sonars that the source overrides."""
         overridden = state.overrides.acknowledged_by(source)
-        if not overridden:
-            return distances
         return tuple(
             self.creep_room if n in overridden else distance for n, distance in enumerate(distances)
         )
@@ -143,7 +146,7 @@ class Planner:
     def plan(self, state: State, measured: Twist, requested: RequestedTwist, step_s: float) -> Plan:
         """Return the twist for the next step; zero when the way is blocked."""
         source = None if requested.is_release else requested.source  # it overrides no sonar
-        distances = self.with_overrides(state.sonar_array.cautious, state, source)
+        distances = self.cautious(state, source)
         limit = self.zones.limit(requested.twist, distances)
         target = requested.twist.scaled(limit.factor)
         sent = state.verdict
@@ -154,7 +157,7 @@ class Planner:
         for tightest in (limit, here):
             if tightest.factor == 0:
                 return Plan(blocked_by=tightest.sonar)
-        shown = self.with_overrides(state.sonar_array.distances, state, source)
+        shown = self._with_overrides(state.sonar_array.distances, state, source)
         blocked_by = self.zones.too_fast(measured, shown)
         if blocked_by is not None:
             return Plan(blocked_by=blocked_by)

@@ -59,11 +59,7 @@ class Policy:
     def __init__(self, settings: Safety, vehicle: Vehicle) -> None:
         self.settings = settings
         self.planner = Planner(settings, vehicle)
-        self._sonar_filter = SonarFilter(
-            self.planner.zones.axes,
-            settings.times.ultrasonic_age,
-            self.planner.creep_room,
-        )
+        self._sonar_filter = SonarFilter(self.planner.zones.axes, settings.times.ultrasonic_age)
         self._supervisor = Supervisor(settings)
 
     def start(self) -> State:
@@ -170,18 +166,17 @@ class Policy:
     def _conclude(
         self, state: State, inputs: Inputs, step_s: float, now_ns: int
     ) -> tuple[State, Verdict]:
-        # While a release moves the vehicle, it creeps although the contact is latched.
-        suspended = {"contact"} if state.release.direction else set()
+        # A release moves the vehicle although the contact is latched.
+        ignored = {"contact"} if state.release.direction else set()
         requested = self.planner.requested(state, now_ns)
-        barred = _worst((BARRING & state.latches.keys()) - suspended) != "run"
         plan = Plan()
-        if requested and not barred:
+        if requested and (BARRING & state.latches.keys()) <= ignored:
             known = inputs.known_velocity(now_ns, self.settings.times.velocity_age)
             measured = known.value if known else STILL
             plan = self.planner.plan(state, measured, requested, step_s)
         seen = observations(state, requested, plan)
         held = observe(state.latches, seen, now_ns, decision=state.decision)
-        worst = _worst(held.keys() - suspended)
+        worst = _worst(held.keys() - ignored)
         command = COMMANDS[worst]
         if command is STOP and state.motion.standstill.rolls:
             command = BRAKE

@@ -109,11 +109,6 @@ class Sonar(Struct, frozen=True):
     suspect: bool = False
     changed: int = 0  # samples in a row that contradict the suspicion
 
-    @property
-    def is_unseen(self) -> bool:
-        """Whether it has no reading."""
-        return self.fault in UNSEEN
-
     def cautious(self, creep_room: float) -> float:
         """Return the distance to plan with; ``creep_room`` is the distance for the creep speed."""
         doubted = 0.0 if self.suspect else self.same - self.nearer
@@ -121,7 +116,7 @@ class Sonar(Struct, frozen=True):
 
 
 class Moved(Struct, frozen=True):
-    """Motion since the last sample, and what explains a constant reading."""
+    """Motion since the last sample, and what else explains a constant reading."""
 
     along: float = 0.0  # m along the axis, toward the sector
     turn: float = 0.0  # rad
@@ -129,16 +124,15 @@ class Moved(Struct, frozen=True):
     alongside: bool = False  # whether a surface alongside explains it
 
 
-def read(sonar: Sonar, reading: float | None, status: RangeStatus, moved: Moved) -> Sonar:
-    """Return the sonar after one sample."""
-    distance, fault = _trust(reading, status)
+def updated(sonar: Sonar, distance: float, fault: str, moved: Moved) -> Sonar:
+    """Return the sonar after one sample, as ``trusted`` reads it."""
     if fault:
         return Sonar(fault=fault)
     return _accept(_watch(sonar, distance, moved), distance)
 
 
-def _trust(reading: float | None, status: RangeStatus) -> tuple[float, str]:
-    """Return the distance of one sample, or the reason why it has none."""
+def trusted(reading: float | None, status: RangeStatus) -> tuple[float, str]:
+    """Return the distance of one sample, and the reason if it has none; then it is 0."""
     if status == "no_echo":
         return math.inf, ""
     if status != "ok":
@@ -252,9 +246,16 @@ class SonarArray(Struct, frozen=True):
     token: Token | None = None
     at_ns: int = 0
     saturation: Saturation = Saturation()
-    distances: tuple[float, ...] = (0.0,) * len(SONAR_NAMES)  # m that are shown to be free
-    cautious: tuple[float, ...] = (0.0,) * len(SONAR_NAMES)  # m to plan with, less where in doubt
     unseen: frozenset[int] = frozenset()  # sonars without a reading while samples are fresh
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        """The distances that are shown to be free, in metres."""
+        return tuple(sonar.distance for sonar in self.sonars)
+
+    def cautious(self, creep_room: float) -> tuple[float, ...]:
+        """Return the distances to plan with: less where a sonar is in doubt."""
+        return tuple(sonar.cautious(creep_room) for sonar in self.sonars)
 
     @property
     def is_doubted(self) -> bool:
@@ -267,7 +268,6 @@ class SonarFilter(Struct, frozen=True):
 
     axes: tuple[Axis, ...]
     age_s: float  # limit of a sample's age
-    creep_room: float  # m that the creep speed needs
 
     def update(
         self,
@@ -285,42 +285,27 @@ class SonarFilter(Struct, frozen=True):
             return array
         moved = STILL if measured is None or measured.is_standing else measured
         step_s = min((latest.received_ns - array.at_ns) / NS_PER_S, LONGEST_STEP_S)
-        readings = tuple(map(_shown, sample.ranges, sample.status))
-        saturation = array.saturation.updated(readings)
+        distances, faults = zip(*map(trusted, sample.ranges, sample.status), strict=True)
+        saturation = array.saturation.updated(distances)
         sonars = tuple(
-            read(
+            updated(
                 sonar,
-                sample.ranges[n],
-                sample.status[n],
+                distances[n],
+                faults[n],
                 Moved(
                     along=self.axes[n].along(moved) * step_s,
                     turn=moved.angular * step_s,
-                    beyond=saturation.explains(readings[n]),
-                    alongside=_is_alongside(n, readings),
+                    beyond=saturation.explains(distances[n]),
+                    alongside=_is_alongside(n, distances),
                 ),
             )
             for n, sonar in enumerate(array.sonars)
         )
-        return SonarArray(
-            sonars,
-            token,
-            latest.received_ns,
-            saturation,
-            distances=tuple(sonar.distance for sonar in sonars),
-            cautious=tuple(sonar.cautious(self.creep_room) for sonar in sonars),
-            unseen=frozenset(n for n, sonar in enumerate(sonars) if sonar.is_unseen),
-        )
+        unseen = frozenset(n for n, sonar in enumerate(sonars) if sonar.fault in UNSEEN)
+        return SonarArray(sonars, token, latest.received_ns, saturation, unseen)
 
 
-def _shown(reading: float | None, status: str) -> float:
-    """Return the range of a sample; infinity for no echo, 0 for no reading."""
-    if status == "no_echo":
-        return math.inf
-    good = status == "ok" and reading is not None and math.isfinite(reading)
-    return reading if good and reading is not None else 0.0
-
-
-def _is_alongside(sonar: int, readings: tuple[float, ...]) -> bool:
+def _is_alongside(sonar: int, readings: Sequence[float]) -> bool:
     """Return whether the flank on its side sees the wall that a corner sonar sees."""
     flank = FLANK_OF.get(SONAR_NAMES[sonar])
     if flank is None:

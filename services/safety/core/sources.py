@@ -366,13 +366,10 @@ class Keepalives(Struct, frozen=True):
         if refused or message is None:
             return self, refused
         before = self.channels.get(name, Channel())
-        broken = before.boot is not None and (
-            before.boot != message.boot or not before.is_fresh(now_ns, self.timeout_s)
-        )
         channel, refused = before.accept(message, now_ns, self.timeout_s, admission.max_age_ns)
-        if broken:
-            channel = replace(channel, conflict_ns=now_ns)
         if not refused:
+            if before.boot is not None and not before.is_fresh(now_ns, self.timeout_s):
+                channel = replace(channel, conflict_ns=now_ns)
             channel = replace(channel, received_ns=admission.sent_ns(message))
         return replace(self, channels={**self.channels, name: channel}), refused
 
