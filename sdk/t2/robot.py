@@ -27,7 +27,7 @@ A = TypeVar("A", bound=msgspec.Struct)
 
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
-STANDSTILL_S = 1.0  # a release is refused until the vehicle stands
+STANDSTILL_S = 2.0  # a release is refused until the vehicle stands
 SWITCH = "use the vehicle's own switch"
 
 
@@ -202,9 +202,11 @@ class Robot:
                     raise NotAllowed(
                         f"the router drops the requests of {source!r}; see `t2 keys list`"
                     )
-                if state.source == source and state.release_refusal and passed_s > STANDSTILL_S:
+                is_refused = state.source == source and bool(state.release_refusal)
+                if is_refused and passed_s > STANDSTILL_S:
                     raise Refused(state.release_refusal)
-                publisher.tick(request(release=direction))
+                # After a refusal safety wants a neutral request: let go, then request it again.
+                publisher.tick(None if is_refused else request(release=direction))
                 time.sleep(PERIOD_S)
         finally:
             publisher.stop()

@@ -8,14 +8,11 @@ import t2
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
-SETS = (
-    'safety.limits.detector={lease=1.0, silence="ignore"}',
-    "safety.sources.tap={priority=40, lease=0.2}",
-)
+SETS = ('safety.limits.detector={lease=1.0, silence="ignore"}',)
 
 
 def library_stack(folder: Path) -> AbstractContextManager[RunningStack]:
-    """Run the stack with a source of limits, ``detector``, and one above all others, ``tap``."""
+    """Run the stack with a source of limits, ``detector``."""
     return running_stack(folder, sets=SETS)
 
 

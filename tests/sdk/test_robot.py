@@ -128,12 +128,20 @@ def test_a_limit_slows_the_vehicle_down_until_it_ends(robot: t2.Robot) -> None:
 
     wait_until(is_shown, "the limit")
     with robot.drive("nav") as drive:
+
+        def becomes(verdict: str) -> None:
+            def is_it() -> bool:
+                drive.check()
+                return robot.safety.latest().verdict == verdict
+
+            wait_until(is_it, verdict)
+
         drive.velocity(0.3)
-        wait_until(lambda: robot.safety.latest().verdict == "slow", "the verdict")
+        becomes("slow")
         limit.end()
-        wait_until(lambda: robot.safety.latest().verdict == "run", "the end of the limit")
+        becomes("run")
         again = robot.limit("detector", linear=0.1, seconds=60)
-        wait_until(lambda: robot.safety.latest().verdict == "slow", "the next limit")
+        becomes("slow")
         again.end()
 
 
