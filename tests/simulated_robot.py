@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 import pytest
 
-import cli.demo.driver
+import cli.demo.lap
 import t2
 import t2.drive
 import t2.publisher
@@ -148,7 +148,7 @@ class SimulatedSession:
 def simulated_robot(stack: SimulatedStack, patch: pytest.MonkeyPatch) -> t2.Robot:
     """Return the robot of a stack; the library and the demo run in its time."""
     time = SimulatedTime(stack)
-    modules = (t2.drive, t2.publisher, t2.robot, t2.stream, cli.demo.driver, cli.demo.record)
+    modules = (t2.drive, t2.publisher, t2.robot, t2.stream, cli.demo.lap)
     for module in modules:
         patch.setattr(module, "time", time)
     patch.setattr(

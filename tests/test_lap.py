@@ -1,13 +1,10 @@
 """The demo's lap with the shipped settings, in simulated time."""
 
-import threading
 from functools import cache
 
 import pytest
 
-from cli.demo.driver import Driver
-from cli.demo.lap import QUICK, drive_lap
-from cli.demo.record import LapRecord
+from cli.demo.lap import QUICK, Lap
 from cli.demo.score import Trace, good, results, stops
 from sim import trace as t
 from t2.messages import Odometry
@@ -18,14 +15,16 @@ pytestmark = pytest.mark.no_cover  # whole laps; the cores have tests of their o
 
 
 @cache
-def driven() -> tuple[SimulatedStack, LapRecord]:
-    """Drive a lap; return the stack and the record after it."""
-    stack, record = SimulatedStack(), LapRecord()
+def driven() -> tuple[SimulatedStack, Lap, list[tuple[str, str]]]:
+    """Drive a lap; return the stack, the lap, and safety's answers to its steps."""
+    stack, answers = SimulatedStack(), []
     with pytest.MonkeyPatch.context() as patch, simulated_robot(stack, patch) as robot:
-        drive_lap(Driver(robot, record, threading.Event()), QUICK)
-    record.finished = True
-    record.odometry = [as_client(pose, Odometry) for pose in stack.poses]
-    return stack, record
+        lap = Lap(
+            robot, QUICK, check=lambda: None,
+            show=lambda step, answer: answers.append((step, answer)) if answer else None,
+        )  # fmt: skip
+        lap.drive()
+    return stack, lap, answers
 
 
 def trace_of(stack: SimulatedStack) -> Trace:
@@ -37,11 +36,11 @@ def trace_of(stack: SimulatedStack) -> Trace:
 
 
 def test_the_lap_is_driven_as_it_should_be() -> None:
-    stack, record = driven()
+    stack, lap, _ = driven()
     trace = trace_of(stack)
-    rows = results(trace, record, fast=False)
+    rows = results(trace, [as_client(pose, Odometry) for pose in stack.poses], lap)
     assert good(rows), rows
-    assert record.unplanned == []
+    assert lap.unplanned == []
     assert stack.oracle.violations == []
     assert min(x.clearance for x in trace.truth if x.clearance is not None) > 0.15
     (stop,) = stops(trace)
@@ -50,11 +49,13 @@ def test_the_lap_is_driven_as_it_should_be() -> None:
 
 
 def test_safety_answers_as_the_steps_expect() -> None:
-    stack, record = driven()
+    stack, _, shown = driven()
     answers = stack.answers
     assert (answers[0], answers[-1]) == (False, True)
-    assert record.answers[0][:2] == ("reset, refused", False)
-    assert record.answers[-1][:2] == ("reset", True)
+    assert shown[0][0] == "reset, refused"
+    assert shown[0][1].startswith("refused: ")
+    assert shown[-1][0] == "reset"
+    assert shown[-1][1].startswith("granted: ")
 
 
 def test_the_same_lap_twice_is_the_same() -> None:

@@ -1,1 +1,1 @@
-"""``t2 demo``: the steps of the lap, its driver, its display and its score."""
+"""``t2 demo``: the lap, a program of the client library, with its table and its plot."""

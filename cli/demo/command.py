@@ -5,14 +5,13 @@ import contextlib
 import socket
 import time
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
 from cli.demo import host_stalls
-from cli.inspect.session import interruptible
+from cli.inspect import output
 from cli.run.supervisor import Supervisor
 from cli.run.up import commands
 from cli.settings import Everything
@@ -20,20 +19,25 @@ from common import log
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
-from common.loop import Loop
 from sim.config import add_profiles, load_model, load_plan
 
 if TYPE_CHECKING:
-    from cli.demo.lap_thread import LapThread
+    import t2
+    from cli.demo.lap import Lap, Pace
+    from t2.messages import Odometry
 
-WORLD = "office"
+WORLD, LOG, TRACE = "office", "processes.log", "trace.jsonl"
 TIMEOUT_S = 120.0  # a lap takes 40 s; scheduling stalls stop the vehicle now and then
-POLL_S, DRAW_S = 0.1, 0.125
+POLL_S = 0.1
+MARKS = {True: "ok", False: "WRONG", None: ""}
+
+
+class LapEndedError(Exception):
+    """The lap takes too long."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("--fast", action="store_true", help="end before the drive home, no plot")
     parser.add_argument(
         "--out", type=Path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
     )
@@ -42,12 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Drive the lap; return 0 if it is good, 128 plus the signal's number after a signal."""
+    """Drive the lap; return 0 if it is good."""
     try:
-        from cli.demo.display import LapDisplay
-        from cli.demo.lap import PATIENT, QUICK, drive_lap
-        from cli.demo.lap_thread import LapThread
-        from cli.demo.record import LapRecord
+        from cli.demo import plot
+        from cli.demo.lap import PATIENT, QUICK
         from cli.demo.score import good, read, results
     except ImportError as error:
         raise RobotError(
@@ -56,97 +58,104 @@ def run(options: argparse.Namespace) -> int:
         ) from None
     options.no_sim, options.world = False, WORLD
     load_model(options.profile)  # refuses an invalid one before anything starts
-    prepare_folder(options)
+    log_file, trace_file = prepared(options.out)
     stall_s = host_stalls.measured()
     options.sets = host_stalls.with_accepted_joined(
         [*own_ports(), *host_stalls.settings(stall_s), *options.sets]
     )
     config = load(Everything, sources(options)).config
-    # The processes log to a file; on the terminal it would destroy the live display.
     log.configure(replace(config.log, level="error"), "demo")
-    is_stalling = stall_s > host_stalls.LIMIT_S
-    pace = PATIENT if is_stalling else QUICK
-    plan, record = load_plan(WORLD, config.vehicle), LapRecord()
-    lap = LapThread(
-        lambda driver: drive_lap(driver, pace, fast=options.fast),
-        record, config.robot.id, config.bus.endpoints[0],
-    )  # fmt: skip
-    with LapDisplay(plan, config.vehicle, options.out) as display:
-        if is_stalling:
-            display.show(host_stalls.warning(stall_s))
-        record.on_step = display.step
-        interrupted = drive(options, lap, lambda: display.draw(record, time.monotonic()))
-    if interrupted:
-        return 128 + interrupted
-    trace = read(trace_file(options)) if trace_file(options).exists() else None
+    pace = QUICK
+    if stall_s > host_stalls.LIMIT_S:
+        pace = PATIENT
+        print(host_stalls.warning(stall_s))
+    odometry: list[Odometry] = []
+    lap = drive(options, config, pace, odometry)
+    trace = read(trace_file) if trace_file.exists() else None
     if trace is None or not trace.truth:
-        raise LinkError(f"the simulated vehicle did not run; see {log_file(options)}")
-    rows = results(trace, record, options.fast)
-    if not options.fast:
-        display.plot(trace, record.odometry)
-    display.results(rows, record)
+        raise LinkError(f"the simulated vehicle did not run; see {log_file}")
+    rows = results(trace, odometry, lap)
+    body = [(what, amount, MARKS[fine]) for what, amount, fine in rows]
+    print(f"\n{output.table(('the lap', 'result', ''), body)}")
+    files = [options.out / "lap.png", options.out / "lap.svg"]
+    plot.save(files, load_plan(WORLD, config.vehicle), config.vehicle, trace, odometry)
+    print(f"\nplots: {', '.join(map(str, files))}")
     return 0 if good(rows) else 1
 
 
-def drive(options: argparse.Namespace, lap: "LapThread", draw: Callable[[], None]) -> int:
-    """Run the processes until the end of the lap or the timeout; return a signal or 0."""
-    end_s = time.monotonic() + TIMEOUT_S
-    with (
-        log_file(options).open("wb") as output,
-        closing(Loop()) as loop,
-        interruptible(loop) as signals,
-        contextlib.ExitStack() as ends,
-    ):
-        supervisor = Supervisor(traced(options), output)
+def drive(
+    options: argparse.Namespace, config: Everything, pace: "Pace", odometry: "list[Odometry]"
+) -> "Lap":
+    """Run the processes and drive the lap; ``odometry`` receives the poses."""
+    from cli.demo.lap import Lap
+
+    end_s, log_file = time.monotonic() + TIMEOUT_S, options.out / LOG
+    with log_file.open("wb") as written, contextlib.ExitStack() as ends:
+        supervisor = Supervisor(traced(options), written)
         ends.callback(supervisor.end)
 
-        def poll(_: int) -> None:
+        def check() -> None:
             if supervisor.look(time.monotonic()):
-                raise LinkError(f"a process cannot run; see {output.name}")
-            if not lap.is_alive() or time.monotonic() > end_s:
-                loop.stop()
+                raise LinkError(f"a process cannot run; see {log_file}")
+            if time.monotonic() > end_s:
+                raise LapEndedError
 
-        lap.start()
-        ends.callback(lap.end)  # before the processes end: the last requests are zeros
-        loop.every(POLL_S, poll)
-        loop.every(DRAW_S, lambda _: draw())
-        loop.run()
-    return signals[0] if signals else 0
+        print("starting simulator, router, bridge, safety and odometry", flush=True)
+        # Its session closes before the processes end: the last requests are zeros.
+        robot = ends.enter_context(connected(config, check))
+        robot.odometry.on(odometry.append)
+        lap = Lap(robot, pace, show=show, check=check)
+        with contextlib.suppress(LapEndedError):
+            lap.drive()
+    return lap
 
 
-def prepare_folder(options: argparse.Namespace) -> None:
-    """Create the output folder, and delete the trace of an earlier lap."""
+def connected(config: Everything, check: Callable[[], None]) -> "t2.Robot":
+    """Connect as soon as the router runs; ``check`` raises when it never will."""
+    import t2
+
+    while True:
+        check()
+        try:
+            return t2.connect(config.robot.id, endpoint=config.bus.endpoints[0])
+        except t2.LinkError:
+            time.sleep(POLL_S)
+
+
+def show(step: str, answer: str) -> None:
+    """Print the start of a step, or safety's answer to it."""
+    print(f"    {answer}" if answer else f"  {step}", flush=True)
+
+
+def prepared(out: Path) -> tuple[Path, Path]:
+    """Create the output folder; return its log, empty, and its trace, deleted."""
+    log_file, trace_file = out / LOG, out / TRACE
     try:
-        options.out.mkdir(parents=True, exist_ok=True)
-        log_file(options).write_bytes(b"")
-        trace_file(options).unlink(missing_ok=True)
+        out.mkdir(parents=True, exist_ok=True)
+        log_file.write_bytes(b"")
+        trace_file.unlink(missing_ok=True)
     except OSError as error:
-        raise ConfigError(f"--out {options.out}: cannot be written: {error.strerror}") from None
+        raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from None
+    return log_file, trace_file
 
 
 def traced(options: argparse.Namespace) -> list[tuple[str, list[str]]]:
     """Return the processes of ``t2 up``, with a simulator that writes a trace."""
-    trace = ["--trace", str(trace_file(options))]
+    trace = ["--trace", str(options.out / TRACE)]
     return [
         (name, [*command, *(trace if name == "sim" else [])]) for name, command in commands(options)
     ]
 
 
-def trace_file(options: argparse.Namespace) -> Path:
-    """Return the file of the simulator's trace."""
-    out: Path = options.out
-    return out / "trace.jsonl"
-
-
-def log_file(options: argparse.Namespace) -> Path:
-    """Return the log file of the processes."""
-    out: Path = options.out
-    return out / "processes.log"
-
-
 def own_ports() -> list[str]:
-    """Return settings with separate ports, so that the demo can run beside ``t2 up``."""
-    board, first, second, router = free_ports(*[socket.SOCK_DGRAM] * 3, socket.SOCK_STREAM)
+    """Return settings with free ports, so that the demo can run beside ``t2 up``."""
+    with contextlib.ExitStack() as stack:
+        ports = []
+        for kind in (*[socket.SOCK_DGRAM] * 3, socket.SOCK_STREAM):
+            sock = stack.enter_context(socket.socket(socket.AF_INET, kind))
+            sock.bind(("127.0.0.1", 0))
+            ports.append(sock.getsockname()[1])
+    board, first, second, router = ports
     return [
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
@@ -155,12 +164,3 @@ def own_ports() -> list[str]:
         f"bus.listen=tcp/127.0.0.1:{router}",
         "bus.connect=",
     ]
-
-
-def free_ports(*kinds: socket.SocketKind) -> list[int]:
-    """Return different free ports of 127.0.0.1."""
-    with contextlib.ExitStack() as stack:
-        socks = [stack.enter_context(socket.socket(socket.AF_INET, kind)) for kind in kinds]
-        for sock in socks:
-            sock.bind(("127.0.0.1", 0))
-        return [sock.getsockname()[1] for sock in socks]

@@ -1,17 +1,30 @@
 """The lap: a program of the client library ``t2``, written as you would write your own.
 
-The vehicle stops short of a wall, hits a box that no sonar sees, moves off it, and returns to the
-start. The world is ``sim/worlds/office.toml``; odometry starts at its origin.
+The vehicle stops short of a wall, hits a box that no sonar sees, moves off it, is reset, and
+returns to the start. The world is ``sim/worlds/office.toml``; odometry starts at its origin.
+
+On a host with scheduling stalls safety stops the vehicle now and then. Each motion is repeated
+until it is done; a latch that the lap does not expect is reset and counted.
 """
 
 import math
+import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import TypeVar
 
 import t2
-from cli.demo.driver import Driver
+from t2.messages import Odometry
 
+SOURCE = "demo"  # of ``safety.sources``
+OPERATOR = "teleop"  # a program may not move off the bumper; here the lap stands in for an operator
 FAR = 10.0  # m; the room is shorter
+PATIENCE_S = 1.0  # without progress, until a motion is requested anew
+RETRY_S = 0.1
+FACING = 0.03  # rad
+TURNS_MAX = 3  # old measurements make a turn end late; the next one corrects it
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,53 +41,150 @@ QUICK = Pace(0.8, 0.4, 0.8)
 PATIENT = Pace(0.5, 0.25, 0.3)
 
 
-def drive_lap(drive: Driver, pace: Pace, *, fast: bool = False) -> None:
-    """Drive the lap; the fast one ends before the way home."""
-    step = drive.record.step
+class Lap:
+    """One lap of a robot.
 
-    step("wait for safety")
-    drive.wait()
+    ``show`` receives each step, and safety's answers to it; the answer is empty at the start of a
+    step. ``check`` is called before each attempt of a motion, and raises to end the lap.
+    """
 
-    step("drive off to the wall")
-    with suppress(t2.Blocked):
-        drive.forward(FAR, pace.cruise, expected="blocked")
+    def __init__(
+        self,
+        robot: t2.Robot,
+        pace: Pace,
+        *,
+        show: Callable[[str, str], None],
+        check: Callable[[], None],
+    ) -> None:
+        self.steps: list[str] = []  # begun
+        self.finished = False
+        self.unplanned: list[str] = []  # latches that the lap does not expect
+        self._robot, self._pace = robot, pace
+        self._show, self._check = show, check
+        self._answer = ""
 
-    step("back off")
-    drive.forward(-0.45, pace.careful)
+    def drive(self) -> None:
+        """Drive the lap."""
+        self._step("wait for safety")
+        self._motion(lambda _: None)
 
-    step("turn left")
-    drive.turn(math.pi / 2, pace.spin)
+        self._step("drive off to the wall")
+        with suppress(t2.Blocked):
+            self._forward(FAR, self._pace.cruise, expected="blocked")
 
-    step("drive on")
-    with suppress(t2.Latched):
-        drive.forward(FAR, pace.cruise, expected="contact")
+        self._step("back off")
+        self._forward(-0.45, self._pace.careful)
 
-    step("reset, refused")
-    try:
-        drive.robot.reset()
-    except t2.T2Error as refusal:  # the bumper is pressed
-        drive.record.answer(False, str(refusal))
+        self._step("turn left")
+        self._turn(math.pi / 2)
 
-    step("release")
-    drive.release("backward")
+        self._step("drive on")
+        with suppress(t2.Latched):
+            self._forward(FAR, self._pace.cruise, expected="contact")
 
-    step("reset")
-    drive.reset()
+        self._step("reset, refused")
+        try:
+            self._robot.reset()
+        except t2.T2Error as refusal:  # the bumper is pressed
+            self._answered(f"refused: {refusal}")
 
-    step("back off")
-    drive.forward(-0.6, pace.careful)
-    if fast:
-        return
+        self._step("release")
+        self._repeat(lambda: self._robot.release("backward", OPERATOR))
 
-    step("turn home")
-    here = drive.pose()
-    drive.turn(wrapped(math.atan2(-here.y, -here.x) - here.heading), pace.spin)
+        self._step("reset")
+        self._reset()
 
-    step("drive home")
-    drive.forward(math.hypot(here.x, here.y), pace.cruise)
+        self._step("back off")
+        self._forward(-0.6, self._pace.careful)
 
-    step("turn as at the start")
-    drive.turn(-drive.pose().heading, pace.spin)
+        self._step("turn home")
+        here = self._pose()
+        self._turn(wrapped(math.atan2(-here.y, -here.x) - here.heading))
+
+        self._step("drive home")
+        self._forward(math.hypot(here.x, here.y), self._pace.cruise)
+
+        self._step("turn as at the start")
+        self._turn(-self._pose().heading)
+        self.finished = True
+
+    def _forward(self, distance: float, speed: float, expected: str = "") -> None:
+        """Drive straight, m and m/s; an ``expected`` cause raises ``Blocked`` or ``Latched``."""
+        start = self._pose()
+
+        def go(drive: t2.Drive) -> None:
+            driven = travelled(start, self._robot.odometry.latest())
+            drive.forward(distance - driven, speed, PATIENCE_S)
+
+        self._motion(go, expected)
+
+    def _turn(self, angle: float) -> None:
+        """Turn on the spot, rad."""
+        goal = self._pose().heading + angle
+
+        def go(drive: t2.Drive) -> None:
+            for _ in range(TURNS_MAX):
+                left = wrapped(goal - self._robot.odometry.latest().heading)
+                if abs(left) < FACING:
+                    return
+                drive.turn(left, self._pace.spin, PATIENCE_S)
+
+        self._motion(go)
+
+    def _pose(self) -> Odometry:
+        return self._repeat(self._robot.odometry.latest)
+
+    def _reset(self) -> None:
+        """Reset until nothing is latched."""
+
+        def clear() -> None:
+            while self._robot.safety.latest().latched:
+                self._answered(f"granted: {self._robot.reset().text}")
+
+        self._repeat(clear)
+
+    def _motion(self, go: Callable[[t2.Drive], None], expected: str = "") -> None:
+        def once() -> None:
+            with self._robot.drive(SOURCE) as drive:
+                go(drive)
+
+        self._repeat(once, expected)
+
+    def _repeat(self, act: Callable[[], T], expected: str = "") -> T:
+        """Repeat an action until it succeeds, or an expected cause stops it."""
+        while True:
+            self._check()
+            try:
+                return act()
+            except t2.Stopped as stop:
+                names = [cause.name for cause in stop.causes]
+                if expected in names and isinstance(stop, t2.Blocked | t2.Latched):
+                    raise
+                if isinstance(stop, t2.Latched):
+                    self.unplanned.append(", ".join(names))
+                    self._reset()
+            except t2.Refused as refusal:
+                self._answered(f"refused: {refusal}")
+            except t2.T2Error:  # no data, for example: wait for it
+                pass
+            time.sleep(RETRY_S)
+
+    def _step(self, name: str) -> None:
+        self.steps.append(name)
+        self._answer = ""
+        self._show(name, "")
+
+    def _answered(self, text: str) -> None:
+        """Show safety's answer to a step, once."""
+        if text != self._answer:
+            self._answer = text
+            self._show(self.steps[-1], text)
+
+
+def travelled(start: Odometry, now: Odometry) -> float:
+    """Return the distance along the heading of the start, m."""
+    along_x, along_y = math.cos(start.heading), math.sin(start.heading)
+    return (now.x - start.x) * along_x + (now.y - start.y) * along_y
 
 
 def wrapped(angle: float) -> float:

@@ -6,11 +6,11 @@ metres, times in seconds.
 
 import math
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cli.demo.record import LapRecord
+from cli.demo.lap import Lap
 from common.freshness import NS_PER_S
 from common.motion import Command
 from sim import trace as t
@@ -55,49 +55,20 @@ def read(file: Path) -> Trace:
     )
 
 
-def stops(trace: Trace) -> list[Stop]:
-    """Return the reaction to each bumper hit."""
-    return [_stop(trace, hit.mono_ns) for hit in trace.bumper if hit.pressed]
-
-
-def odometry_errors(trace: Trace, odometry: Sequence[Odometry]) -> tuple[float, float]:
-    """Return the largest odometry errors in metres: driving, and at rest.
-
-    The error while driving includes the transport delay of a frame; the error at rest does not.
-    """
-    times = [truth.mono_ns for truth in trace.truth]
-    driving = resting = 0.0
-    for pose in odometry:
-        at = bisect_left(times, pose.mono_ns)
-        if at < REST_SAMPLES or at >= len(times):
-            continue
-        truth = _between(trace.truth[at - 1], trace.truth[at], pose.mono_ns)
-        error = math.hypot(pose.x - truth[0], pose.y - truth[1])
-        driving = max(driving, error)
-        if all(x.linear == 0 and x.angular == 0 for x in trace.truth[at - REST_SAMPLES : at]):
-            resting = max(resting, error)
-    return driving, resting
-
-
-def results(trace: Trace, record: LapRecord, fast: bool) -> list[Result]:
-    """Return the table of results; a lap is good without a False in it."""
+def results(trace: Trace, odometry: Sequence[Odometry], lap: Lap) -> list[Result]:
+    """Return the table of results."""
     last = trace.truth[-1]
     wall = min((x.clearance for x in trace.truth if x.clearance is not None), default=math.inf)
-    driving, resting = odometry_errors(trace, record.odometry)
+    error, home = odometry_error(trace, odometry), math.hypot(last.x, last.y)
     rows: list[Result] = [
-        ("lap finished", f"{len(record.steps)} steps", record.finished),
+        ("lap finished", f"{len(lap.steps)} steps", lap.finished),
         ("distance driven", f"{last.distance:.2f} m", last.distance > 1.0),
         ("closest to an obstacle", f"{wall:.2f} m", wall > CLEARANCE_MIN),
-        ("odometry error, driving", f"{driving * 100:.1f} cm at most", None),
-        (
-            "odometry error, at rest",
-            f"{resting * 100:.1f} cm at most",
-            resting < ODOMETRY_MAX,
-        ),
+        ("odometry error, at rest", f"{error * 100:.1f} cm at most", error < ODOMETRY_MAX),
+        ("distance from the start at the end", f"{home * 100:.1f} cm", home < HOME_MAX),
     ]
     for number, stop in enumerate(stops(trace), 1):
-        reaction = stop.reaction_s
-        driven = stop.distance_m
+        reaction, driven = stop.reaction_s, stop.distance_m
         took = "never" if reaction is None else f"{reaction * 1000:.1f} ms"
         way = "never" if driven is None else f"{driven * 100:.1f} cm"
         rows += [
@@ -106,10 +77,7 @@ def results(trace: Trace, record: LapRecord, fast: bool) -> list[Result]:
             (f"contact {number}: stopped within", f"{way} from {stop.speed_mps:.2f} m/s",
              driven is not None and driven < STOP_MAX),
         ]  # fmt: skip
-    if not fast:
-        home = math.hypot(last.x, last.y)
-        rows.append(("distance from the start at the end", f"{home * 100:.1f} cm", home < HOME_MAX))
-    rows.append(("unplanned latches", ", ".join(record.unplanned) or "none", None))
+    rows.append(("unplanned latches", ", ".join(lap.unplanned) or "none", None))
     return rows
 
 
@@ -119,19 +87,28 @@ def good(rows: Sequence[Result]) -> bool:
     return met and all(fine is not False for _, _, fine in rows)
 
 
-def _stop(trace: Trace, hit_ns: int) -> Stop:
-    breaks = (c.mono_ns for c in trace.commands if c.mono_ns >= hit_ns and c.kind is Command.BRAKE)
-    first = next(breaks, None)
-    before = [x for x in trace.truth if x.mono_ns <= hit_ns] or trace.truth[:1]
-    after = (x for x in trace.truth if x.mono_ns > hit_ns)
-    rest = next((x for x in after if abs(x.linear) < 0.001), None)
-    return Stop(
-        None if first is None else (first - hit_ns) / NS_PER_S,
-        None if rest is None else rest.distance - before[-1].distance,
-        max((abs(x.linear) for x in before[-20:]), default=0.0),
-    )
+def stops(trace: Trace) -> Iterator[Stop]:
+    """Yield the reaction to each bumper hit."""
+    for hit_ns in (hit.mono_ns for hit in trace.bumper if hit.pressed):
+        brakes = (c.mono_ns for c in trace.commands if c.kind is Command.BRAKE)
+        first = next((at_ns for at_ns in brakes if at_ns >= hit_ns), None)
+        before = [x for x in trace.truth if x.mono_ns <= hit_ns] or trace.truth[:1]
+        after = (x for x in trace.truth if x.mono_ns > hit_ns)
+        rest = next((x for x in after if abs(x.linear) < 0.001), None)
+        yield Stop(
+            None if first is None else (first - hit_ns) / NS_PER_S,
+            None if rest is None else rest.distance - before[-1].distance,
+            max((abs(x.linear) for x in before[-20:]), default=0.0),
+        )
 
 
-def _between(a: t.Truth, b: t.Truth, at_ns: int) -> tuple[float, float]:
-    part = (at_ns - a.mono_ns) / max(1, b.mono_ns - a.mono_ns)
-    return a.x + part * (b.x - a.x), a.y + part * (b.y - a.y)
+def odometry_error(trace: Trace, odometry: Sequence[Odometry]) -> float:
+    """Return the largest error of a pose at rest, where no transport delay is in it."""
+    times = [truth.mono_ns for truth in trace.truth]
+    largest = 0.0
+    for pose in odometry:
+        at = bisect_left(times, pose.mono_ns)
+        before = trace.truth[at - REST_SAMPLES : at] if at >= REST_SAMPLES else ()
+        if before and all(x.linear == 0 and x.angular == 0 for x in before):
+            largest = max(largest, math.dist((pose.x, pose.y), (before[-1].x, before[-1].y)))
+    return largest

@@ -46,7 +46,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     ("command", "option"),
     [
         ("up", "--no-sim"),
-        ("demo", "--fast"),
+        ("demo", "--profile"),
         ("drive", "--source"),
         ("router", "--set"),
         ("sim", "--world"),
@@ -140,7 +140,7 @@ def test_an_early_ctrl_c_exits_silently(
 # The robot's requirements have no extras: only commands that need one may fail, with a message.
 ROBOT_SET = """
 import sys
-ABSENT = {"rich", "matplotlib", "textual", "pygame", "dpkt"}
+ABSENT = {"matplotlib", "textual", "pygame", "dpkt"}
 class Absent:
     def find_spec(self, name, path=None, target=None):
         if name.split(".")[0] in ABSENT:
@@ -172,7 +172,7 @@ def test_without_the_extras(tmp_path: Path) -> None:
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
     demo, demo_code, drive, drive_code, wire, wire_code, client = result.stderr.splitlines()
-    assert demo.startswith("t2 demo: the demo needs rich; ")
+    assert demo.startswith("t2 demo: the demo needs matplotlib; ")
     assert demo.endswith("pip install -e '.[demo]' -e sdk")
     assert client.startswith("t2 demo: the demo needs t2; ")
     assert drive.startswith("t2 drive: the screen needs ")
