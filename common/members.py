@@ -6,21 +6,18 @@ TLS and then has no permissions: Zenoh does not support revocation lists.
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from common.errors import ConfigError
+from common.settings import Name, SourceName
 
 Role = Literal["robot", "driver", "device", "viewer", "fleet", "site", "ros"]
 ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site", "ros")
 
-# The name of a source, as in ``safety.sources`` and ``safety.limits``.
-SourceName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z")]
 OPERATORS_SOURCES = ("teleop", "web", "checkout")  # of the operator's screens
-# A robot's id, and other parts of a certificate's name: one chunk of a key.
-Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")]
 
 
 class Member(Struct, frozen=True, kw_only=True):

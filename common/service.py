@@ -26,10 +26,9 @@ from common.config import Loaded, load
 from common.errors import ConfigError, LinkError, RobotError
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import Durations, Event, Health, Level
+from common.messages import MAX_TEXT, Durations, Event, Health, Level
 from common.settings import Shared
 from common.systemd import CHECK_PERIOD_S, Systemd
-from common.verdict import MAX_TEXT
 
 STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
 QUERY_PERIOD_S = 0.02  # one query of each key

@@ -22,6 +22,10 @@ AngularUnit = Literal["decidegree", "milliradian"]
 LogLevel = Literal["debug", "info", "warning", "error"]
 
 Port = Annotated[int, Meta(ge=1, le=65535)]
+# A robot's id, and other parts of a certificate's name: one chunk of a key.
+Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")]
+# The name of a source, as in ``safety.sources`` and ``safety.limits``.
+SourceName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z")]
 
 # Protocols of the eclipse-zenoh wheel; a client would retry any other one forever.
 ENDPOINT = re.compile(r"((tcp|udp|tls|quic|ws)/.+:\d+|unixsock-stream/.+)([?#].*)?")
@@ -73,7 +77,7 @@ def lengthened(limits: T, stall_s: float) -> T:
 class Robot(Section, frozen=True, kw_only=True):
     """Identity of the robot, and scheduling of its processes."""
 
-    id: Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")] = "001"
+    id: Name = "001"
     realtime: bool = True  # whether the control chain requests SCHED_FIFO
 
 

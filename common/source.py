@@ -1,4 +1,4 @@
-"""Sources of drive requests and of speed limits: the publishers that their programs use."""
+"""Sources of messages to safety: the publishers that their programs use."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -9,14 +9,7 @@ from common import codec, keys
 from common.bus.bus import Arrival, Bus
 from common.client import Access, request
 from common.keys import Topic
-from common.messages import (
-    MAX_REASON,
-    Drive,
-    EstopKeepalive,
-    Limit,
-    SafetyState,
-    SourceMessage,
-)
+from common.messages import Drive, EstopKeepalive, SafetyState, SourceMessage
 
 M = TypeVar("M", bound=SourceMessage)
 
@@ -65,25 +58,6 @@ class DriveSource(Source[Drive]):
         if not codec.finite(drive.linear, drive.angular):
             raise ValueError(f"non-finite request: {drive.linear} m/s, {drive.angular} rad/s")
         return self._put(drive)
-
-
-class LimitPublisher(Source[Limit]):
-    """A source of speed limits."""
-
-    topic = keys.LIMIT
-
-    def limit(
-        self, linear: float | None = None, angular: float | None = None, reason: str = ""
-    ) -> Limit:
-        """Cap the speed (m/s, rad/s) until the source's lease expires.
-
-        Zero is a protective stop, None no cap. Repeat it several times within the lease.
-        """
-        for cap in (linear, angular):
-            if cap is not None and not (codec.finite(cap) and cap >= 0):
-                raise ValueError(f"a cap must be finite and not negative, not {cap}")
-        reason = reason[:MAX_REASON]
-        return self._put(Limit(linear=linear, angular=angular, reason=reason, echo=0))
 
 
 class KeepalivePublisher(Source[EstopKeepalive]):

@@ -4,18 +4,9 @@ import ast
 from pathlib import Path
 from types import ModuleType
 
-from common import client, keys, messages, verdict
+from common import client, keys, messages
 
 SDK = Path(__file__).parent.parent / "sdk" / "t2"
-PARTS = (verdict,)
-ALIASES = ("Counts", "Few", "Name", "Text")  # of types, for use inside the messages
-USED = ("Annotated", "Literal", "Meta", "Struct", *ALIASES)  # that messages import themselves
-PARTS_HEAD = '''"""Parts of messages; generated from the stack by ``make docs``, do not edit."""
-
-from typing import Annotated, Literal
-
-from msgspec import Meta, Struct
-'''
 HEAD = '''"""Messages on the bus; generated from the stack's own by ``make docs``, do not edit.
 
 Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
@@ -26,7 +17,6 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-{imports}
 Command = Literal["run", "stop", "brake"]
 '''
 CLIENT_HEAD = "# Generated from the stack's own by ``make docs``, do not edit.\n"
@@ -39,25 +29,11 @@ from t2 import messages as m
 
 def generated() -> dict[Path, str]:
     """Return the text of each generated module."""
-    found = {
-        name
-        for part in PARTS
-        for name, value in vars(part).items()
-        if getattr(messages, name, None) is value and not name.startswith("_") and name not in USED
-    }
-    names = sorted(found, key=str.lower)  # as the linter sorts imports
-    lines = [", ".join(ALIASES), *(f"{name} as {name}" for name in names)]
-    imports = "".join(f"from t2.parts import {line}\n" for line in sorted(lines, key=str.lower))
     return {
-        SDK / "parts.py": _joined(PARTS_HEAD, *map(_body, PARTS)),
-        SDK / "messages.py": _joined(HEAD.format(imports=imports), _body(messages)),
+        SDK / "messages.py": f"{HEAD}\n{_body(messages)}",
         SDK / "client.py": CLIENT_HEAD + _text(client).replace("common.messages", "t2.messages"),
         SDK / "keys.py": KEYS_HEAD + _keys(),
     }
-
-
-def _joined(*parts: str) -> str:
-    return "\n".join(parts).rstrip() + "\n"
 
 
 def _text(module: ModuleType) -> str:
@@ -72,7 +48,7 @@ def _body(module: ModuleType) -> str:
         is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
             del lines[node.lineno - 1 : node.end_lineno]
-    return "".join(lines).strip("\n") + "\n\n"
+    return "".join(lines).strip("\n") + "\n"
 
 
 def _keys() -> str:

@@ -15,7 +15,7 @@ from cli.inspect.payload import read
 from cli.inspect.pub import json_object
 from cli.inspect.session import BusSession, add_options, decoded, open_session, positive
 from common import codec, keys
-from common.bus.calls import no_answer, not_allowed
+from common.bus.bus import no_answer, not_allowed
 from common.bus.probe import Answer, Probe
 from common.client import CONFIRM_S, confirms, reset_request
 from common.errors import MessageError, RobotError

@@ -14,7 +14,8 @@ import msgspec
 from msgspec import Meta
 
 from common.errors import ConfigError, RobotError
-from common.members import OPERATORS_SOURCES, Name, Role, SourceName
+from common.members import OPERATORS_SOURCES, Role
+from common.settings import Name, SourceName
 
 DAY_S = 86_400
 CA_DAYS = 3650

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, Generic, TypeVar
@@ -13,8 +13,6 @@ import zenoh.ext
 from msgspec import Struct
 
 from common import clock, codec, settings
-from common.bus.calls import Caller, is_timeout, no_answer, refusal_of
-from common.bus.overwriting_queue import OverwritingQueue
 from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
 from common.bus.session import Session, client
 from common.codec import Sample
@@ -26,6 +24,7 @@ from common.messages import Message
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)
 R = TypeVar("R", bound=Struct)
+T = TypeVar("T")
 Stamped = tuple[zenoh.Sample, int]  # with its receive time, in monotonic nanoseconds
 
 QUERIES = 8  # of each key that wait for ``answer_queries``
@@ -38,6 +37,54 @@ class Arrival(Struct, Generic[M], frozen=True):
     key: str
     received_ns: int
     raw: bytes | None
+
+
+class Caller(Generic[R]):
+    """The caller of a served call; answer it once, now or later."""
+
+    def __init__(self, query: zenoh.Query, key: str) -> None:
+        self._query = query
+        self._key = key
+
+    def reply(self, message: R) -> None:
+        """Answer with the reply."""
+        encoding = codec.encoding(type(message))
+        with contextlib.suppress(zenoh.ZError):  # the caller may have disconnected
+            self._query.reply(self._key, codec.encode(message), encoding=encoding)
+        self._query.drop()
+
+    def refuse(self, reason: str) -> None:
+        """Answer with the reason of the refusal."""
+        with contextlib.suppress(zenoh.ZError):
+            self._query.reply_err(reason.encode(), encoding="text/plain")
+        self._query.drop()
+
+
+class OverwritingQueue(Generic[T]):
+    """Queue from Zenoh's threads to ``take`` in the owner's; overwritten items are ``overrun``."""
+
+    def __init__(
+        self, depth: int, take: Callable[[T], None], post: Post, counters: Counter[str]
+    ) -> None:
+        self._items: deque[T] = deque(maxlen=depth)
+        self._take = take
+        self._post = post
+        self._counters = counters
+        self._posted = False
+
+    def put(self, item: T) -> None:
+        """Append an item, on a thread of Zenoh; never waits."""
+        if len(self._items) == self._items.maxlen:
+            self._counters["overrun"] += 1
+        self._items.append(item)
+        if not self._posted:
+            self._posted = True
+            self._post(self._drain)
+
+    def _drain(self) -> None:
+        self._posted = False  # first: an item that comes now posts again
+        for _ in range(len(self._items)):  # in a flood, timers and sockets have their turn, too
+            self._take(self._items.popleft())
 
 
 class Bus:
@@ -354,3 +401,29 @@ def _subscriber(
         history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
         recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
     )
+
+
+def is_timeout(reply: zenoh.Reply) -> bool:
+    """Return whether a reply is Zenoh's own "Timeout", not a server's refusal."""
+    if reply.err is None or reply.err.encoding == zenoh.Encoding.TEXT_PLAIN:
+        return False
+    return reply.err.payload.to_bytes() == b"Timeout"
+
+
+def refusal_of(reply: zenoh.Reply) -> str:
+    """Return the reason of a refusal."""
+    reason = reply.err.payload.to_bytes() if reply.err else b""
+    return reason.decode(errors="replace") or "refused without a reason"
+
+
+def no_answer(server: str) -> str:
+    """Return the text of a call without any answer."""
+    return f"{server} does not answer; run `t2 doctor`"
+
+
+def not_allowed(server: str) -> str:
+    """Return the text of a call without any answer from a service whose messages arrive.
+
+    A router whose access rules forbid a call drops it without an error.
+    """
+    return f"no reply, though {server} runs: this certificate may not call it (see `t2 keys list`)"

@@ -15,8 +15,7 @@ import zenoh
 import zenoh.ext
 
 from common import clock
-from common.bus.bus import copied
-from common.bus.calls import is_timeout, refusal_of
+from common.bus.bus import copied, is_timeout, refusal_of
 from common.bus.publisher import QUERY_CONGESTION, qos
 from common.bus.session import check_files, client_config
 from common.codec import Sample

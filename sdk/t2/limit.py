@@ -7,9 +7,8 @@ import time
 import zenoh
 
 from t2.errors import NotAllowed, T2Error
-from t2.messages import Limit, SafetyState
+from t2.messages import Limit, LimitState, SafetyState
 from t2.motion import finite
-from t2.parts import LimitState
 from t2.publisher import SourcePublisher
 from t2.stream import Stream
 

@@ -14,8 +14,7 @@ from typing import Any
 
 from common import clock, keys, realtime
 from common import messages as m
-from common.bus.bus import Arrival
-from common.bus.calls import Caller
+from common.bus.bus import Arrival, Caller
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
 from common.motion import BRAKE, STOP

@@ -6,7 +6,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from common import settings
-from common.members import SourceName
+from common.settings import SourceName
 
 Speed = Annotated[float, Meta(gt=0.0, le=3.0)]  # m/s or rad/s
 # Its origin is part of a Content-Security-Policy: no separator of that may occur.

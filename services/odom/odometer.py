@@ -8,8 +8,7 @@ import msgspec
 
 from common import clock, keys
 from common import messages as m
-from common.bus.bus import Arrival
-from common.bus.calls import Caller
+from common.bus.bus import Arrival, Caller
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.heartbeat import Echoes

@@ -15,7 +15,7 @@ import zenoh
 import zenoh.ext
 
 from common import clock
-from common.bus.overwriting_queue import OverwritingQueue
+from common.bus.bus import OverwritingQueue
 from common.bus.session import client
 from common.loop import Post
 from common.settings import BusSettings

@@ -8,7 +8,7 @@ from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from common import settings
-from common.members import SourceName
+from common.settings import SourceName
 
 Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]

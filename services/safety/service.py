@@ -9,8 +9,7 @@ from typing import TypeVar
 from msgspec.structs import replace
 
 from common import clock, keys
-from common.bus.bus import Arrival, Bus
-from common.bus.calls import Caller
+from common.bus.bus import Arrival, Bus, Caller
 from common.freshness import Latest
 from common.heartbeat import Heartbeat
 from common.keys import Topic

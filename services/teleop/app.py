@@ -24,7 +24,6 @@ from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from services.teleop.core.hold import Press
 from services.teleop.core.round_trip import NUMBERS, PROBE_S
-from services.teleop.sonar_view import around
 
 QUERY = "\x1b7\x1b[2;{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
 MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
@@ -75,7 +74,6 @@ class TeleopApp(App[None]):
         self._header, self._hints = Panel(id="header"), Panel(id="hints")
         self._safety, self._around = titled("safety"), titled("around")
         self._motion, self._events = titled("motion"), titled("events")
-        self._help = titled("help")
 
     def compose(self) -> ComposeResult:
         """Lay out the panels."""
@@ -85,17 +83,15 @@ class TeleopApp(App[None]):
             yield self._around
             yield self._motion
         yield self._events
-        yield self._help
         yield self._hints
 
     def on_mount(self) -> None:
         """Start the timers."""
         self.set_interval(REFRESH_S, self.draw)
         self.set_interval(PROBE_S, self.probe)
-        self._help.show(panels.help_text())
 
     def on_resize(self, event: events.Resize) -> None:
-        """Enlarge the sonar view in a tall terminal."""
+        """Enlarge the safety panel in a tall terminal."""
         self.screen.set_class(event.size.height >= 30, "tall")
 
     def draw(self) -> None:
@@ -106,12 +102,11 @@ class TeleopApp(App[None]):
         now_ns = self._clock()
         self._post(lambda: self._controller.screen_drawn(now_ns))
         self._view = view = self._controller.view
-        size = self._around.content_size
         self._header.show(panels.header(view))
         self.set_class(bool(panels.release(view)), "contact")
         self.set_class(bool(view.alarm), "alarm")
         self._safety.show(panels.safety(view, self._safety.content_size.height))
-        self._around.show(around(view.ultrasonic, view.bumper, size.width, size.height))
+        self._around.show(panels.around(view))
         self._motion.show(panels.motion(view))
         size = self._events.content_size
         self._events.show(panels.events(view, size.height, size.width))
@@ -142,8 +137,6 @@ class TeleopApp(App[None]):
 
     def on_key(self, event: events.Key) -> None:
         """Post a key to the controller; CapsLock and shift make no difference."""
-        helps = event.character == "?" and not self.has_class("help")
-        self.set_class(helps, "help")  # any other key closes it, and counts
         key = event.key.removeprefix("shift+").lower()
         press = Press(key, self._received_ns(event), self._view.safety)
         self._post(lambda: self._controller.press(press, self._clock()))

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from common import settings
-from common.members import SourceName
+from common.settings import SourceName
 
 Speed = Annotated[float, Meta(gt=0.0, le=3.0)]  # m/s or rad/s
 Hold = Annotated[float, Meta(ge=0.1, le=1.0)]  # s

@@ -10,8 +10,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from common import clock, keys
-from common.bus.bus import Arrival
-from common.bus.calls import no_answer, not_allowed
+from common.bus.bus import Arrival, no_answer, not_allowed
 from common.client import Contest, EstopRepetition, EstopStep, ResetCheck, reset_request
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Drive, Event, ResetDone, SafetyState

@@ -6,7 +6,16 @@ from textwrap import wrap
 
 from rich.text import Text
 
-from common.messages import Cause, Direction, Driver, Release, SafetyState, Verdict
+from common.messages import (
+    SONAR_NAMES,
+    Cause,
+    Direction,
+    Driver,
+    Release,
+    SafetyState,
+    Ultrasonic,
+    Verdict,
+)
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.view import Line, View
 
@@ -31,20 +40,15 @@ LEVELS = {"info": "", "warning": WARN, "error": BAD}
 SLOW_KEYS = (("␣", "stop"), ("E", "ESTOP"), ("Q", "quit"))  # accepted from a slow terminal
 KEYS = (
     ("WASD", "drive"), ("␣", "stop"), ("1-5", "gear"), ("E", "ESTOP"),
-    ("R", "reset"), ("FB", "release"), ("Q", "quit"), ("?", "help"),
+    ("R", "reset"), ("FB", "release"), ("ZC", "arcs"), ("Q", "quit"),
 )  # fmt: skip
-HELP = (
-    ("W A S D, arrows", "drive and turn on the spot, while held"),
-    ("Z C, keypad corners", "arcs: forward left, forward right"),
-    ("space", "release all controls and stop"),
-    ("E", "emergency stop, latched until R"),
-    ("R", "reset the latched causes on the screen"),
-    ("F B, held", "move forward or backward off a pressed bumper"),
-    ("1 to 5", "gear: 0.2 to 0.8 m/s"),
-    ("Q, ctrl-c", "stop and quit"),
-    ("gamepad", "left shoulder held: sticks drive"),
-    ("?", "close this help; any other key closes it and counts"),
-)
+# End of each band of distances, in metres, and its colour. For display only: the distances at which
+# safety acts depend on the speed.
+BANDS = ((0.5, BAD), (1.0, WARN))
+NO_RANGE = {"fault": ("fault", "bold magenta"), "too_near": ("near", BAD), "no_echo": ("-", DIM)}
+AHEAD, BESIDE, BEHIND = (
+    ("front_left", "front", "front_right"), ("left", "right"), ("rear_left", "rear", "rear_right"),
+)  # fmt: skip
 
 
 def rows_of(*rows: Text) -> Text:
@@ -73,11 +77,6 @@ def _bumper(view: View) -> Part:
     if view.bumper is None:
         return ("○ bumper", WARN)
     return ("● bumper PRESSED", BAD) if view.bumper.pressed else ("● bumper", GOOD)
-
-
-def help_text() -> Text:
-    """Return the keys and what they do."""
-    return rows_of(*(Text.assemble((f"{key:<21}", "bold cyan"), action) for key, action in HELP))
 
 
 def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
@@ -177,17 +176,47 @@ def _age(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
 
 
+# --- sonars ---------------------------------------------------------------------------------
+
+
+def around(view: View) -> Text:
+    """Return the vehicle from above with the readings of its eight sonars."""
+    bumper = view.bumper is not None and view.bumper.pressed
+    style, label = ("bold white on red", "BUMPER") if bumper else ("bold cyan", "▲")
+    read = {name: reading(view.ultrasonic, at) for at, name in enumerate(SONAR_NAMES)}
+    left, right = (read[name] for name in BESIDE)
+    space = (" " * 11, "")
+    return rows_of(
+        Text.assemble(*(read[name] for name in AHEAD)),
+        Text.assemble(space, ("╭─────────╮", style), space),
+        Text.assemble(left, (f"│{label:^9}│", style), right),
+        Text.assemble(space, ("╰─────────╯", style), space),
+        Text.assemble(*(read[name] for name in BEHIND)),
+    )
+
+
+def reading(ultrasonic: Ultrasonic | None, at: int) -> Part:
+    """Return a sonar's reading, 11 characters wide; "?" without a fresh message."""
+    if ultrasonic is None:
+        return (f"{'?':^11}", DIM)
+    status, distance = ultrasonic.status[at], ultrasonic.ranges[at]
+    if status != "ok" or distance is None:
+        text, style = NO_RANGE.get(status, NO_RANGE["no_echo"])
+        return (f"{text:^11}", style)
+    style = next((style for end, style in BANDS if distance < end), GOOD)
+    return (f"{f'{distance:.2f} m':^11}", style)
+
+
 # --- motion ---------------------------------------------------------------------------------
 
 
 def motion(view: View) -> Text:
-    """Return the table: eleven rows, or ten during a contact, whose panel needs the room."""
+    """Return the table of ten rows."""
     rows = {
         "": Text(f"{'request':>8}{'allowed':>9}{'measured':>10}", style=DIM),
         **_speeds(view),
         **_pose(view),
         "board": _link(view),
-        "rates": _rates(view),
         "motor L": Text(*_faults(view.left)),
         "motor R": Text(*_faults(view.right)),
         "driver": _driver(view),
@@ -195,8 +224,6 @@ def motion(view: View) -> Text:
         if view.move_stick
         else Text(view.gamepad),
     }
-    if view.safety and view.safety.release:
-        del rows["rates"]
     return rows_of(*(Text.assemble((f"{name:<8}", DIM), row) for name, row in rows.items()))
 
 
@@ -248,13 +275,6 @@ def _link(view: View) -> Text:
         return Text(link.waiting or "not armed", style=WARN)
     trip = "" if link.round_trip is None else f"  {link.round_trip * 1e3:.1f} ms"
     return Text(f"{link.board}{trip}", style=GOOD)
-
-
-def _rates(view: View) -> Text:
-    if view.link is None:
-        return Text(*NO_DATA)
-    fastest = sorted(view.link.rates.items(), key=lambda rate: -rate[1])[:4]
-    return Text(" ".join(f"{name[:4].lower()} {rate:.0f}" for name, rate in fastest) or "none")
 
 
 def _faults(driver: Driver | None) -> Part:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from common import log
 from common.messages import (
+    MAX_TEXT,
     Bumper,
     Drive,
     Driver,
@@ -24,7 +25,6 @@ from common.messages import (
 from common.motion import Twist
 from common.settings import Log, LogLevel
 from common.text import printable
-from common.verdict import MAX_TEXT
 
 LINES = 40  # of the event log: more than a screen has
 

@@ -8,8 +8,7 @@ from msgspec import Struct, inspect
 from common.codec import decode, encode
 from common.errors import MessageError
 from common.keys import CALLS, TOPICS
-from common.messages import Event
-from common.verdict import MAX_TEXT
+from common.messages import MAX_TEXT, Event
 
 
 def unbounded(kind: inspect.Type, at: str) -> Iterator[str]:

@@ -15,10 +15,9 @@ from common.bus.bus import Bus
 from common.bus.session import ONE_POOL, RUNTIME_ENV, router
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.config import Sources, load
-from common.messages import Event, Health
+from common.messages import MAX_TEXT, Event, Health
 from common.service import Node, resident_bytes, run
 from common.settings import Shared
-from common.verdict import MAX_TEXT
 from tests.common.bus_fixture import BusFixture
 from tests.common.program import SPECIMEN, Program, on, program
 from verification.harness.bus import listening

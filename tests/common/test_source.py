@@ -9,8 +9,8 @@ from common.bus.bus import Arrival, Bus
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER
 from common.loop import Loop
-from common.messages import MAX_REASON, Drive
-from common.source import DriveSource, LimitPublisher
+from common.messages import Drive
+from common.source import DriveSource
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
 from verification.harness.bus import bus_on, running
@@ -107,21 +107,3 @@ def test_a_subscriber_of_the_same_session_is_no_permission(endpoint: str) -> Non
         wait_until(published, "the missing subscriber is noticed")
         safety.subscribe(keys.DRIVE, lambda _: None, source="*")
         wait_until(lambda: not published(), "the subscriber of safety is noticed")
-
-
-def test_a_limit_carries_the_newest_heartbeat_and_a_bounded_reason(bus: FakeBus) -> None:
-    source = LimitPublisher(bus, "lidar")
-    bus.deliver(keys.SAFETY, safety_state(heartbeat=8))
-    sent = source.limit(0.3, None, "x" * 100)
-    assert (sent.linear, sent.angular, sent.echo, sent.reason) == (0.3, None, 8, "x" * MAX_REASON)
-    assert (source.limit().linear, source.limit().reason) == (None, "")
-
-
-@pytest.mark.parametrize("wrong", [math.nan, math.inf, -0.1])
-def test_a_cap_that_safety_would_refuse_is_an_error(bus: FakeBus, wrong: float) -> None:
-    source = LimitPublisher(bus, "lidar")
-    with pytest.raises(ValueError, match="a cap must be finite and not negative"):
-        source.limit(wrong)
-    with pytest.raises(ValueError, match="a cap must be finite and not negative"):
-        source.limit(0.1, wrong)
-    assert source.limit(0.0, 0.0).linear == 0.0

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from common import keys
-from common.bus.bus import Arrival, Bus
-from common.bus.calls import Caller
+from common.bus.bus import Arrival, Bus, Caller
 from common.messages import Bumper, Done, Drive, PoseRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.waiting import PATIENCE_S, wait_until

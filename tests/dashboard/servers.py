@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from common import clock, keys
-from common.bus.bus import Bus
-from common.bus.calls import Caller
+from common.bus.bus import Bus, Caller
 from common.loop import Loop
 from common.messages import (
     Cause,

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 
-from common.bus.bus import Bus
+from common import keys
+from common.bus.bus import Arrival, Bus
 from common.loop import Loop
-from common.source import LimitPublisher
+from common.messages import Limit, SafetyState
 from tests.dashboard.page import (
     BROWSER_MARKS,
     reset_all,
@@ -45,13 +46,20 @@ class Lidar:
 
     def __init__(self, loop: Loop) -> None:
         self.cap = 0.1
+        self.heartbeat = 0
         self._loop = loop
 
     def declare(self, bus: Bus) -> None:
-        limits = LimitPublisher(bus, "lidar")
+        limits = bus.publisher(keys.LIMIT, source="lidar")
+
+        def hear(arrival: Arrival[SafetyState]) -> None:
+            self.heartbeat = arrival.message.heartbeat
 
         def publish(_: int) -> None:
-            limits.limit(self.cap, None, "person at 2 m")
+            reason, echo = "person at 2 m", self.heartbeat
+            limits.put(Limit(linear=self.cap, angular=None, reason=reason, echo=echo))
+
+        bus.subscribe(keys.SAFETY, hear)
 
         self._loop.post(lambda: self._loop.every(0.1, publish))
 

@@ -10,8 +10,7 @@ from msgspec.structs import replace
 
 from common.codec import decode, encode
 from common.freshness import Latest
-from common.messages import MAX_REASON, Direction, Limits, Mileage, SafetyState
-from common.verdict import MAX_TEXT
+from common.messages import MAX_REASON, MAX_TEXT, Direction, Limits, Mileage, SafetyState
 from services.safety.config import LimitSource, Safety, Source
 from services.safety.core.causes import Held
 from services.safety.core.inputs import Estop, Event, Reset

@@ -11,16 +11,13 @@ from textual.pilot import Pilot
 from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Cause, ResetRequest, Ultrasonic
-from services.teleop.app import Panel
 from tests.factories import contact_state, link, safety_state
 from tests.teleop.screen_fixture import LocalTerminalApp, Screen, play, until
 
 # --- keys -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("key", "speed"), [("w", 0.2), ("W", 0.2), ("up", 0.2), ("shift+up", 0.2), ("s", -0.2)]
-)
+@pytest.mark.parametrize(("key", "speed"), [("W", 0.2), ("shift+up", 0.2), ("s", -0.2)])
 def test_a_key_drives_and_then_requests_end(screen: Screen, key: str, speed: float) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press(key)
@@ -68,7 +65,7 @@ def test_losing_the_focus_of_the_screen_releases(screen: Screen) -> None:
     play(screen, act)
 
 
-@pytest.mark.parametrize("key", ["q", "Q", "ctrl+c", "ctrl+q"])
+@pytest.mark.parametrize("key", ["q", "ctrl+c"])
 def test_quitting_waits_for_the_final_zeros(screen: Screen, key: str) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press(key)
@@ -149,19 +146,6 @@ def test_a_control_character_reaches_no_panel(screen: Screen) -> None:
     play(screen, act)
 
 
-def test_help_opens_and_any_other_key_closes_it(screen: Screen) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        await pilot.press("question_mark")
-        await until(lambda: screen.app.query_one("#help", Panel).display, "the help")
-        assert not screen.app.query_one("#events", Panel).display
-        assert screen.fits("help")
-        await pilot.press("w")
-        await until(lambda: not screen.app.query_one("#help", Panel).display, "its end")
-        assert screen.speeds(5)  # the key counts
-
-    play(screen, act)
-
-
 @pytest.mark.parametrize("size", [(80, 24), (120, 40)])
 def test_an_unconfirmed_emergency_stop_is_shown_until_it_is_latched(
     screen: Screen, size: tuple[int, int]
@@ -199,10 +183,7 @@ def test_a_contact_shows_its_release_without_clipping(
     play(screen, act, *size)
 
 
-@pytest.mark.parametrize(("size", "rows"), [((80, 24), 11), ((120, 40), 13)])
-def test_received_values_are_shown_on_a_screen_that_grows(
-    screen: Screen, size: tuple[int, int], rows: int
-) -> None:
+def test_received_values_are_shown(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         fake = screen.node.fake
         fake.deliver(keys.SAFETY, safety_state(text="Driving, slowly."))
@@ -216,9 +197,8 @@ def test_received_values_are_shown_on_a_screen_that_grows(
         assert "10.7.5.224:4002" in screen.text_of("motion")
         assert "no router yet" in screen.text_of("header")
         assert "contact" in screen.text_of("events")
-        await until(lambda: screen.text_of("around").count("\n") == rows - 1, f"{rows} rows")
         assert "1.50 m" in screen.text_of("around")
         assert screen.text_of("around").count("fault") == 7
         assert screen.fits("header", "safety", "around", "motion", "hints")
 
-    play(screen, act, *size)
+    play(screen, act)

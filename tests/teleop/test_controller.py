@@ -4,7 +4,7 @@ import pytest
 from msgspec import structs
 
 from common import keys
-from common.bus.calls import no_answer, not_allowed
+from common.bus.bus import no_answer, not_allowed
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER, ESTOP_TICKS, OVERRULED_TICKS
 from common.messages import Bumper, Driver, Event, ResetDone, ResetRequest, Velocity
@@ -17,12 +17,6 @@ DONE = ResetDone(text="Reset.", boot=5, heartbeat=8, cleared=(42,))
 
 
 # --- requests -------------------------------------------------------------------------------
-
-
-def test_a_tap_sends_requests_and_then_nothing(operator: Operator) -> None:
-    assert operator.speeds(3) == [None] * 3
-    operator.press("w")
-    assert operator.speeds(17) == [0.0] + [0.2] * 11 + [0.0] * 3 + [None] * 2
 
 
 @pytest.mark.parametrize(("key", "release"), [("w", "none"), ("f", "forward"), ("b", "backward")])
@@ -50,15 +44,6 @@ def test_quitting_sends_three_zeros_then_stops_the_loop(operator: Operator, driv
 
 
 # --- emergency stop -------------------------------------------------------------------------
-
-
-def test_estop_releases_and_stops_the_robot(operator: Operator) -> None:
-    operator.press("w")
-    operator.ticks(3)
-    operator.press("e")
-    assert operator.node.fake.estops == 1
-    assert operator.speeds(5) == [0.0] * 3 + [None] * 2
-    assert operator.lines == ["emergency stop requested by the operator"]
 
 
 def test_estop_is_repeated_until_safety_has_latched_it(operator: Operator) -> None:
@@ -171,13 +156,6 @@ def test_a_gamepad_change_is_reported(operator: Operator) -> None:
     pad.read = lambda: setattr(pad, "status", "none")  # type: ignore[method-assign]
     operator.ticks(2)
     assert operator.lines == ["gamepad: none"]
-
-
-def test_losing_the_focus_releases(operator: Operator) -> None:
-    operator.press("w")
-    operator.ticks(2)
-    operator.controller.release_controls(operator.now_ns)
-    assert operator.speeds(4) == [0.0] * 3 + [None]
 
 
 def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -> None:

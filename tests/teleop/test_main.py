@@ -14,7 +14,6 @@ from common.loop import Loop
 from common.messages import Drive, Event, Health
 from services.teleop import __main__ as teleop
 from verification.harness.bus import bus_on, running
-from verification.harness.ports import free_port
 from verification.harness.teleop_terminal import STRICT, TELEOP, Terminal, terminal
 from verification.harness.waiting import wait_until
 
@@ -171,14 +170,6 @@ def test_a_terminal_that_never_answers_does_not_drive(endpoint: str, listener: L
 
 
 # --- the start ------------------------------------------------------------------------------
-
-
-def test_a_missing_router_is_shown() -> None:
-    with terminal(f"tcp/127.0.0.1:{free_port()}") as it:
-        wait_until(lambda: it.shows(b"no router yet"), "the words")
-        it.type("q")
-        wait_until(it.ends, "its end")
-        assert it.process.returncode == 0
 
 
 def test_a_missing_terminal_is_reported(

@@ -5,7 +5,16 @@ from typing import Any
 import pytest
 
 from common.client import request
-from common.messages import Bumper, Cause, Driver, Limits, ReleaseRequest, Velocity
+from common.messages import (
+    Bumper,
+    Cause,
+    Driver,
+    Limits,
+    RangeStatus,
+    ReleaseRequest,
+    Ultrasonic,
+    Velocity,
+)
 from services.teleop import panels
 from services.teleop.core.round_trip import UNKNOWN
 from services.teleop.view import Line, View
@@ -34,13 +43,6 @@ def test_the_header_shows_connections_and_gear(fields: dict[str, Any], words: st
     shown = panels.header(view(**fields)).plain
     assert words in shown
     assert len(shown) <= 78
-
-
-def test_the_help_names_every_key_of_the_hints() -> None:
-    words = panels.help_text().plain
-    for key in ("W A S D", "Z C", "space", "E", "R", "F B", "1 to 5", "Q", "gamepad", "?"):
-        assert f"\n{key}" in f"\n{words}", key
-    assert max(map(len, words.split("\n"))) <= 76
 
 
 def test_the_hints_explain_key_repeats_and_fit() -> None:
@@ -171,6 +173,41 @@ def test_the_release_fits() -> None:
     assert max(map(len, rows)) <= 76
 
 
+# --- sonars ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("distance", "status", "words", "style"),
+    [
+        (0.49, "ok", "0.49 m", panels.BAD),
+        (0.5, "ok", "0.50 m", panels.WARN),
+        (1.0, "ok", "1.00 m", panels.GOOD),
+        (None, "fault", "fault", "bold magenta"),
+        (None, "too_near", "near", panels.BAD),
+        (None, "no_echo", "-", panels.DIM),
+        (None, "ok", "-", panels.DIM),
+    ],
+)
+def test_a_reading_has_a_label_and_a_colour(
+    distance: float | None, status: RangeStatus, words: str, style: str
+) -> None:
+    seen = Ultrasonic(ranges=(distance, *(None,) * 7), status=(status, *("fault",) * 7))
+    assert panels.reading(seen, 0) == (f"{words:^11}", style)
+    assert panels.reading(None, 0) == (f"{'?':^11}", panels.DIM)
+
+
+@pytest.mark.parametrize(("pressed", "body"), [(True, "BUMPER"), (False, "▲")])
+def test_each_sonar_is_at_its_place_around_the_vehicle(pressed: bool, body: str) -> None:
+    ranges = tuple(1.0 + at / 10 for at in range(8))
+    seen = Ultrasonic(ranges=ranges, status=("ok",) * 8)
+    rows = panels.around(view(ultrasonic=seen, bumper=Bumper(pressed=pressed))).plain.split("\n")
+    ahead, beside, behind = (rows[row].replace("│", "").split() for row in (0, 2, 4))
+    assert ahead == ["1.10", "m", "1.20", "m", "1.30", "m"]
+    assert beside == ["1.00", "m", body, "1.40", "m"]
+    assert behind == ["1.70", "m", "1.60", "m", "1.50", "m"]
+    assert {len(row) for row in rows} == {33}
+
+
 # --- motion ---------------------------------------------------------------------------------
 
 
@@ -184,13 +221,13 @@ def table(of: View) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("fields", "expected"),
     [
-        ({}, {"pose": "no data", "odom": "no data", "board": "no data", "rates": "no data"}),
+        ({}, {"pose": "no data", "odom": "no data", "board": "no data"}),
         ({}, {"motor L": "no data", "driver": "none", "m/s": "-        -         -"}),
         ({"odometry": odometry()}, {"pose": "x +1.23  y -0.40 m  +90°"}),
         ({"odometry": odometry()}, {"odom": "residual +0.004 m  no slip"}),
         ({"odometry": odometry(residual=None, slip=True)}, {"odom": "residual -  SLIP"}),
-        ({"link": link()}, {"board": "10.7.5.224:4002  0.8 ms", "rates": "velo 50 driv 2"}),
-        ({"link": link(round_trip=None, rates={})}, {"board": "10.7.5.224:4002", "rates": "none"}),
+        ({"link": link()}, {"board": "10.7.5.224:4002  0.8 ms"}),
+        ({"link": link(round_trip=None)}, {"board": "10.7.5.224:4002"}),
         ({"link": link(state="lost")}, {"board": "lost: 10.7.5.224:4002"}),
         ({"link": link(armed=False, waiting="a neutral motion")}, {"board": "a neutral motion"}),
         ({"link": link(armed=False)}, {"board": "not armed"}),
@@ -211,7 +248,7 @@ def table(of: View) -> dict[str, str]:
 )
 def test_rows_of_the_motion_panel(fields: dict[str, Any], expected: dict[str, str]) -> None:
     shown = table(view(**fields))
-    assert len(shown) == 11
+    assert len(shown) == 10
     assert {name: shown[name] for name in expected} == expected
 
 
@@ -227,7 +264,3 @@ def test_speeds_requested_allowed_and_measured(linear: float, allowed: str) -> N
     )
     assert shown["m/s"].split() == [f"{linear:+.2f}", allowed, "+0.21"]
     assert shown["rad/s"].split() == ["+0.10", "0.90", "-0.02"]
-
-
-def test_a_contact_takes_the_row_of_the_rates() -> None:
-    assert "rates" not in table(view(link=link(), safety=contact_state()))

@@ -3,8 +3,8 @@
 import pytest
 
 from common.log import Logger
+from common.messages import MAX_TEXT
 from common.settings import Log
-from common.verdict import MAX_TEXT
 from services.teleop.view import LINES, EventLog, Line
 
 

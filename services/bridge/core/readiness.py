@@ -33,8 +33,8 @@ import msgspec
 
 from common import messages as m
 from common.freshness import NS_PER_S
+from common.messages import Few, Name
 from common.settings import Board
-from common.verdict import Few, Name
 from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
 from common.wire.frame import Frame
 from services.bridge.config import Bridge as Settings

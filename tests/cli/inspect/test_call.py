@@ -11,8 +11,7 @@ import zenoh
 from cli.inspect import call as command
 from common import codec, keys
 from common import messages as m
-from common.bus.bus import Bus
-from common.bus.calls import Caller
+from common.bus.bus import Bus, Caller
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 

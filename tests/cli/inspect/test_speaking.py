@@ -4,8 +4,7 @@ import pytest
 
 from cli.inspect import estop
 from common import keys
-from common.bus.bus import Bus
-from common.bus.calls import Caller
+from common.bus.bus import Bus, Caller
 from common.messages import Cause, Done, LedRequest, Limits, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture

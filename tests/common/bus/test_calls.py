@@ -6,8 +6,7 @@ import msgpack
 import pytest
 
 from common import keys
-from common.bus.bus import Bus
-from common.bus.calls import Caller
+from common.bus.bus import Bus, Caller
 from common.messages import LedRequest, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from common.bus.overwriting_queue import OverwritingQueue
+from common.bus.bus import OverwritingQueue
 
 
 class Owner:
