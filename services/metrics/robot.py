@@ -4,35 +4,18 @@ Only fresh values are exported, so that a dead robot does not look alive. Its ag
 are exported until the robot expires.
 """
 
-from bisect import bisect_left
 from collections import Counter
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import Any
 
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Event, Health, Message
 
 FRESH_S = 3.0  # a value is exported for so long: the slowest streams have 1 Hz
-EXPIRY_S = 24 * 3600.0  # until an absent robot or service is removed: fleets change
+EXPIRY_S = 24 * 3600.0  # until an absent robot is removed: fleets change
 EXPECTED = ("bridge", "safety", "odom")  # needed to drive: exported even if never seen
 EVENT_NAMES_MAX = 500  # further names count as "other": this bounds the memory
 DISK_EVENTS = ("disk_full", "disk_room")  # of the recorder
-LATENESS_S = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
-
-
-@dataclass(slots=True)
-class Histogram:
-    """A histogram over ``LATENESS_S``: it keeps samples between two scrapes."""
-
-    counts: list[int] = field(default_factory=lambda: [0] * (len(LATENESS_S) + 1))
-    total: float = 0.0  # s
-
-    def add(self, late_s: float) -> None:
-        """Count a value; ignore a non-finite one."""
-        if isfinite(late_s):
-            self.counts[bisect_left(LATENESS_S, late_s)] += 1
-            self.total += late_s
 
 
 @dataclass(slots=True)
@@ -41,7 +24,6 @@ class ServiceState:
 
     instances: set[str] = field(default_factory=set)  # by liveliness
     health: Latest[Health] | None = None
-    lateness: Histogram = field(default_factory=Histogram)
     seen_ns: int = 0  # last message or liveliness change
 
     def is_healthy(self, now_ns: int) -> bool:
@@ -62,9 +44,7 @@ class RobotState:
 
     def on_health(self, name: str, health: Health, now_ns: int) -> None:
         """Handle a health message."""
-        service = self._service(name, now_ns)
-        service.health = Latest(health, now_ns)
-        service.lateness.add(health.lateness)
+        self._service(name, now_ns).health = Latest(health, now_ns)
 
     def on_live(self, name: str, instance: str, alive: bool, now_ns: int) -> None:
         """Handle a liveliness token that appeared or disappeared."""
@@ -99,12 +79,8 @@ class RobotState:
         same_process = self.disk.boot == recorder.health.value.boot
         return same_process and self.disk.name == "disk_full"
 
-    def expire(self, now_ns: int) -> bool:
-        """Remove services that are long absent; return whether the robot itself has expired."""
-        for name, service in list(self.services.items()):
-            gone = not service.instances and now_ns - service.seen_ns > EXPIRY_S * NS_PER_S
-            if gone and name not in EXPECTED:
-                del self.services[name]
+    def is_expired(self, now_ns: int) -> bool:
+        """Return whether the robot has been absent for ``EXPIRY_S``."""
         received = [latest.received_ns for latest in self.streams.values()]
         seen_ns = max([*received, *(each.seen_ns for each in self.services.values())])
         present = any(each.instances for each in self.services.values())
@@ -119,6 +95,5 @@ class RobotState:
 def prune(robots: dict[str, RobotState], own: str, now_ns: int) -> None:
     """Remove expired robots and ids without a robot; always keep ``own``."""
     for name, robot in list(robots.items()):
-        expired = robot.expire(now_ns)
-        if name != own and (expired or not robot.is_robot):
+        if name != own and (robot.is_expired(now_ns) or not robot.is_robot):
             del robots[name]

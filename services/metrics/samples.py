@@ -6,7 +6,7 @@ numbers have the label ``name``. None and stale values have no sample; ``t2_robo
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from typing import Any, get_args
 
@@ -22,8 +22,8 @@ from prometheus_client.core import (
 from common.freshness import fresh
 from common.keys import ROOT
 from common.members import Members
-from common.messages import Link, LinkState, Message, Odometry, SafetyState, Verdict
-from services.metrics.robot import FRESH_S, LATENESS_S, RobotState, ServiceState
+from common.messages import Durations, Link, LinkState, Message, Odometry, SafetyState, Verdict
+from services.metrics.robot import FRESH_S, RobotState, ServiceState
 
 KINDS = {
     "gauge": GaugeMetricFamily,
@@ -68,8 +68,6 @@ FAMILIES = (
     Family("t2_service_instances", "gauge", OF_SERVICE, "Processes of the service on the bus"),
     Family("t2_service_health_age_seconds", "gauge", OF_SERVICE,
            "Time since the latest health message"),
-    Family("t2_service_loop_lateness_seconds", "histogram", OF_SERVICE,
-           "Maximum lateness of the event loop in each second"),
     Family("t2_reaction_seconds", "histogram", (*OF_SERVICE, "reaction"),
            "Reactions of the bridge to a hit, from its read: until BRAKE (reflex), until safety's "
            "BRAKE (judged_stop)"),
@@ -93,14 +91,11 @@ class Scrape:
         """Add a sample of a gauge or counter."""
         self.families[name].add_metric(labels, float(value))  # type: ignore[attr-defined]
 
-    def add_histogram(
-        self, name: str, bounds: Sequence[float], counts: Iterable[int], total: float | None,
-        *labels: str,
-    ) -> None:  # fmt: skip
-        """Add a histogram by the counts between its bounds, and above the last one."""
-        ends = [*(f"{bound:.3g}" for bound in bounds), "+Inf"]
-        buckets = list(zip(ends, accumulate(counts), strict=True))
-        self.families[name].add_metric(labels, buckets, total)  # type: ignore[attr-defined]
+    def add_durations(self, name: str, each: Durations, *labels: str) -> None:
+        """Add a histogram."""
+        ends = [*(f"{bound:.3g}" for bound in each.bounds), "+Inf"]
+        buckets = list(zip(ends, accumulate(each.counts), strict=True))
+        self.families[name].add_metric(labels, buckets, None)  # type: ignore[attr-defined]
 
     def add_fields(self, prefix: str, part: Struct, labels: Mapping[str, str]) -> None:
         """Add the fields of a message, also those of the structs inside."""
@@ -175,16 +170,13 @@ def _service(scrape: Scrape, labels: tuple[str, str], service: ServiceState, now
     scrape.add("t2_service_health_age_seconds", service.health.age_s(now_ns), *labels)
     if not fresh(service.health, now_ns, FRESH_S):
         return
-    health, late, own = service.health.value, service.lateness, f"{ROOT}/{labels[0]}/"
+    health, own = service.health.value, f"{ROOT}/{labels[0]}/"
     rates = {key.removeprefix(own): rate for key, rate in health.rates.items()}
     own_labels = dict(zip(OF_SERVICE, labels, strict=True))
     scrape.add_fields("t2_service", replace(health, rates=rates), own_labels)
-    name = "t2_service_loop_lateness_seconds"
-    scrape.add_histogram(name, LATENESS_S, late.counts, late.total, *labels)
     for reaction, each in sorted(health.reactions.items()):
         if len(each.counts) == len(each.bounds) + 1:
-            name = "t2_reaction_seconds"
-            scrape.add_histogram(name, each.bounds, each.counts, None, *labels, reaction)
+            scrape.add_durations("t2_reaction_seconds", each, *labels, reaction)
 
 
 def certificate_expiry(listed: Members) -> dict[tuple[str, str], float]:

@@ -11,7 +11,6 @@ import msgspec
 import pytest
 
 from common import codec, keys
-from common import messages as m
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.members import Member, Members
 from services.metrics import __main__ as metrics
@@ -19,7 +18,7 @@ from services.metrics import exporter
 from services.metrics.exporter import call_in_loop
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
-from tests.metrics.robots import event, health, link, odometry, safety
+from tests.metrics.robots import health, link, odometry, safety
 from tests.metrics.scraping import running, scraped, value
 from tests.metrics.values import names
 from verification.harness.bus import router_process
@@ -32,38 +31,16 @@ def test_scrape_of_a_running_robot(buses: BusFixture, tmp_path: Path) -> None:
     with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
         assert value(port, "t2_robot_up", **robot) == 0
         pretend(buses, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
-        pretend(buses, "safety", {keys.SAFETY: lambda: safety("estop")})
+        told = {keys.SAFETY: lambda: safety("estop"), keys.EVENTS: lambda: event("contact")}
+        pretend(buses, "safety", told, service="safety")
         pretend(buses, "odom", {keys.ODOMETRY: odometry})
         wanted = {"t2_link_armed", "t2_safety_latched", "t2_odometry_slip", "t2_service_rss_bytes"}
+        wanted |= {"t2_events_total"}
         wait_until(lambda: wanted <= names(scraped(port)), "every stream")
         assert value(port, "t2_robot_up", **robot) == 1
         assert value(port, "t2_service_up", service="bridge", **robot) == 1
         assert value(port, "t2_safety_latched", name="estop", **robot) == 1
         assert value(port, "t2_link_rejected", name="crc", **robot) == 3
-
-
-def test_a_dead_robot_has_no_values(buses: BusFixture, tmp_path: Path) -> None:
-    robot = {"robot": buses.robot}
-    with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
-        bus = pretend(buses, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
-        wait_until(
-            lambda: value(port, "t2_service_up", service="bridge", **robot) == 1, "the robot"
-        )
-        assert value(port, "t2_link_armed", **robot) == 1
-        bus.close()
-        wait_until(
-            lambda: value(port, "t2_service_instances", service="bridge", **robot) == 0,
-            "the end of its token",
-        )
-        wait_until(lambda: value(port, "t2_robot_up", **robot) == 0, "the end of the robot")
-        assert value(port, "t2_link_armed", **robot) is None
-        age = value(port, "t2_stream_age_seconds", stream="link", **robot)
-        assert age is not None
-        assert age > 3
-        wait_until(
-            lambda: (value(port, "t2_stream_age_seconds", stream="link", **robot) or 0) > age,
-            "its age to grow",
-        )
 
 
 def test_all_robots_of_a_site_are_exported(buses: BusFixture, tmp_path: Path) -> None:
@@ -88,28 +65,6 @@ def test_all_robots_of_a_site_are_exported(buses: BusFixture, tmp_path: Path) ->
         )  # fmt: skip
         assert value(port, "t2_robot_up", robot="001") is None
         assert value(port, "t2_robot_up", robot=f"{site}-3") is None  # only a laptop has its id
-
-
-def test_events_are_counted_and_set_disk_full(buses: BusFixture, tmp_path: Path) -> None:
-    robot = {"robot": buses.robot}
-    labels = {"event": "disk_full", "level": "error", "service": "recorder"}
-    with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
-        made: list[m.Health] = []
-
-        def healthy() -> m.Health:
-            made.append(health("recorder"))
-            return made[-1]
-
-        bus = pretend(buses, "recorder", {keys.HEALTH: healthy}, service="recorder")
-        events = bus.publisher(keys.EVENTS, service="recorder")
-        until_received(
-            lambda: events.put(event("disk_full")),
-            lambda: value(port, "t2_events_total", **labels, **robot),
-            "the event",
-        )
-        assert value(port, "t2_recorder_disk_full", **robot) == 1
-        events.put(event("disk_room"))
-        wait_until(lambda: value(port, "t2_recorder_disk_full", **robot) == 0, "room again")
 
 
 def test_router_loss_is_exported(tmp_path: Path) -> None:

@@ -135,19 +135,6 @@ def test_rates_by_key_and_counters_by_name() -> None:
     assert of_name(found, "t2_service_counters") == {"overrun": 2}
 
 
-def test_lateness_histogram_covers_every_second() -> None:
-    robot = RobotState()
-    for late_s in (0.001, 0.03, 0.3):
-        robot.on_health("odom", health("odom", late_s=late_s), NOW_NS)
-    found = values(robot)
-    name = "t2_service_loop_lateness_seconds"
-    assert value(found, f"{name}_bucket", service="odom", le="0.005") == 1
-    assert value(found, f"{name}_bucket", service="odom", le="0.1") == 2
-    assert value(found, f"{name}_bucket", service="odom", le="+Inf") == 3
-    assert value(found, f"{name}_count", service="odom") == 3
-    assert value(found, f"{name}_sum", service="odom") == pytest.approx(0.331)
-
-
 def test_reactions_are_cumulative_histograms() -> None:
     robot = whole()
     reactions = {
