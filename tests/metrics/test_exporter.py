@@ -4,21 +4,25 @@ import contextlib
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 
 from common import codec, keys
+from common import messages as m
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.keys import Topic
 from common.members import Member, Members
 from services.metrics import __main__ as metrics
 from services.metrics import exporter
 from services.metrics.exporter import call_in_loop
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
-from tests.metrics.robots import health, link, odometry, safety
+from tests.metrics.robots import event, health, link, odometry, safety
 from tests.metrics.scraping import running, scraped, value
 from tests.metrics.values import names
 from verification.harness.bus import router_process
@@ -31,7 +35,10 @@ def test_scrape_of_a_running_robot(buses: BusFixture, tmp_path: Path) -> None:
     with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
         assert value(port, "t2_robot_up", **robot) == 0
         pretend(buses, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
-        told = {keys.SAFETY: lambda: safety("estop"), keys.EVENTS: lambda: event("contact")}
+        told: dict[Topic[Any], Callable[[], m.Message]] = {
+            keys.SAFETY: lambda: safety("estop"),
+            keys.EVENTS: lambda: event("contact"),
+        }
         pretend(buses, "safety", told, service="safety")
         pretend(buses, "odom", {keys.ODOMETRY: odometry})
         wanted = {"t2_link_armed", "t2_safety_latched", "t2_odometry_slip", "t2_service_rss_bytes"}
