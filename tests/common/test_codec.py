@@ -13,7 +13,6 @@ from common.messages import (
     Bumper,
     Cause,
     Drive,
-    Event,
     Limits,
     Motion,
     PoseRequest,
@@ -49,10 +48,6 @@ def test_plain_msgpack_reads_our_bytes() -> None:
 def test_we_read_the_bytes_of_plain_msgpack() -> None:
     payload = msgpack.packb({"angular": 0, "linear": 1, "echo": 3, "later": ["unknown", {}]})
     assert decode(payload, Drive) == Drive(linear=1.0, angular=0.0, echo=3)
-
-
-def test_what_goes_out_comes_back() -> None:
-    assert decode(encode(STATE), SafetyState) == STATE
 
 
 @given(st.builds(Motion, command=st.sampled_from(Command),
@@ -114,24 +109,9 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("payload", HOSTILE.values(), ids=HOSTILE)
-@pytest.mark.parametrize("kind", [SafetyState, Event])
-def test_hostile_bytes_are_refused(payload: bytes, kind: type[SafetyState | Event]) -> None:
+def test_hostile_bytes_are_refused(payload: bytes) -> None:
     with pytest.raises(MessageError):
-        decode(payload, kind)
-
-
-@given(st.binary(max_size=64))
-def test_any_bytes_are_a_message_or_refused(payload: bytes) -> None:
-    try:
-        message = decode(payload, Bumper)
-    except MessageError:
-        return
-    assert isinstance(message.pressed, bool)
-
-
-def test_nan_passes_a_typed_decode_which_is_why_finite_exists() -> None:
-    hostile = decode(msgpack.packb({"linear": math.nan, "angular": 0.0, "echo": 0}), Drive)
-    assert not finite(hostile.linear, hostile.angular)
+        decode(payload, SafetyState)
 
 
 @pytest.mark.parametrize(

@@ -100,14 +100,6 @@ def test_lateness_is_the_worst_since_the_last_report(loop: Loop, clock: Clock) -
     assert loop.take_lateness_s() == 1.0
 
 
-def test_a_timer_may_set_a_timer(loop: Loop, clock: Clock) -> None:
-    calls: list[str] = []
-    loop.every(9.0, lambda _: loop.every(9.0, lambda _: calls.append("inner")))
-    turn(loop)
-    turn(loop)
-    assert calls == ["inner"]
-
-
 def test_posted_calls_are_made_before_timers_judge_their_age(loop: Loop, clock: Clock) -> None:
     order: list[str] = []
     loop.every(1.0, lambda _: order.append("timer"))
@@ -155,13 +147,6 @@ def test_a_stop_from_another_thread_ends_an_idle_loop(loop: Loop) -> None:
     loop.stop()
     thread.join(20)
     assert not thread.is_alive()
-
-
-def test_posting_after_the_end_is_harmless() -> None:
-    loop = Loop()
-    loop.close()
-    loop.post(lambda: None)
-    loop.stop()
 
 
 def test_an_error_of_a_call_ends_the_run(loop: Loop) -> None:

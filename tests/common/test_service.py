@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -186,13 +187,6 @@ def test_its_schemas_settings_and_last_values_are_looked_up(lived: Lived) -> Non
     assert last[keys.HEALTH.on(buses.robot, service="specimen")]["service"] == "specimen"
 
 
-def test_its_logs_are_json_lines(lived: Lived) -> None:
-    it = lived[1]
-    it.wait_for("started")
-    entries = [json.loads(line) for line in it.lines]
-    assert {(entry["service"], entry["level"]) for entry in entries} == {("specimen", "info")}
-
-
 def test_sigterm_lets_it_come_to_rest_and_its_token_goes(lived: Lived) -> None:
     """The last of those that share it."""
     _, it, witness = lived
@@ -262,3 +256,8 @@ def test_memory_is_unknown_where_the_system_does_not_tell(monkeypatch: pytest.Mo
 
     monkeypatch.setattr("common.service.Path.read_text", absent)
     assert resident_bytes() == 0
+
+
+def test_its_version_is_that_of_the_package() -> None:
+    project = Path(__file__).parents[2] / "pyproject.toml"
+    assert tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"] == VERSION

@@ -5,11 +5,10 @@ import math
 import pytest
 
 from common import keys
-from common.bus.bus import Arrival, Bus
+from common.bus.bus import Bus
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER
 from common.loop import Loop
-from common.messages import Drive
 from common.source import DriveSource
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
@@ -41,29 +40,6 @@ def test_a_non_finite_request_is_refused(bus: FakeBus, wrong: float) -> None:
         source.request(wrong, 0.0)
     with pytest.raises(ValueError, match="non-finite request"):
         source.request(0.0, wrong)
-
-
-def test_it_reaches_a_listener_over_a_real_bus(endpoint: str) -> None:
-    loop = Loop()
-    received: list[Arrival[Drive]] = []
-    sources: list[DriveSource] = []
-    with (
-        running(loop),
-        bus_on(
-            endpoint, loop, lambda bus: bus.subscribe(keys.DRIVE, received.append, source="*")
-        ) as safety,
-        bus_on(endpoint, loop, lambda bus: sources.append(DriveSource(bus, "demo"))),
-    ):
-        state = safety.publisher(keys.SAFETY)
-
-        def echoed() -> bool:
-            state.put(safety_state(heartbeat=41))
-            sources[0].request(0.3, 0.0)
-            return bool(received) and received[-1].message.echo == 41
-
-        wait_until(echoed, "an echo of the heartbeat")
-    assert received[-1].key.endswith("@cmd/drive/demo")
-    assert received[-1].message.linear == 0.3
 
 
 @pytest.mark.parametrize(("passed_on", "denied"), [(False, True), (True, False), (None, False)])

@@ -6,13 +6,12 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from common import keys
-from common.bus.bus import Arrival, Bus, Caller
-from common.messages import Bumper, Done, Drive, PoseRequest
+from common.bus.bus import Arrival
+from common.messages import Bumper, Drive
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.waiting import PATIENCE_S, wait_until
 
@@ -65,22 +64,6 @@ def test_it_shows_our_messages(buses: BusFixture, watching: "subprocess.Popen[st
     assert shown["boot"] == bus.boot
 
 
-def test_it_shows_what_is_no_message_and_lives_on(
-    buses: BusFixture, watching: "subprocess.Popen[str]"
-) -> None:
-    key = f"t2/v1/{buses.robot}/tel/mine"
-    publisher: Any = buses.session().declare_publisher(
-        key
-    )  # annotated Any: its type hint declares a bool
-    wait_until(lambda: publisher.matching_status.matching, "the subscription")
-    publisher.put(b"\xc1")
-    publisher.delete()
-    publisher.put(b"\x81\xa1a\x01")
-    assert watching.stdout is not None
-    shown = [watching.stdout.readline() for _ in range(3)]
-    assert shown == [f"{key}: {each}\n" for each in ('{"not_msgpack": "c1"}', "null", '{"a": 1}')]
-
-
 def test_it_puts_a_message_that_we_understand(buses: BusFixture) -> None:
     received: list[Arrival[Drive]] = []
     buses.bus(lambda bus: bus.subscribe(keys.DRIVE, received.append, source="*"))
@@ -92,21 +75,3 @@ def test_it_puts_a_message_that_we_understand(buses: BusFixture) -> None:
     message = received[0].message
     assert (message.linear, message.echo, message.seq) == (0.25, 1, 1)
     assert message.boot != 0
-
-
-def test_it_makes_a_call(buses: BusFixture) -> None:
-    asked: list[PoseRequest] = []
-
-    def pose(request: PoseRequest, caller: Caller[Done]) -> None:
-        asked.append(request)
-        caller.reply(Done(text="moved"))
-
-    def declare(bus: Bus) -> None:
-        bus.serve(keys.SET_POSE, pose)
-
-    buses.bus(declare)
-    key = keys.SET_POSE.on(buses.robot)
-    words = ("--encoder", "t2", "--decoder", "t2", "-v", '{"x": 1}')
-    done = zenoh(buses, "get", "-s", key, *words)
-    assert '"text": "moved"' in done.stdout, done.stderr
-    assert asked == [PoseRequest(x=1.0)]

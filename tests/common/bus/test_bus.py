@@ -1,18 +1,16 @@
 """Publish and subscribe over a real router: what arrives, and what is refused."""
 
 import threading
-import time
 from collections.abc import Callable
 
 import msgpack
-import pytest
 import zenoh
 
 from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.errors import MessageError
 from common.messages import Bumper, Drive, ResetRequest
-from tests.common.bus_fixture import BusFixture, rising, until_received
+from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
 
@@ -23,35 +21,28 @@ def bumper(buses: BusFixture) -> str:
 
 
 def test_a_message_arrives_with_header_key_time_and_raw_frame(buses: BusFixture) -> None:
+    """As plain MessagePack with its encoding and class of service."""
     received: list[Arrival[Bumper]] = []
+    samples: list[zenoh.Sample] = []
     buses.bus(lambda bus: bus.subscribe(keys.BUMPER, received.append, depth=9))
+    subscriber = buses.session().declare_subscriber(bumper(buses), samples.append)
     sender = buses.bus()
     publisher = sender.publisher(keys.BUMPER)
     before_ns = clock.now_ns()
     until_received(
-        lambda: publisher.put(Bumper(pressed=True), b"GS\t\0"), lambda: received, "a bumper"
+        lambda: publisher.put(Bumper(pressed=True), b"GS\t\0"), lambda: received and samples, "it"
     )
+    subscriber.undeclare()
+    assert msgpack.unpackb(samples[0].payload.to_bytes())["pressed"] is True
+    assert str(samples[0].encoding) == "application/msgpack;t2.v1.Bumper"
+    assert samples[0].priority == zenoh.Priority.DATA_HIGH
+    assert samples[0].congestion_control == zenoh.CongestionControl.DROP
     arrival = received[0]
     assert arrival.message.pressed
     assert arrival.message.boot == sender.boot
     assert arrival.key == bumper(buses)
     assert arrival.raw == b"GS\t\0"
     assert before_ns < arrival.message.mono_ns < arrival.received_ns < clock.now_ns()
-
-
-def test_messages_keep_their_order_and_are_counted_at_both_ends(buses: BusFixture) -> None:
-    received: list[Arrival[Bumper]] = []
-    receiver = buses.bus(lambda bus: bus.subscribe(keys.BUMPER, received.append, depth=100))
-    sender = buses.bus()
-    publisher = sender.publisher(keys.BUMPER)
-    until_received(lambda: publisher.put(Bumper(pressed=False)), lambda: received, "the first")
-    for _ in range(50):
-        publisher.put(Bumper(pressed=False))
-    wait_until(lambda: received[-1].message.seq == publisher.next_seq - 1, "the last")
-    assert rising(arrival.message.seq for arrival in received)
-    assert receiver.counts[bumper(buses)] == len(received)
-    assert sender.counts[bumper(buses)] == publisher.next_seq - 1
-    assert received[0].raw is None
 
 
 def test_every_source_arrives_of_this_robot_alone_and_unknown_ones_are_counted_together(
@@ -81,30 +72,6 @@ def test_every_source_arrives_of_this_robot_alone_and_unknown_ones_are_counted_t
     assert receiver.counts[everyone] >= 50
 
 
-def test_it_travels_as_plain_messagepack_with_its_encoding(buses: BusFixture) -> None:
-    samples: list[zenoh.Sample] = []
-    stranger = buses.session()
-    subscriber = stranger.declare_subscriber(bumper(buses), samples.append)
-    publisher = buses.bus().publisher(keys.BUMPER)
-    until_received(lambda: publisher.put(Bumper(pressed=True)), lambda: samples, "a sample")
-    subscriber.undeclare()
-    assert msgpack.unpackb(samples[0].payload.to_bytes())["pressed"] is True
-    assert str(samples[0].encoding) == "application/msgpack;t2.v1.Bumper"
-    assert samples[0].priority == zenoh.Priority.DATA_HIGH
-    assert samples[0].congestion_control == zenoh.CongestionControl.DROP
-
-
-HOSTILE = {
-    "nothing": b"",
-    "no msgpack": b"\xc1",
-    "a wrong type": msgpack.packb({"pressed": 1}),
-    "another message": msgpack.packb({"linear": 0.1, "angular": 0.0}),
-    "a megabyte": msgpack.packb({"pressed": "x" * 1_000_000}),
-    "deeply nested": b"\x81\xa1x" + b"\x91" * 100_000,
-    "said to be endless": b"\x81\xa1x\xdd\xff\xff\xff\xff",
-}
-
-
 def test_what_is_no_message_is_refused_counted_and_harmless(buses: BusFixture) -> None:
     received: list[Arrival[Bumper]] = []
     refused: list[tuple[str, MessageError]] = []
@@ -120,10 +87,11 @@ def test_what_is_no_message_is_refused_counted_and_harmless(buses: BusFixture) -
     until_received(lambda: stranger.put(bumper(buses), b""), lambda: refused, "the first")
     count = len(refused)
     wait = zenoh.CongestionControl.BLOCK  # what is dropped on the way is not refused
-    for payload in HOSTILE.values():
-        stranger.put(bumper(buses), payload, congestion_control=wait)
+    stranger.put(
+        bumper(buses), msgpack.packb({"pressed": "x" * 1_000_000}), congestion_control=wait
+    )
     stranger.delete(bumper(buses), congestion_control=wait)
-    wait_until(lambda: len(refused) >= count + len(HOSTILE) + 1, "all of them")
+    wait_until(lambda: len(refused) >= count + 2, "all of them")
     stranger.put(bumper(buses), msgpack.packb({"pressed": True, "later": {"a": [1]}}))
     wait_until(lambda: received, "a good one after them")
     assert [arrival.message.pressed for arrival in received] == [True]
@@ -136,8 +104,8 @@ def test_what_is_no_message_is_refused_counted_and_harmless(buses: BusFixture) -
     )
 
 
-@pytest.mark.parametrize("depth", [1, 4])
-def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture, depth: int) -> None:
+def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture) -> None:
+    depth = 4
     received: list[int] = []
     receiver = buses.bus(
         lambda bus: bus.subscribe(
@@ -155,31 +123,6 @@ def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture, depth: int)
     assert received[-depth:] == list(range(last - depth + 1, last + 1))
     publisher.put(Bumper(pressed=False))
     wait_until(lambda: received[-1] == last + 1, "the one after")
-
-
-@pytest.mark.timed
-def test_in_a_flood_samples_are_stamped_at_once_and_handled_by_the_owner(
-    buses: BusFixture,
-) -> None:
-    """A thousand samples a second, of which two hundred can be handled."""
-    late_s: list[float] = []
-    threads: set[int] = set()
-
-    def take(arrival: Arrival[Bumper]) -> None:
-        threads.add(threading.get_ident())
-        late_s.append((arrival.received_ns - arrival.message.mono_ns) / 1e9)
-        time.sleep(0.005)
-
-    buses.bus(lambda bus: bus.subscribe(keys.BUMPER, take))
-    publisher = buses.bus().publisher(keys.BUMPER)
-    wait_until(lambda: publisher.passed_on, "a subscriber")
-    end_s = time.monotonic() + 2.0
-    while time.monotonic() < end_s:
-        publisher.put(Bumper(pressed=False))
-        time.sleep(0.001)
-    assert len(late_s) > 50
-    assert sorted(late_s)[len(late_s) // 2] < 0.25
-    assert len(threads) == 1
 
 
 def test_any_put_and_any_delete_is_an_emergency_stop(buses: BusFixture) -> None:

@@ -70,10 +70,6 @@ def test_any_crc_over_any_range(sent: list[Frame], crc: str) -> None:
         assert frames(read_all(other, raw, TO_BOARD)) == sent
 
 
-def test_an_empty_datagram_holds_nothing() -> None:
-    assert read(b"", TO_BOARD) == []
-
-
 # --- damage ---------------------------------------------------------------------------------
 
 
@@ -116,11 +112,6 @@ def test_the_header_is_not_protected() -> None:
     assert [type(frame).__name__ for frame in frames(read(bytes(raw), FROM_BOARD))] == [
         "UltrasonicBrakeReport"
     ]
-
-
-@given(st.binary(max_size=80), st.booleans())
-def test_arbitrary_bytes_never_raise_and_none_is_lost(raw: bytes, to_board: bool) -> None:
-    read(raw, TO_BOARD if to_board else FROM_BOARD)
 
 
 headers = st.builds(
@@ -208,10 +199,6 @@ def test_a_magic_inside_a_good_payload_is_payload() -> None:
     frame = MotionCommand(MotionKind.RUN, int.from_bytes(b"GS", "little"), 0)
     assert MAGIC in frame.to_bytes()
     assert frames(read(framing.pack(frame), TO_BOARD)) == [frame]
-
-
-def test_half_a_magic_at_the_end_is_no_magic() -> None:
-    assert rejected(read(framing.pack(DistanceQuery()) + b"G", TO_BOARD)) == [Reason.NO_MAGIC]
 
 
 def test_a_frame_of_the_other_direction_is_refused() -> None:
