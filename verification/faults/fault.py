@@ -9,15 +9,16 @@ import random
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median_low
-from typing import Literal
+from typing import Literal, get_args
 
 from cli.settings import Everything
 from common import clock
 from common.freshness import NS_PER_S
 from sim.trace import Command
 from verification.faults.stack_fixture import SPEED_MPS, Requirement, StackFixture
+from verification.harness.host import StallRecorder
 from verification.harness.trace import first_stop_s, last_move_s, moves
 from verification.harness.waiting import becomes_true
 
@@ -28,6 +29,8 @@ Budget = Callable[[Everything], float]  # s from the fault to the last command t
 Injector = Callable[[StackFixture], int | None]
 
 NOTICE_S = 0.05
+BEYOND_S = 0.25  # how long requests go on after the budget
+STALL_S = 0.05  # a longer stall of the host stops the vehicle, too; that needs no reset
 # After the fault, with motion still requested: the vehicle may only drive on by itself.
 HOLD_ON_S = 0.7
 REARM_S = 2.5
@@ -96,9 +99,14 @@ class Row:
     def violations(self) -> list[str]:
         """Return the violations of all samples."""
         allowed = " or ".join(self.fault.outcome)
+        efforts = get_args(Outcome)
+        stopped = efforts[efforts.index(self.fault.outcome[0]) : efforts.index("after a reset")]
         found = []
-        for sample, allowance_s in zip(self.samples, self.allowances_s, strict=True):
-            if sample.outcome not in self.fault.outcome:
+        for sample, stall_s, allowance_s in zip(
+            self.samples, self.stalls_s, self.allowances_s, strict=True
+        ):
+            by_stall = stall_s > STALL_S and sample.outcome in stopped
+            if sample.outcome not in self.fault.outcome and not by_stall:
                 found.append(f"{sample.outcome or 'does not drive again'}, not {allowed}")
             if sample.unrequested:
                 found.append("a motion command without a request")
@@ -133,6 +141,17 @@ def unrequested(commands: Sequence[Command]) -> bool:
     return any(
         moves(c) and not (0.0 <= c.linear <= SPEED_MPS + 0.01 and c.angular == 0.0)
         for c in commands
+    )
+
+
+def run_row(fixture: StackFixture, fault: Fault, stalls: StallRecorder, repeat: int = 1) -> Row:
+    """Run the trials of a fault; it outlasts its budget, which is longer on a slow host."""
+    budget_s = fault.budget(fixture.running.config) if fault.budget else None
+    if budget_s is not None:
+        fault = replace(fault, hold_s=max(fault.hold_s, budget_s + BEYOND_S))
+    samples = [run_trial(fixture, fault) for _ in range(repeat)]
+    return Row(
+        fault, budget_s, samples, [stalls.worst_s(it.fault_ns, fault.hold_s) for it in samples]
     )
 
 

@@ -1,22 +1,33 @@
 """Independent main board, written from the manual and the notes on its wire alone.
 
-It imports only the standard library: an error in T2's codec or simulator cannot hide here.
+``python -m verification.faults.independent_board PORT HOST_PORT HOST_PORT TRACE``
+
+It imports only the standard library: an error in T2's codec or simulator cannot hide here. It takes
+the simulator's place in a stack: it writes the motion commands that it receives to a trace, and
+lines on its standard input change it:
+
+- ``press BYTE PORT``: report this bumper byte at one of the host's ports, 0 or 1
+- ``wall METRES``: an obstacle ahead, seen by the front sonar; whoever drives into it is hit
+- ``roll SPEED``: roll at this speed while STOP is commanded
+- ``normal``: none of these
 
 Frame, little-endian: "GS", size, id, CRC-16/ARC of the payload, payload. Speeds are sign and
 magnitude in mm/s and 0.1 deg/s; counters are two's complement in mm and 0.1 deg.
 """
 
+import json
 import math
 import select
 import socket
 import struct
+import sys
 import threading
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
 
-MOTION, COUNTERS, SONARS, BUMPER = 0x7426, 0x7600, 0x7601, 0x7602
-SONAR_BRAKE, BUMPER_BRAKE, DRIVER = 0x7603, 0x7604, 0x7605
+MOTION, COUNTERS, SONARS, BUMPER, DRIVER = 0x7426, 0x7600, 0x7601, 0x7602, 0x7605
 KINDS = ("stop", "run", "brake")
 HEADER = struct.Struct("<2sHHH")
 
@@ -65,39 +76,14 @@ def magnitude(value: float) -> int:
     return size | 0x8000 if value < 0 and size else size
 
 
-@dataclass(frozen=True)
-class Command:
-    """A motion command, with the numbers of the wire."""
-
-    at_s: float
-    kind: str
-    linear: int  # mm/s
-    angular: int
-
-    @property
-    def moves(self) -> bool:
-        """Whether it moves the vehicle."""
-        return self.kind == "run" and (self.linear != 0 or self.angular != 0)
-
-
 class IndependentBoard:
-    """Board and vehicle on 127.0.0.1; its attributes may change while it runs."""
+    """Board and vehicle on 127.0.0.1."""
 
-    def __init__(self, port: int, host_ports: tuple[int, int]) -> None:
-        self.merge_s = 0.0  # for which frames wait for others, to share a datagram
-        self.ignores_stop = False  # only BRAKE takes speed away
-        self.rolls = 0.0  # m/s while STOP is commanded
-        self.wall_m: float | None = None  # distance at which an obstacle ends the way ahead
-
+    def __init__(self, port: int, host_ports: tuple[int, int], trace: TextIO) -> None:
         self.linear = self.angular = self.distance = self.heading = 0.0
-        self.brakes = {SONAR_BRAKE: False, BUMPER_BRAKE: False}
-        self.commands: list[Command] = []
-
-        self._bumper = [0, 0]  # by port of the host
-        self._command = Command(0.0, "stop", 0, 0)
-        self._host_ports = host_ports
-        self._off_until_s = self._flush_s = 0.0
-        self._waiting = [b"", b""]
+        self.normal()
+        self._command = ("stop", 0.0, 0.0)  # kind, m/s, rad/s
+        self._host_ports, self._trace = host_ports, trace
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self._ended = threading.Event()
@@ -110,21 +96,23 @@ class IndependentBoard:
         self._thread.join()
         self._socket.close()
 
-    def press(self, byte: int = 1, ports: tuple[int, ...] = (0, 1)) -> float:
-        """Report this bumper byte on these ports from now on; return the time."""
-        self._bumper = [byte if index in ports else 0 for index in (0, 1)]
-        return time.monotonic()
+    def normal(self) -> None:
+        """Free the bumper, remove the wall, hold the vehicle by STOP."""
+        self._bumper = [0, 0]  # by port of the host
+        self._wall_m = math.inf  # where the way ahead ends
+        self._rolls = 0.0  # m/s while STOP is commanded
 
-    def restart(self, off_s: float) -> None:
-        """Restart: brakes, command and counters are reset, and nothing is sent for a time."""
-        self._off_until_s = time.monotonic() + off_s
-        self._command = Command(0.0, "stop", 0, 0)
-        self.brakes = dict.fromkeys(self.brakes, False)
-        self.linear = self.angular = self.distance = self.heading = 0.0
+    def press(self, byte: str, port: str) -> None:
+        """Report a bumper byte at one port."""
+        self._bumper[int(port)] = int(byte)
 
-    def since(self, at_s: float) -> list[Command]:
-        """Return the motion commands since a time."""
-        return [command for command in list(self.commands) if command.at_s >= at_s]
+    def wall(self, metres: str) -> None:
+        """Place an obstacle ahead."""
+        self._wall_m = self.distance + float(metres)
+
+    def roll(self, speed: str) -> None:
+        """Roll while STOP is commanded."""
+        self._rolls = float(speed)
 
     def _run(self) -> None:
         report_s = step_s = time.monotonic()
@@ -133,32 +121,32 @@ class IndependentBoard:
             now_s = time.monotonic()
             if readable:
                 datagram, (_, port) = self._socket.recvfrom(2048)
-                self._receive(datagram, port, now_s)
+                self._receive(datagram, port)
             self._move(now_s - step_s)
             step_s = now_s
-            if now_s >= report_s and now_s >= self._off_until_s:
+            if now_s >= report_s:
                 report_s = max(report_s + VELOCITY_S, now_s)
-                self._report()
-            if now_s >= self._flush_s:
-                self._flush_s = now_s + self.merge_s
-                self._flush()
+                speeds = magnitude(self.linear * 1000), magnitude(self.angular * DECIDEGREES)
+                for index in (0, 1):
+                    self._send(frame(MOTION, struct.pack("<HH", *speeds)), index)
 
-    def _receive(self, datagram: bytes, port: int, now_s: float) -> None:
-        if now_s < self._off_until_s or port not in self._host_ports:
+    def _receive(self, datagram: bytes, port: int) -> None:
+        if port not in self._host_ports:
             return
         for command, payload in frames(datagram):
             if command == MOTION:
                 kind, linear, angular = struct.unpack("<BHH", payload)
-                self._command = Command(now_s, KINDS[kind], signed(linear), signed(angular))
-                self.commands.append(self._command)
-            else:
-                self._answer(command, payload)
+                self._command = KINDS[kind], signed(linear) / 1000, signed(angular) / DECIDEGREES
+                self._record(*self._command)
+                continue
+            for index in (0, 1):
+                self._send(frame(command, self._content(command, payload, index)), index)
 
-    def _answer(self, command: int, payload: bytes) -> None:
-        if command in self.brakes:
-            self.brakes[command] = bool(payload[0])
-        for index in (0, 1):
-            self._send(frame(command, self._content(command, payload, index)), index)
+    def _record(self, kind: str, linear: float, angular: float) -> None:
+        mono_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+        line = {"event": "command", "mono_ns": mono_ns, "kind": kind, "linear": linear}
+        self._trace.write(json.dumps(line | {"angular": angular}) + "\n")
+        self._trace.flush()
 
     def _content(self, command: int, payload: bytes, index: int) -> bytes:
         if command == COUNTERS:
@@ -170,46 +158,49 @@ class IndependentBoard:
             return bytes([self._bumper[index]])
         if command == DRIVER:
             return payload + bytes(4)
-        return payload
+        return payload  # of a brake: its echo
 
     def _ranges(self) -> list[int]:
         ranges = [NO_ECHO_MM] * 8
-        if self.wall_m is not None:
-            ranges[FRONT] = max(1, round(1000 * (self.wall_m - self.distance)))
+        if math.isfinite(self._wall_m):
+            ranges[FRONT] = max(1, round(1000 * (self._wall_m - self.distance)))
         return ranges
 
-    def _report(self) -> None:
-        speeds = magnitude(self.linear * 1000), magnitude(self.angular * DECIDEGREES)
-        for index in (0, 1):
-            self._send(frame(MOTION, struct.pack("<HH", *speeds)), index)
-
     def _send(self, content: bytes, index: int) -> None:
-        self._waiting[index] += content
-        if not self.merge_s:
-            self._flush()
-
-    def _flush(self) -> None:
-        for index, port in enumerate(self._host_ports):
-            if self._waiting[index]:
-                self._socket.sendto(self._waiting[index], ("127.0.0.1", port))
-                self._waiting[index] = b""
+        self._socket.sendto(content, ("127.0.0.1", self._host_ports[index]))
 
     def _move(self, step_s: float) -> None:
-        command = self._command
-        if command.kind == "brake":
-            self._approach(0.0, 0.0, BRAKE * step_s)
-        elif command.kind == "run":
-            linear, angular = command.linear / 1000, command.angular / DECIDEGREES
+        kind, linear, angular = self._command
+        if kind == "run":
             self._approach(linear, angular, ACCELERATION * step_s)
-        elif not self.ignores_stop:
-            self._approach(self.rolls, 0.0, COAST * step_s)
+        elif kind == "brake":
+            self._approach(0.0, 0.0, BRAKE * step_s)
+        else:
+            self._approach(self._rolls, 0.0, COAST * step_s)
         self.distance += self.linear * step_s
         self.heading += self.angular * step_s
-        if self.wall_m is not None and self.distance > self.wall_m:
-            self.distance, self.linear = self.wall_m, 0.0
-            self.press()
+        if self.distance > self._wall_m:
+            self.distance, self.linear = self._wall_m, 0.0
+            self._bumper = [1, 1]
 
     def _approach(self, linear: float, angular: float, most: float) -> None:
         self.linear += max(-most, min(most, linear - self.linear))
         turn = TURNING * most
         self.angular += max(-turn, min(turn, angular - self.angular))
+
+
+def main() -> None:
+    """Run a board until standard input ends."""
+    port, first, second = map(int, sys.argv[1:4])
+    with Path(sys.argv[4]).open("w", encoding="utf-8") as trace:
+        board = IndependentBoard(port, (first, second), trace)
+        sys.stdout.write('{"event": "started"}\n')
+        sys.stdout.flush()
+        for line in sys.stdin:
+            what, *values = line.split()
+            getattr(board, what)(*values)
+        board.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,10 +1,9 @@
 """``python -m verification.faults.programs ENDPOINT NAME``: the programs beside the stack.
 
-``driver`` and ``keyboard`` read speeds in m/s from standard input, one a line.
+``driver`` reads speeds in m/s from standard input, one a line.
 """
 
 import contextlib
-import select
 import socket
 import sys
 import threading
@@ -12,10 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 
 from verification.faults.independent_client import Client, Source, session
-from verification.harness.teleop_terminal import STRICT, Terminal, terminal
 
-REPEAT_S = 0.03  # of a held key
-FIFTH_GEAR = "5"
 PER_MS = 20  # datagrams of the flood
 
 
@@ -47,34 +43,6 @@ def pendant(endpoint: str) -> None:
         threading.Event().wait()
 
 
-def keyboard(endpoint: str) -> None:
-    """Run teleop in a terminal; a speed above zero holds W in the fifth gear until a zero.
-
-    ``stall SECONDS`` stalls the terminal in both directions. Ends with teleop or with its input.
-    """
-    held = False
-    with terminal(endpoint, *STRICT) as teleop, open(0, "rb", buffering=0) as stdin:
-        while not teleop.shows(b"ESTOP") and not teleop.ends():
-            time.sleep(REPEAT_S)
-        teleop.type(FIFTH_GEAR)
-        while not teleop.ends():
-            if select.select([stdin], [], [], REPEAT_S)[0]:
-                line = stdin.readline()
-                if not line:
-                    return
-                held = _execute(line, teleop, held)
-            if held:
-                teleop.type("w")
-
-
-def _execute(line: bytes, teleop: Terminal, held: bool) -> bool:
-    """Execute a line; return whether the key is held afterwards."""
-    if line.startswith(b"stall "):
-        teleop.stall(float(line.removeprefix(b"stall ")))
-        return held
-    return float(line) > 0
-
-
 def flood(address: str) -> None:
     """Send 20 000 datagrams/s to an address, host:port."""
     host, _, port = address.partition(":")
@@ -90,7 +58,7 @@ def flood(address: str) -> None:
 
 
 PROGRAMS: Mapping[str, Callable[[str], None]] = {
-    program.__name__: program for program in (driver, keyboard, limiter, pendant, flood)
+    program.__name__: program for program in (driver, limiter, pendant, flood)
 }
 
 if __name__ == "__main__":

@@ -32,8 +32,8 @@ from verification.harness.waiting import becomes_true
 
 # What a fault needs beside or in place of the usual stack.
 Requirement = Literal[
-    "none", "teleop", "remote driver", "third parties", "small disk", "separate clocks", "relay",
-    "site",
+    "none", "remote driver", "third parties", "small disk", "separate clocks", "relay", "site",
+    "independent board",
 ]  # fmt: skip
 # Reach the speed sooner. No time limit changes.
 QUICK = ["safety.unsafe_overrides=linear_acceleration", "safety.linear_acceleration=5"]
@@ -50,6 +50,7 @@ NORMAL = (
 MODULE = [sys.executable, "-m"]
 PROGRAMS = [*MODULE, "verification.faults.programs"]
 REMOTE_HOST = "verification.faults.remote_host"
+INDEPENDENT_BOARD = "verification.faults.independent_board"
 (PC, RELAY_TO_PC), (BOARD, RELAY_TO_BOARD) = RELAY_CABLES.values()
 RELAY_PORT = 4010  # of its reports
 SIM_BEHIND_RELAY = [
@@ -81,11 +82,11 @@ class StackFixture:
         """Disturb the packets between a remote driver and the robot from now on."""
         self.send_line(msgspec.json.encode(faults))
 
-    def send_line(self, line: bytes) -> None:
-        """Send a line to the driver process."""
-        pipe = self.running.processes["driver"].stdin
+    def send_line(self, line: bytes, name: str = "driver") -> None:
+        """Send a line to a process."""
+        pipe = self.running.processes[name].stdin
         assert pipe is not None
-        with contextlib.suppress(OSError):  # the driver may be dead
+        with contextlib.suppress(OSError):  # it may be dead
             pipe.write(line + b"\n")
             pipe.flush()
 
@@ -159,6 +160,12 @@ class StackFixture:
         for clock_file in (self.folder / name for name in CLOCKS):
             if clock_file.exists():
                 step_clock(clock_file, 0)
+        self._restore_board()
+
+    def _restore_board(self) -> None:
+        if INDEPENDENT_BOARD in self.running.commands["sim"]:
+            self.send_line(b"normal", "sim")
+            return
         for request in NORMAL:
             self.running.control.do(request)
         if abs(self.running.control.truth().x) > ROOM_M:
@@ -189,7 +196,7 @@ def _settings(need: Requirement) -> list[str]:
 def _beside(need: Requirement, folder: Path, config: Everything) -> dict[str, list[str]]:
     """Return the commands of the driver, and of the processes that a requirement adds."""
     endpoint = operators_endpoint(config)
-    driver = [*PROGRAMS, endpoint, "keyboard" if need == "teleop" else "driver"]
+    driver = [*PROGRAMS, endpoint, "driver"]
     if need == "remote driver":
         driver = [*MODULE, REMOTE_HOST, endpoint, PROGRAMS[-1], "driver"]
     if need == "separate clocks":
@@ -205,6 +212,11 @@ def _beside(need: Requirement, folder: Path, config: Everything) -> dict[str, li
     if need == "site":
         made["site router"] = [*MODULE, "cli", "router", "--set", f"bus.listen={endpoint}"]
     return made
+
+
+def _independent_board(config: Everything) -> list[str]:
+    ports = (config.board.port, *config.board.listen_ports)
+    return [*MODULE, INDEPENDENT_BOARD, *map(str, ports)]
 
 
 @contextlib.contextmanager
@@ -225,6 +237,7 @@ def stack_fixture(
                 profiles=[QUICK_MOTORS],
                 sim_sets=SIM_BEHIND_RELAY if need == "relay" else (),
                 beside=partial(_beside, need, folder),
+                board=_independent_board if need == "independent board" else None,
                 log="disk/log.jsonl" if need == "small disk" else "log.jsonl",
                 listen=f"tcp/{'0.0.0.0' if need == 'remote driver' else '127.0.0.1'}:{{port}}",
                 env=os.environ | clock(folder / CLOCKS[0]) if need == "separate clocks" else None,

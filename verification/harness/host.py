@@ -34,11 +34,6 @@ def description() -> str:
     return f"{model}, {os.cpu_count()} cores, Linux {platform.release()}"
 
 
-def short_description() -> str:
-    """Return architecture, number of cores and kernel."""
-    return f"{platform.machine()}, {os.cpu_count()} cores, Linux {platform.release()}"
-
-
 class StallRecorder:
     """Records how long the host keeps a process that only sleeps from running.
 

@@ -94,6 +94,7 @@ def running_stack(
     log: str = "log.jsonl",
     env: Mapping[str, str] | None = None,
     route: Callable[[Sequence[str]], list[str]] | None = None,
+    board: Callable[[Everything], list[str]] | None = None,
     sim_sets: Sequence[str] = (),
     beside: Callable[[Everything], Mapping[str, list[str]]] | None = None,
 ) -> Iterator[RunningStack]:
@@ -103,7 +104,8 @@ def running_stack(
     they are. ``profiles`` are those of the simulated vehicle, ``sim_sets`` settings of the
     simulator alone. ``listen`` is where the router listens, the endpoint of the services first;
     ``log`` is a file in the folder. ``route`` returns the command of another router, zenohd, for
-    these settings. ``beside`` returns the commands of further processes, which are not waited for.
+    these settings, ``board`` that of another board, without the file of the trace. ``beside``
+    returns the commands of further processes, which are not waited for.
     """
     control = free_port(socket.SOCK_DGRAM)
     sets = _all_settings(sets, shipped, listen, control)
@@ -115,6 +117,8 @@ def running_stack(
         made["router"] = route(sets)
     trace_file = folder / "trace.jsonl"
     made["sim"] += ["--trace", str(trace_file), *set_options(*sim_sets)]
+    if board:
+        made["sim"] = [*board(config), str(trace_file)]
     services = sum(command[0] == sys.executable for command in made.values())
     made |= beside(config) if beside else {}
     it = RunningStack(

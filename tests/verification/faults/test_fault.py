@@ -1,13 +1,14 @@
 """Rows of the fault campaign: reaction times, violations, the page."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from common import motion
 from sim.trace import Command
 from verification.faults.__main__ import lines_of, page
-from verification.faults.fault import Fault, Row, Sample, unrequested
+from verification.faults.fault import STALL_S, Fault, Outcome, Row, Sample, unrequested
 
 RUN, STOP, BRAKE = motion.Command
 FAULT = Fault("it", lambda _: 0, ("after a neutral",))
@@ -25,6 +26,12 @@ def sample(stopped_s: float | None = 0.01, moved_s: float = 0.0, **rest: object)
 
 def row(*samples: Sample, budget_s: float | None = 0.02, stall_s: float = 0.0) -> Row:
     return Row(FAULT, budget_s, samples, [stall_s] * len(samples))
+
+
+def stalled(allowed: Outcome, outcome: Outcome) -> Row:
+    """Return a row in whose sample the host stalled."""
+    made = replace(FAULT, outcome=(allowed,))
+    return Row(made, None, [sample(outcome=outcome)], [2 * STALL_S])
 
 
 @pytest.mark.parametrize(
@@ -58,6 +65,10 @@ def test_both_the_first_stop_and_the_last_move_count() -> None:
         (row(sample(0.025, death_s=0.004)), ["25.0 ms, 24.0 ms are allowed"]),
         (row(sample(None), budget_s=None), []),
         (row(sample(outcome="by itself")), ["by itself, not after a neutral"]),
+        (stalled("drives on", "after a neutral"), []),
+        (stalled("after a neutral", "by itself"), ["by itself, not after a neutral"]),
+        (stalled("drives on", "after a reset"), ["after a reset, not drives on"]),
+        (stalled("after a reset", "after a neutral"), ["after a neutral, not after a reset"]),
         (row(sample(outcome=None)), ["does not drive again, not after a neutral"]),
         (row(sample(unrequested=True)), ["a motion command without a request"]),
         (row(sample(ended=("odom",))), ["odom ended"]),
@@ -72,7 +83,7 @@ def test_the_page_has_the_rows_of_the_catalogue() -> None:
     assert good == (
         "| it | 2 | 20.0 ms | 1.0 ms | 2.0 ms | 0.0 ms | after a neutral | 2026-01-02 | ok |"
     )
-    lines = {"estop": good.replace("it", "estop", 1), "rolling away": "| rolling away | ok |"}
+    lines = {name: good.replace("it", name, 1) for name in ("estop", "contact")}
     text = page(lines | {"no such row": good})
     assert lines_of(text).items() >= lines.items()
     assert "no such row" not in text
