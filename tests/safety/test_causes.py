@@ -73,6 +73,7 @@ def test_order_and_groups_of_the_table() -> None:
     lasting = {name for name, _, clears in TABLE if clears is not AT_ONCE}
     assert {name for name in names if wants_neutral(name)} == lasting
     assert lasting | {"two_publishers"} == BARRING
+    assert not any(name in BARRING for name, action, _ in TABLE if action == "slow")
 
 
 # --- held causes ----------------------------------------------------------------------------

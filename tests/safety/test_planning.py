@@ -87,33 +87,6 @@ def test_a_flank_does_not_move_along_its_axis(field: Zones, name: str, along: fl
     )
 
 
-@given(st.floats(0.0, 6.0), st.floats(0.0, 6.0))
-def test_nearer_is_never_faster(field: Zones, one: float, other: float) -> None:
-    near, far = sorted((one, other))
-    assert field.allowed(near) <= field.allowed(far)
-
-
-@pytest.mark.parametrize(
-    ("name", "twist", "approach"),
-    [
-        ("front", Twist(1.0, 0.0), 1.0),
-        ("rear", Twist(1.0, 0.0), -1.0),
-        ("front_left", Twist(1.0, 0.0), math.sqrt(0.5)),
-        ("rear_right", Twist(-1.0, 0.0), math.sqrt(0.5)),
-        ("front", Twist(0.0, 1.0), 0.0),
-        ("front_left", Twist(0.0, 1.0), (0.55 - 0.35) * math.sqrt(0.5)),
-        ("front_right", Twist(0.0, 1.0), (0.35 - 0.55) * math.sqrt(0.5)),
-        ("left", Twist(0.0, 1.0), 0.55),
-        ("left", Twist(0.0, -1.0), 0.55),
-        ("right", Twist(0.0, 1.0), 0.55),
-        ("left", Twist(1.0, 0.0), 0.0),
-    ],
-)
-def test_how_fast_a_sonar_closes_in(field: Zones, name: str, twist: Twist, approach: float) -> None:
-    axis = field.axes[SONAR_NAMES.index(name)]
-    assert axis.approach(twist) == pytest.approx(approach, abs=1e-12)
-
-
 def test_a_wall_at_the_flank_lets_the_vehicle_pass_but_not_turn(field: Zones) -> None:
     wall = only("left", 0.1)
     assert field.limit(Twist(1.0, 0.0), wall).factor == 1.0

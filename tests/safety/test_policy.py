@@ -9,10 +9,8 @@ from msgspec.structs import replace as with_fields
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import (
-    SONAR_NAMES,
     Bumper,
     Direction,
-    Drive,
     Limits,
     Mileage,
     SafetyState,
@@ -21,8 +19,8 @@ from common.messages import (
 )
 from common.motion import STILL, Twist
 from services.safety.config import Safety
-from services.safety.core.causes import BY_NAME, FAILURES, RULES, Clears, Held, latched
-from services.safety.core.inputs import DriveRequest, Inputs
+from services.safety.core.causes import FAILURES, RULES, Held, latched
+from services.safety.core.inputs import Inputs
 from tests.safety.policy_fixture import TICK_S, PolicyFixture, hit, link
 
 
@@ -100,17 +98,6 @@ def test_a_latched_trip_holds_until_a_reset_and_a_neutral_request(
     assert fixture.drive().command == "run"
 
 
-@pytest.mark.parametrize(("cause", "command", "trip", "cure"), LATCHING)
-def test_a_reset_is_refused_while_the_cause_is_there(
-    cause: str, command: str, trip: Trip, cure: Trip
-) -> None:
-    fixture = PolicyFixture().running()
-    trip(fixture)
-    fixture.tick(30)
-    assert fixture.state.latches[cause].good >= 3 or "Still present" in fixture.reset()
-    assert fixture.verdict.command == command
-
-
 def test_one_hit_sample_is_enough_and_three_clear_ones_are_needed() -> None:
     fixture = PolicyFixture().running()
     fixture.linear = 0.0
@@ -130,24 +117,19 @@ def test_one_hit_sample_is_enough_and_three_clear_ones_are_needed() -> None:
     assert fixture.reset() == ""
 
 
-def test_velocities_that_fall_silent_stop_the_vehicle_and_need_no_reset() -> None:
-    fixture = PolicyFixture().running()
-    fixture.muted = {"velocity"}
-    assert fixture.drive(0.5, seconds=0.2).command == "run"
-    assert fixture.drive(0.5, seconds=0.02).name == "inhibited"
-    assert fixture.state.latches["silent"].text == "No recent data: velocity."
-    fixture.muted = set()
-    assert fixture.drive(0.5, seconds=1.0).name == "inhibited"
-    assert fixture.drive().command == "run"
-
-
 def test_inputs_that_fail_again_and_again_latch() -> None:
     fixture = PolicyFixture().ready()
     for _ in range(int(FAILURES)):
-        fixture.muted = {"bumper"}
-        fixture.tick(10)
-        fixture.muted = set()
+        assert "flapping" not in fixture.state.latches
         fixture.tick(40)
+        fixture.muted = {"bumper"}
+        while "bumper" not in fixture.state.latches:
+            fixture.tick()
+        fixture.muted = set()
+    held, now_ns = fixture.state.latches["flapping"], fixture.now_ns
+    assert held == Held(now_ns, now_ns, 0, (0, now_ns), "Inputs failed repeatedly.", held.id)
+    assert held.id // len(RULES) == fixture.state.decision
+    fixture.tick(40)
     assert latched(fixture.state.latches) == ("flapping",)
     assert fixture.drive().command == "stop"
     fixture.tick(20)
@@ -261,30 +243,11 @@ def test_a_bridge_that_started_anew_wants_a_neutral_request() -> None:
     assert fixture.drive().command == "run"
 
 
-def test_what_was_judged_is_the_newest_bumper_sample() -> None:
-    fixture = PolicyFixture().ready()
-    fixture.tick()
-    assert fixture.verdict.acked == (fixture.boot, fixture.seq)
-
-
 def test_leaving_stops() -> None:
     fixture = PolicyFixture().running()
     fixture.inputs = replace(fixture.inputs, leaving=True)
     assert fixture.decide().command == "stop"
     assert fixture.drive(0.5).command == "stop"
-
-
-def test_the_switches_may_be_accepted_as_missing() -> None:
-    settings = Safety(require_switches=False, unsafe_overrides=("require_switches",))
-    fixture = PolicyFixture(settings)
-    fixture.switches = Switches()
-    assert fixture.ready().verdict.command == "run"
-
-
-def test_every_cause_of_the_table_can_be_reported() -> None:
-    for rule in BY_NAME.values():
-        assert rule.text.endswith(".")
-        assert rule.action != "slow" or rule.clears is Clears.AT_ONCE
 
 
 def test_an_emergency_stop_that_only_the_bridge_received_latches_and_is_acknowledged() -> None:
@@ -322,15 +285,6 @@ def test_a_stall_in_which_an_emergency_stop_may_be_missed_latches(
     assert latched(fixture.state.latches) == names
 
 
-def test_two_publishers_of_a_source_that_is_not_in_control_stop_nothing() -> None:
-    fixture = PolicyFixture().running(0.3)
-    for boot in (1, 2, 1, 2):
-        drive = Drive(linear=0.0, angular=0.0, echo=fixture.echo, seq=boot, boot=boot)
-        fixture.decide(DriveRequest("nav", drive, fixture.now_ns))
-        assert fixture.drive(0.3, seconds=0.1).command == "run"
-    assert fixture.drive(0.3).source == "teleop"
-
-
 def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_request() -> None:
     fixture = PolicyFixture().running(0.3)
     state = SafetyState(
@@ -347,30 +301,6 @@ def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_reque
     assert fixture.drive(0.3, seconds=1.0).command == "stop"
     fixture.drive()
     assert fixture.drive(0.3).command == "run"
-
-
-def test_a_decision_without_a_request_refuses_none() -> None:
-    fixture = PolicyFixture().ready()
-    assert fixture.decide().refused == ""
-
-
-def test_an_old_velocity_is_no_runaway() -> None:
-    fixture = PolicyFixture().ready()
-    fixture.linear = 0.9
-    fixture.tick()
-    fixture.muted = {"velocity"}
-    fixture.tick(40)
-    assert "silent" in fixture.state.latches
-    assert "runaway" not in fixture.state.latches
-
-
-def test_a_reading_that_stays_the_same_while_driving_limits_to_the_creep_speed() -> None:
-    fixture = PolicyFixture()
-    fixture.sonar(front=3.0)
-    assert fixture.ready().drive(0.3, seconds=1.0).name == "run"
-    assert fixture.drive(0.3, seconds=1.5).name == "slow"
-    assert fixture.state.sonar_array.sonars[SONAR_NAMES.index("front")].suspect
-    assert fixture.verdict.twist.linear == pytest.approx(0.15)
 
 
 def test_being_pushed_off_the_bumper_uses_up_no_way() -> None:
@@ -394,22 +324,6 @@ def test_a_runaway_is_one_of_either_axis(linear: float, angular: float, trips: b
     assert "runaway" not in fixture.state.latches
     fixture.drive(0.5, 0.5, seconds=0.04)
     assert ("runaway" in fixture.state.latches) is trips
-
-
-def test_two_publishers_are_named() -> None:
-    fixture = PolicyFixture().running()
-    fixture.driver_boot, fixture.driver_seq = 100, 0
-    fixture.request(0.5)
-    held = fixture.state.latches["two_publishers"]
-    assert held.text == "Two publishers use teleop."
-    assert held.token == (0, fixture.now_ns)
-
-
-def test_what_no_sample_shows_is_known_by_the_time() -> None:
-    fixture = PolicyFixture().running(0.5)
-    fixture.linear = 0.9
-    fixture.drive(0.5, seconds=0.4)
-    assert fixture.state.latches["runaway"].token == (0, fixture.now_ns)
 
 
 def test_the_first_bumper_sample_follows_none() -> None:
@@ -449,39 +363,12 @@ def test_a_held_cause_knows_since_when() -> None:
     fixture.tick(lease_ticks)
     assert "no_request" not in fixture.state.latches
     fixture.tick()
-    since_ns = fixture.now_ns
+    since_ns, decision = fixture.now_ns, fixture.state.decision
     fixture.tick(3)
     now_ns = fixture.now_ns
     held = fixture.state.latches["no_request"]
     assert held == Held(since_ns, now_ns, 0, (0, now_ns), "No source requests motion.", held.id)
-
-
-def test_flapping_knows_since_when() -> None:
-    fixture = PolicyFixture().ready()
-    for _ in range(int(FAILURES)):
-        fixture.tick(40)
-        fixture.muted = {"bumper"}
-        fixture.tick(9)
-        fixture.muted = set()
-    held = fixture.state.latches["flapping"]
-    assert fixture.now_ns - NS_PER_S // 10 < held.since_ns < held.bad_ns == fixture.now_ns
-    assert held.token == (0, fixture.now_ns)
-
-
-def test_a_cause_is_identified_by_the_decision_in_which_it_began() -> None:
-    fixture = PolicyFixture().ready()
-    for _ in range(int(FAILURES)):
-        fixture.tick(40)
-        fixture.muted = {"bumper"}
-        for _ in range(9):
-            fixture.tick()
-            if "flapping" in fixture.state.latches:
-                break
-        else:
-            fixture.muted = set()
-    for name in ("flapping", "no_request"):
-        assert fixture.state.latches[name].id // len(RULES) > 0
-    assert fixture.state.latches["flapping"].id // len(RULES) == fixture.state.decision
+    assert held.id // len(RULES) == decision
 
 
 def test_room_is_not_looked_for_while_motion_is_barred() -> None:
@@ -501,16 +388,6 @@ def test_a_request_that_is_stopped_commands_no_motion() -> None:
     assert fixture.tick().name == "inhibited"  # time has passed, so that a ramp would have begun
     assert "neutral" in fixture.state.latches
     assert fixture.verdict.twist == STILL
-
-
-def test_nothing_creeps_while_two_publishers_are_active() -> None:
-    fixture = hit()
-    assert fixture.hold() == ""
-    assert "release" in fixture.state.latches
-    fixture.driver_boot, fixture.driver_seq = 100, 0
-    assert fixture.request(0.0).refused == "second_publisher"
-    assert fixture.verdict.command == "brake"  # the release ends, and the bumper is still pressed
-    assert "release" not in fixture.state.latches
 
 
 @pytest.mark.parametrize("latched_by", [None, 41])
@@ -624,10 +501,6 @@ def test_a_successor_without_a_link_sample_names_no_predecessor() -> None:
     assert (motion.latched, motion.predecessor) == (True, None)
 
 
-def test_without_a_latch_a_successor_needs_no_reset() -> None:
-    successor(latched_by=None).ready()
-
-
 @pytest.mark.parametrize("first", ["bumper", "link"])
 def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str) -> None:
     fixture = successor(latched_by=OLD)
@@ -650,18 +523,3 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
     assert release is not None
     assert release.left == 0.0
     assert fixture.reset() == f"Still present: The bumper was hit. {UNKNOWN}"
-
-
-def test_the_next_contact_after_a_reset_has_a_release_again() -> None:
-    fixture = successor(latched_by=OLD)
-    fixture.pressed = True
-    fixture.tick(50)
-    fixture.link = with_fields(fixture.link, latched_by=OWN)
-    fixture.pressed = False
-    fixture.tick(10)
-    assert fixture.reset() == ""
-    assert latched(fixture.state.latches) == ()
-    fixture.pressed = True
-    fixture.let_go(5)
-    assert fixture.hold() == ""
-    assert fixture.tick(3).command == "run"

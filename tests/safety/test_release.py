@@ -1,13 +1,12 @@
 """Moving off a pressed bumper, through the whole decision."""
 
-import math
 from collections.abc import Callable
 
 import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Direction, Mileage, ReleaseRequest
+from common.messages import Direction, ReleaseRequest
 from services.safety.core.causes import BY_NAME, latched
 from services.safety.core.operator_requests import BUMPER_FREE, LET_GO, room
 from tests.safety.policy_fixture import (
@@ -148,13 +147,6 @@ def test_only_an_operator_releases() -> None:
     fixture.let_go()
     assert fixture.hold("backward", 5) == ""
     assert fixture.request(source="nav", release="forward").twist.linear < 0  # of lower priority
-
-
-def test_a_reset_due_of_a_fault_that_is_there_is_not_offered() -> None:
-    fixture = hit()
-    fixture.left_bits = 1
-    fixture.tick(3)
-    assert fixture.hold() == fixture.state.latches["driver_left"].text
 
 
 # --- beginning, ending ---------------------------------------------------------------------------
@@ -359,24 +351,6 @@ def test_the_advice_names_only_the_direction_that_is_left(
     assert fixture.reset() == f"Still present: The bumper was hit. {advice}"
 
 
-def test_the_direction_that_moved_is_forbidden_not_the_one_held_next() -> None:
-    fixture = hit()
-    fixture.hold("backward", 10)
-    fixture.let_go(3)
-    assert fixture.hold("forward") == ""
-    press_anew(fixture)  # before anything moves forward
-    assert fixture.state.release.forbidden == {"backward"}
-
-
-def test_a_press_long_after_a_release_forbids_nothing() -> None:
-    fixture = hit()
-    fixture.hold("backward", 10)
-    press_anew(fixture, 60)
-    fixture.let_go()
-    assert fixture.hold("backward", 5) == ""
-    assert fixture.verdict.command == "run"
-
-
 def test_a_reset_and_a_new_contact_have_the_way_anew() -> None:
     fixture = hit()
     fixture.hold("backward", 30)
@@ -461,18 +435,3 @@ def test_a_second_contact_looks_at_the_travel_between() -> None:
     assert release is not None
     assert release.believed_free == "forward"
     assert release.travelled == pytest.approx(-1.0)
-
-
-@pytest.mark.parametrize("distance", [math.nan, math.inf])
-def test_counters_that_are_no_numbers_stop_no_release_and_free_no_way(distance: float) -> None:
-    fixture = hit()
-    fixture.distance = distance
-    fixture.muted = {"mileage"}
-    fixture.put("mileage", Mileage(distance=distance, heading=0.0, epoch=0))
-    while not fixture.hold():
-        fixture.tick()
-    assert fixture.state.release.refusal == USED_UP_TEXT
-    release = fixture.published().release
-    assert release is not None
-    assert release.believed_free == "backward"
-    assert math.isfinite(release.travelled)

@@ -131,14 +131,3 @@ def test_the_direction_that_moved_is_forbidden() -> None:
     assert ramp.after(held(1), TOUCHED, 0).forbidden == {"backward"}
     forward = moving(moved, sent=Twist(0.01))
     assert forward.after(held(1), TOUCHED, 0).forbidden == {"forward"}
-
-
-def test_both_directions_can_be_forbidden() -> None:
-    one = moving(BACKWARD).after(held(1), TOUCHED, 0)
-    both = moving(replace(one, direction="forward")).after(held(1), TOUCHED, 0)
-    assert both.forbidden == {"forward", "backward"}
-
-
-def test_a_restart_of_safety_leaves_nothing_to_travel() -> None:
-    assert Release(unknown=True).left(0.15) == 0.0
-    assert Release(integrated=0.05).left(0.15) == pytest.approx(0.1)

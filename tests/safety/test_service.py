@@ -9,7 +9,7 @@ import pytest
 import zenoh
 from msgspec.structs import replace
 
-from common import codec, keys, realtime
+from common import clock, codec, keys, realtime
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink
 from common.bus.session import client_config
@@ -249,3 +249,22 @@ def test_what_the_bridge_measures_is_not_taken_from_the_router(endpoint: str) ->
             lambda: seen.motions and seen.motions[-1].command == "brake",
             "what comes by the drive link",
         )
+
+
+def test_bumper_samples_without_news_are_decided_on_in_time_and_not_one_by_one(
+    endpoint: str,
+) -> None:
+    node = make_node(endpoint)
+    with contextlib.closing(node.loop):
+        service = SafetyService(node, node.open_bus())
+
+        def decisions(seq: int, *, pressed: bool = False, lost: int = 0) -> int:
+            before = service._state.decision
+            bumper = Bumper(pressed=pressed, lost=lost, seq=seq, boot=5)
+            service._on_bumper(Arrival(bumper, "", clock.now_ns(), None))
+            assert "bumper" not in service._state.latches  # no sample seems lost
+            return service._state.decision - before
+
+        assert [decisions(seq) for seq in range(1, 9)] == [1, 0, 0, 1, 0, 0, 1, 0]
+        assert [decisions(9, pressed=True), decisions(10, pressed=True)] == [1, 1]
+        assert [decisions(11), decisions(12), decisions(13, lost=1)] == [1, 0, 1]

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from msgspec.structs import replace
 
 from common import codec
@@ -141,8 +142,8 @@ def test_values_that_are_not_finite_are_refused(value: float) -> None:
     assert limit(LIMITS, angular=value) == (LIMITS, "not_finite")
 
 
-@pytest.mark.parametrize(("seq", "reason"), [(4, "seq_not_rising"), (5, "seq_not_rising"), (6, "")])
-def test_seq_rises_within_its_boot(seq: int, reason: str) -> None:
+@pytest.mark.parametrize(("seq", "reason"), [(5, "seq_not_rising"), (6, "")])
+def test_each_kind_is_checked_against_its_channel(seq: int, reason: str) -> None:
     channels: list[tuple[Any, Any]] = [(request, DRIVES), (limit, LIMITS), (keep, KEPT)]
     for accept, empty in channels:
         before, _ = accept(empty, seq=5)
@@ -151,65 +152,67 @@ def test_seq_rises_within_its_boot(seq: int, reason: str) -> None:
         assert (after == before) == bool(reason)
 
 
-@pytest.mark.parametrize("seq", [0, 1, 9])
-def test_a_new_boot_counts_anew(seq: int) -> None:
-    arbiter, _ = request(DRIVES, seq=5)
-    arbiter, refused = request(arbiter, TELEOP_NS + 1, boot=2, seq=seq)
-    assert refused == ""
-    assert request(arbiter, TELEOP_NS + 1, boot=2, seq=seq)[1] == "seq_not_rising"
+class Publishers(RuleBasedStateMachine):
+    """Two publishers on one channel, whose numbers rise or not: what counts, and for how long."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now_ns = NS_PER_S
+        self.channel = DriveChannel()
+        self.owner: tuple[int, int, int] | None = None  # boot, seq, time
+        self.conflict_ns: int | None = None
+
+    def expected(self, boot: int, seq: int) -> str:
+        if self.owner is None:
+            return ""
+        age_ns = self.now_ns - self.owner[2]
+        if boot != self.owner[0]:
+            return "second_publisher" if age_ns <= TELEOP_NS else ""
+        return "seq_not_rising" if seq <= self.owner[1] and age_ns <= AGE_NS else ""
+
+    @rule(
+        wait_ns=st.sampled_from(
+            [edge + ns for edge in (0, TELEOP_NS, AGE_NS, CONFLICT_NS - 1) for ns in (0, 1)]
+        ),
+        boot=st.integers(1, 2),
+        seq=st.integers(0, 4),
+    )
+    def send(self, wait_ns: int, boot: int, seq: int) -> None:
+        self.now_ns += wait_ns
+        reason, before = self.expected(boot, seq), replace(self.channel, neutral=True)
+        goes_on = self.owner is not None and self.owner[0] == boot and seq > self.owner[1]
+        message = Drive(linear=0.0, angular=0.0, echo=0, boot=boot, seq=seq)
+        lease_s = TELEOP_NS / NS_PER_S
+        self.channel, refused = before.accept(message, self.now_ns, lease_s, AGE_NS)
+        assert refused == reason
+        if reason == "second_publisher":
+            self.conflict_ns = self.now_ns
+        elif not reason:
+            self.owner = boot, seq, self.now_ns
+            assert self.channel.neutral is goes_on  # another publisher starts anew
+        else:
+            assert self.channel == before
+
+    @rule(wait_ns=st.sampled_from([1, TELEOP_NS, CONFLICT_NS]))
+    def wait(self, wait_ns: int) -> None:
+        self.now_ns += wait_ns
+
+    @invariant()
+    def the_channel_is_that_of_its_owner(self) -> None:
+        if self.owner is None:
+            return
+        assert (self.channel.boot, self.channel.seq, self.channel.received_ns) == self.owner
+        is_fresh = self.now_ns - self.owner[2] <= TELEOP_NS
+        assert self.channel.is_fresh(self.now_ns, TELEOP_NS / NS_PER_S) is is_fresh
+        since_ns = self.conflict_ns
+        in_conflict = since_ns is not None and self.now_ns - since_ns < CONFLICT_NS
+        assert self.channel.in_conflict(self.now_ns) is in_conflict
 
 
-def test_a_second_publisher_waits_for_the_lease_of_the_first_to_end() -> None:
-    arbiter = request(DRIVES)[0].armed(0)
-    refused, reason = request(arbiter, TELEOP_NS, boot=2)
-    assert reason == "second_publisher"
-    assert refused.conflict(TELEOP_NS) == ["teleop"]
-    assert refused.conflict(TELEOP_NS + 1) == []  # not in control any more
-    taken, reason = request(arbiter, TELEOP_NS + 1, boot=2)
-    assert (reason, taken.channels["teleop"].neutral) == ("", False)
-    taken, reason = request(refused, TELEOP_NS + 1, boot=2)
-    assert reason == ""
-    assert taken.conflict(TELEOP_NS + 1) == ["teleop"]  # the first may still be there
-    taken, _ = request(taken, TELEOP_NS + CONFLICT_NS, boot=2, seq=2)
-    assert taken.conflict(TELEOP_NS + CONFLICT_NS) == []
-
-
-@pytest.mark.parametrize("seq", [4, 5])
-def test_a_lower_seq_of_a_known_boot_is_a_new_publisher_after_the_age(seq: int) -> None:
-    arbiter = request(DRIVES, seq=5)[0].armed(0)
-    arbiter, _ = request(arbiter, 1, boot=2)  # a conflict, which a copy does not end
-    beat = BEAT.beat(AGE_NS)
-    copy = DriveRequest("teleop", Drive(linear=0.1, angular=0.0, echo=43, seq=seq, boot=1), AGE_NS)
-    assert arbiter.accept(copy, Admission(beat, AGE_NS, AGE_NS)) == (arbiter, "seq_not_rising")
-    copy, later = replace(copy, received_ns=AGE_NS + 1), Admission(beat, AGE_NS, AGE_NS + 1)
-    taken, reason = arbiter.accept(copy, later)
-    assert (reason, taken.channels["teleop"].neutral) == ("", False)
-    assert (taken.channels["teleop"].seq, taken.conflict(AGE_NS + 1)) == (seq, ["teleop"])
-    assert copy.drive
-    replayed = replace(copy, drive=replace(copy.drive, echo=41))  # as before the last request
-    assert arbiter.accept(replayed, later) == (arbiter, "late")
+TestPublishers = Publishers.TestCase
 
 
 # --- the source in control ------------------------------------------------------------------
-
-
-def test_the_request_is_stored() -> None:
-    arbiter, _ = request(DRIVES)
-    assert not arbiter.requests_motion(0)
-    for seq, (linear, angular) in enumerate(((0.1, -0.2), (0.0, 0.3), (0.4, 0.0)), start=2):
-        arbiter, refused = request(arbiter, linear=linear, angular=angular, seq=seq)
-        assert (arbiter.channels["teleop"].requested, refused) == (Twist(linear, angular), "")
-        assert arbiter.requests_motion(0)
-    assert not arbiter.requests_motion(NS_PER_S)
-
-
-def test_a_source_starts_without_requests() -> None:
-    assert DriveChannel() == DriveChannel(
-        boot=None, seq=0, received_ns=None, conflict_ns=None, requested=Twist(0.0, 0.0),
-        release="none", neutral=False, neutral_ns=None, overruled_by="",
-    )  # fmt: skip
-    assert CONFLICT_NS == 500_000_000
-    assert (DRIVES.in_control(0), DRIVES.conflict(0)) == (None, [])
 
 
 def test_two_publishers_bar_only_their_own_source() -> None:
@@ -237,19 +240,6 @@ def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
     arbiter = arbiter.disarmed()
     assert arbiter.channels["teleop"].neutral is False
     assert not arbiter.armed(NS_PER_S).channels["teleop"].neutral
-
-
-def test_a_lease_counts_from_the_reception() -> None:
-    late = Admission(BEAT, AGE_NS, 100 * MS)
-    drive = Drive(linear=0.0, angular=0.0, echo=41, seq=1, boot=1)
-    arbiter, _ = DRIVES.accept(DriveRequest("teleop", drive, 5), late)
-    assert arbiter.in_control(5 + TELEOP_NS) == "teleop"
-    assert arbiter.in_control(6 + TELEOP_NS) is None
-    assert not arbiter.armed(6 + TELEOP_NS).channels["teleop"].neutral
-    other = replace(drive, boot=2)  # so does the time of a second publisher
-    arbiter, refused = arbiter.accept(DriveRequest("teleop", other, 6), late)
-    assert (refused, arbiter.conflict(6)) == ("second_publisher", ["teleop"])
-    assert arbiter.accept(DriveRequest("teleop", other, 6 + TELEOP_NS), late)[1] == ""
 
 
 def test_the_source_in_control_overrules_lower_ones_only() -> None:

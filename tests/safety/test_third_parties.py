@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S
 from common.motion import ROUNDED_MPS, STILL
 from services.safety.config import LimitSource, Safety
-from services.safety.core.inputs import KeepaliveRequest, LimitRequest
 from services.safety.core.operator_requests import LET_GO
 from tests.safety.policy_fixture import PolicyFixture
 
@@ -87,34 +86,6 @@ def test_two_limiting_publishers_stop_the_vehicle_until_one_is_left() -> None:
     assert fixture.verdict.name == "inhibited"  # the stick is still pushed
     fixture.drive()
     assert fixture.drive(0.5).command == "run"
-
-
-def test_a_second_publisher_that_is_slow_stops_for_its_lease() -> None:
-    slow = Safety(limits={"lidar": LimitSource(lease=1.0, silence="ignore")})
-    fixture = PolicyFixture(slow).running()
-    fixture.limit()
-    fixture.limit_boot = 56
-    fixture.limit(0.0)
-    for _ in range(3):
-        assert fixture.drive(0.5, seconds=0.3).command == "stop"
-
-
-def test_refused_limits_change_nothing() -> None:
-    fixture = PolicyFixture(IGNORED).running()
-    assert fixture.decide(LimitRequest("lidar", None, fixture.now_ns)).refused == (
-        "limit_not_a_request"
-    )
-    assert fixture.limit(0.0, source="stranger").refused == "limit_unknown_source"
-    assert fixture.verdict.command == "run"
-    assert fixture.limit(0.0).refused == ""
-
-
-def test_a_limit_delays_no_brake() -> None:
-    fixture = PolicyFixture(IGNORED).running()
-    fixture.limit(0.0)
-    assert fixture.estop().command == "brake"
-    fixture.limit(0.1)
-    assert fixture.verdict.command == "brake"
 
 
 def test_a_limit_holds_for_a_release_too() -> None:
@@ -245,19 +216,6 @@ def test_a_second_program_under_the_name_latches() -> None:
     assert fixture.keepalive().refused == "keepalive_second_publisher"
     assert fixture.verdict.command == "brake"
     assert fixture.state.verdict.name == "brake"
-
-
-def test_an_unknown_name_does_nothing() -> None:
-    fixture = running()
-    assert fixture.keepalive("stranger").refused == "keepalive_unknown_source"
-    wrong = fixture.decide(KeepaliveRequest("pendant", None, fixture.now_ns))
-    assert (wrong.refused, wrong.command) == ("keepalive_not_a_request", "run")
-
-
-def test_without_names_nothing_is_expected() -> None:
-    fixture = PolicyFixture().running()
-    assert fixture.published().estop_keepalives == ()
-    assert fixture.drive(0.5, seconds=3.0).command == "run"
 
 
 @settings(max_examples=30)
