@@ -43,10 +43,6 @@ def bench() -> Bench:
     return Bench()
 
 
-def test_the_first_frame_is_a_stop(bench: Bench) -> None:
-    assert motions(bench.outputs) == [MotionKind.STOP]
-
-
 # --- a hit ----------------------------------------------------------------------------------------
 
 
@@ -220,14 +216,6 @@ def test_the_settings_choose_what_the_crc_covers() -> None:
     bench = Bench("wire.crc_covers=header_and_payload")
     made = Framing("crc-16", "header_and_payload").pack(VelocityReport(0, 0))
     assert len(published(bench.receive(made), "velocity")) == 1
-
-
-def test_clear_samples_count_across_ticks(bench: Bench) -> None:
-    found = []
-    for _ in range(3):
-        found += pressed(bench.receive(CLEAR))
-        bench.tick(20 * MS)
-    assert found == [False]
 
 
 def link_lost(bench: Bench) -> None:
@@ -508,6 +496,11 @@ def brakes(bench: Bench, caller: Caller) -> list[Output]:
     return bench.switch(caller, bumper_brake=False, echo=7)
 
 
+def called_late(bench: Bench, caller: Caller) -> list[Output]:
+    bench.now_ns += NS_PER_S + 1
+    return brakes(bench, caller)
+
+
 Call = Callable[[Bench, Caller], list[Output]]
 ONE_OFF = m.Switches(ultrasonic_brake=True, bumper_brake=False)
 
@@ -545,6 +538,7 @@ def test_a_call_is_answered_by_the_boards_echo(
         (nothing, brakes, "the board is absent (link never)"),
         (Bench.arm, lambda bench, to: bench.switch(to, bumper_brake=False), "no echo"),
         (Bench.arm, lambda bench, to: bench.switch(to, echo=1), "unknown heartbeat"),
+        (Bench.arm, called_late, "The call is 1.0 s old, allowed is 1 s"),
     ],
 )
 def test_a_call_is_refused_with_the_reason(

@@ -62,13 +62,6 @@ def obey(
     return on_motion(lease, motion, now_ns, LEASE, OWN_BOOT, received_ns=received_ns)
 
 
-def test_at_first_no_one_may_drive() -> None:
-    assert Lease() == Lease(
-        boot=None, seq=0, renewed_ns=0, over_since_ns=0, ready=False, neutral=False, hit=None,
-        estop=None, sent_ns=0, latched_by=None, braked=False, uncommanded=False,
-    )  # fmt: skip
-
-
 @pytest.mark.parametrize(
     ("given", "when", "order", "refusal"),
     [
@@ -220,13 +213,6 @@ def test_losing_readiness_takes_the_neutral_and_stops_at_once() -> None:
     assert on_ready(ARMED, True) is ARMED
 
 
-def test_a_hit_brakes_at_once_and_while_time_passes() -> None:
-    hit, order = on_hit(ARMED, 42, NOW)
-    assert (order, hit.hit, hit.sent_ns) == (BRAKE, 42, NOW)
-    over = replace(hit, over_since_ns=NOW)
-    assert on_tick(over, NOW + 60 * MS, LEASE, COAST, True)[1] is BRAKE
-
-
 def test_an_emergency_stop_brakes_at_once_and_until_safety_has_latched_it() -> None:
     lease, order = on_estop(ARMED, NOW)
     assert (lease, order) == (replace(ARMED, estop=NOW, sent_ns=NOW), BRAKE)
@@ -299,11 +285,6 @@ def test_a_brake_lasts_until_the_next_order(motion: Motion) -> None:
     state, _, _ = obey(state, motion)
     assert not state.braked
     assert on_tick(state, NOW + LEASE + 1, LEASE, COAST, True)[1] is STOP
-
-
-def test_what_brakes_at_standstill_too() -> None:
-    assert not ARMED.braking
-    assert all(lease.braking for lease in (HIT, STOPPED, MOVED, replace(ARMED, braked=True)))
 
 
 @pytest.mark.parametrize(("age", "obeyed"), [(LEASE - 1, True), (LEASE, True), (LEASE + 1, False)])

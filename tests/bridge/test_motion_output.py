@@ -102,13 +102,6 @@ def test_a_hit_counts_for_the_period_of_stop(output: Output) -> None:
     assert output.tick(NOW + 30 * MS) == [BRAKE]
 
 
-def test_a_frame_leaves_from_the_port_of_the_commands(output: Output) -> None:
-    for port in (output.made.port, 1):
-        output.made.port = port
-        assert [output.made.order(order).port for order in Command] == [port] * 3
-    assert Output().made.port == 0
-
-
 @pytest.mark.parametrize("order", [STOP, BRAKE])
 def test_standstill_must_be_measured_after_the_stop(output: Output, order: Command) -> None:
     output.moves(0.0, NOW)
@@ -137,14 +130,6 @@ def test_away_by_the_counters(stood: Output, distance: float, left: bool) -> Non
     assert stood.events == [UNCOMMANDED] * left
     assert stood.tick(END + 80 * MS) == [BRAKE if left else STOP]
     assert stood.events == [UNCOMMANDED] * left, "once"
-
-
-def test_away_by_the_velocities(stood: Output) -> None:
-    for number in range(1, 8):
-        assert stood.events == []
-        stood.moves(0.5, END + number * 20 * MS)
-        stood.tick(END + number * 20 * MS)
-    assert stood.events == [UNCOMMANDED]
 
 
 def test_what_it_did_before_it_stood_does_not_count(output: Output) -> None:

@@ -25,27 +25,12 @@ def test_the_first_frame_of_a_kind_is_taken_from_either_port(port: int) -> None:
     assert made.takes(BumperReport, port, NS_PER_S)
 
 
-def test_each_kind_has_a_port_of_its_own() -> None:
-    made = ports()
-    for tick in range(100):
-        assert made.takes(VelocityReport, 0, NS_PER_S + tick * 20 * MS)
-        assert made.takes(BumperReport, 1, NS_PER_S + tick * 20 * MS)
-    assert [stream.port for stream in made.streams.values()] == [0, 1]
-
-
 def test_the_other_port_takes_over_when_its_kind_is_silent() -> None:
     made = ports()
     made.takes(BumperReport, 0, NS_PER_S)
     assert not made.takes(BumperReport, 1, NS_PER_S + FAILOVER)
     assert made.takes(BumperReport, 1, NS_PER_S + FAILOVER + 1)
     assert not made.takes(BumperReport, 0, NS_PER_S + FAILOVER + 2)
-
-
-def test_an_urgent_frame_is_taken_from_either_port() -> None:
-    made = ports()
-    made.takes(BumperReport, 0, NS_PER_S)
-    assert made.takes(BumperReport, 1, NS_PER_S, urgent=True)
-    assert not made.takes(BumperReport, 0, NS_PER_S)
 
 
 def test_commands_leave_from_the_port_of_the_velocity() -> None:
