@@ -62,11 +62,6 @@ class Twist(Struct, frozen=True):
 STILL = Twist()
 
 
-def is_standing(linear: float, angular: float) -> bool:
-    """Return whether a measured velocity (m/s, rad/s) counts as standstill."""
-    return abs(linear) < STANDING_MPS and abs(angular) < STANDING_RADPS
-
-
 def clamp(value: float, limit: float) -> float:
     """Return the value limited to ``-limit`` to ``limit``."""
     return max(-limit, min(limit, value))

@@ -23,7 +23,7 @@ from common.freshness import NS_PER_S, Latest
 from common.keys import Call, Topic
 from common.loop import Loop
 from common.messages import Message
-from common.motion import STILL, Twist, is_standing
+from common.motion import STILL, Twist
 from common.settings import Shared
 from common.source import DriveSource
 
@@ -214,7 +214,7 @@ class CheckoutSession:
         if not velocities or velocities[-1].received_ns < since_ns + NS_PER_S // 4:
             return False
         velocity = velocities[-1].value
-        return is_standing(velocity.linear, velocity.angular)
+        return Twist(velocity.linear, velocity.angular).is_standing
 
     def _request(self, _: int) -> None:
         if self._requested is not None:

@@ -27,7 +27,7 @@ from statistics import mean
 from cli.commission.report import Row, Verdict, judged, seconds
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage, Motion, SafetyState, Velocity
-from common.motion import Command, Twist, is_standing
+from common.motion import Command, Twist
 
 SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; a margin for unknown vehicles
 WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
@@ -144,7 +144,7 @@ def stood_after_s(run: Run) -> float | None:
     for velocity in run.velocities:
         if velocity.received_ns < run.released_ns:
             continue
-        if not is_standing(velocity.value.linear, velocity.value.angular):
+        if not Twist(velocity.value.linear, velocity.value.angular).is_standing:
             stood_ns = None
         elif stood_ns is None:
             stood_ns = velocity.received_ns

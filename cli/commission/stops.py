@@ -27,7 +27,7 @@ from typing import Literal
 
 from common.freshness import NS_PER_S
 from common.messages import Bumper, Direction, Message, Mileage, Motion, Velocity
-from common.motion import STANDING_MPS, Command, Twist, is_standing
+from common.motion import STANDING_MPS, Command, Twist
 
 SLOWEST_MPS = 0.1
 STEADY_S, STEADY_MPS, STEADY = 0.2, 0.03, 0.05  # before the command: time, deviation, relative one
@@ -204,7 +204,7 @@ def _until_standstill(
         if other is not None and other.mono_ns <= now.mono_ns:
             raise UnsuitableError(f"changed to {other.command.upper()} before standstill")
         window.append(now)
-        if all(is_standing(v.linear, v.angular) for v in (before, now)):
+        if all(Twist(v.linear, v.angular).is_standing for v in (before, now)):
             return window
     raise UnsuitableError("the recording ends before standstill")
 

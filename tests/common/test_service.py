@@ -13,7 +13,7 @@ import zenoh
 
 from common import codec, keys
 from common.bus.bus import Bus
-from common.bus.session import ONE_POOL, RUNTIME_ENV, router
+from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.config import Sources, load
 from common.messages import MAX_TEXT, Event, Health
@@ -21,7 +21,6 @@ from common.service import Node, resident_bytes, run
 from common.settings import Shared
 from tests.common.bus_fixture import BusFixture
 from tests.common.program import SPECIMEN, Program, on, program
-from verification.harness.bus import listening
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
@@ -204,24 +203,6 @@ def test_a_bug_of_ours_ends_it_though_its_session_is_open(shared_router: str) ->
 
 
 # --- without one, and with one that comes and goes ----------------------------------------------
-
-
-def test_it_waits_for_a_router_and_outlives_its_restart(buses: BusFixture) -> None:
-    buses.endpoint = f"tcp/127.0.0.1:{free_port()}"
-    witness = Witness(buses.robot)
-    with program(SPECIMEN, "plain", *on(buses.endpoint, buses.robot)) as it:
-        it.wait_for("waiting for a router")
-        with router(listening(buses.endpoint)):
-            buses.bus(witness.declare)
-            wait_until(lambda: witness.health, "health")
-            assert {event.name for event in witness.events} <= {"built"}
-        witness.health.clear()
-        with router(listening(buses.endpoint)):
-            wait_until(lambda: witness.health, "health after the restart")
-            assert info(buses, "last")
-        it.process.send_signal(signal.SIGINT)
-        assert it.code() == 0
-        assert it.events()[-1] == "stopped"
 
 
 def test_a_second_signal_ends_it_at_once() -> None:

@@ -135,7 +135,7 @@ def variances(odom: OdomFixture) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("heading", [0.0, math.pi - COUNTER_STEP_RAD / 2])
-@pytest.mark.parametrize(("velocity", "steps"), [(0.0, 0), (0.05, 0), (0.0, 1), (0.05, 1)])
+@pytest.mark.parametrize(("velocity", "steps"), [(0.05, 0), (0.05, 1)])
 def test_standing_adds_one_step_of_noise_however_long(
     heading: float, velocity: float, steps: int
 ) -> None:

@@ -1,7 +1,6 @@
 """Arcs against closed form, covariance against numeric derivatives, fitted segments, trajectory."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -77,13 +76,6 @@ def test_series_and_closed_form_meet() -> None:
     assert below[1] == pytest.approx(above[1], abs=1e-7)
 
 
-@given(turns)
-def test_the_slope_is_the_derivative(turn: float) -> None:
-    step = 1e-5
-    numeric = (chord_ratio(turn + step)[0] - chord_ratio(turn - step)[0]) / (2 * step)
-    assert chord_ratio(turn)[1] == pytest.approx(numeric, abs=1e-8)
-
-
 def derivative(start: Pose, distance: float, turn: float) -> np.ndarray:
     """Return d(x, y, heading) after the arc by (x, y, heading, distance, turn), numerically."""
     step = 1e-6
@@ -109,13 +101,6 @@ def test_covariance_follows_the_derivatives(
     by = derivative(start, distance, turn)
     expected = by @ whole @ by.T + np.diag([noise.place, noise.place, 0.0])
     assert after.covariance.rows() == pytest.approx(expected.ravel(), abs=1e-6)
-
-
-def test_an_error_of_heading_leads_aside() -> None:
-    before = CERTAIN.plus(0.01, 0.0, 0.0, 1.0)
-    start = PoseEstimate(Pose(0.0, 0.0, 0.0), before)
-    after = start.moved(10.0, 0.0, ProcessNoise(0.0, 0.0, 0.0)).covariance
-    assert (after.xx, after.yy, after.yh) == pytest.approx((0.0, 1.0, 0.1))
 
 
 # --- segments -------------------------------------------------------------------------------
@@ -172,13 +157,3 @@ def test_near_points_are_left_out_and_the_oldest_are_dropped() -> None:
     assert [y for _, y, _ in trajectory.points()] == [0.0, 0.0, 1.0]
     trajectory.clear()
     assert trajectory.points() == []
-
-
-@given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5))))
-def test_points_are_never_nearer_than_the_spacing(places: list[tuple[float, float]]) -> None:
-    trajectory = Trajectory(spacing=0.5, points=20)
-    for x, y in places:
-        trajectory.add(Pose(x, y, 0.0))
-    points = trajectory.points()
-    assert len(points) <= 20
-    assert all(math.dist(a[:2], b[:2]) >= 0.5 for a, b in pairwise(points))

@@ -65,18 +65,6 @@ def test_losing_the_focus_of_the_screen_releases(screen: Screen) -> None:
     play(screen, act)
 
 
-@pytest.mark.parametrize("key", ["q", "ctrl+c"])
-def test_quitting_waits_for_the_final_zeros(screen: Screen, key: str) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        await pilot.press(key)
-        assert screen.app.is_running
-        assert screen.speeds(5) == [0.0] * 3
-        screen.ended = True
-        await until(lambda: not screen.app.is_running, "the screen to leave")
-
-    play(screen, act)
-
-
 def test_quitting_twice_does_not_wait(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         await pilot.press("q")
@@ -99,14 +87,6 @@ def test_a_redraw_that_is_posted_late_keeps_its_time(screen: Screen) -> None:
         screen.now_ns += 10 * NS_PER_S
         posted[0]()  # late
         assert screen.controller._drawn_ns == drawn_ns
-
-    play(screen, act)
-
-
-def test_the_terminal_is_queried_and_its_answer_counts(screen: Screen) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        screen.now_ns += 10 * NS_PER_S  # what was answered so far is old
-        await until(lambda: not screen.controller.terminal.refusal(screen.now_ns), "an answer")
 
     play(screen, act)
 

@@ -88,14 +88,6 @@ def test_a_refused_key_changes_nothing(
     assert operator.controls.gear == 1
 
 
-def test_a_slow_terminal_releases_its_keys_until_a_pause(operator: Operator) -> None:
-    operator.press("w")
-    operator.ticks(3)
-    operator.press("r", took_s=0.42)
-    assert operator.ticks(4) == [NEUTRAL] * 3 + [None]
-    assert operator.controls.is_muted(operator.now_ns)
-
-
 @pytest.mark.parametrize(("waited_s", "ticks"), [(0.0, 11), (0.3, 5)])
 def test_a_tap_is_a_zero_the_twist_and_three_zeros(
     operator: Operator, waited_s: float, ticks: int

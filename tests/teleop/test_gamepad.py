@@ -175,27 +175,6 @@ def virtual(
     assert pad.read() is None
 
 
-def test_sdl_reports_every_change_once(virtual: tuple[SdlGamepad, VirtualGamepad]) -> None:
-    pad, gamepad = virtual
-
-    def events() -> int:
-        stick = pad.read()
-        assert stick is not None
-        return stick.events
-
-    assert events() == 0
-    gamepad.press(4)
-    gamepad.push(1, -20_000)
-    assert events() == 2
-    gamepad.push(1, -20_000)  # still, or frozen
-    assert events() == 2
-    gamepad.push(1, -20_001)  # the smallest tremor
-    assert events() == 3
-    gamepad.push(1, -32_768)  # at its end
-    gamepad.push(0, 300)  # the cross axis
-    assert events() == 5
-
-
 def test_a_gamepad_of_sdl_that_freezes_while_it_drives_is_released(
     virtual: tuple[SdlGamepad, VirtualGamepad],
 ) -> None:

@@ -9,7 +9,7 @@ from common.client import NEUTRAL, ZEROS
 from common.freshness import NS_PER_S
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
-from services.teleop.core.hold import RULES, Again, Deadman, Keys, Press
+from services.teleop.core.hold import RULES, Deadman, Keys, Press
 
 
 def at(seconds: float) -> int:
@@ -47,49 +47,8 @@ def test_other_keys_are_released_and_a_kept_one_repeats() -> None:
     assert keys.held(at(10.8)) == []
 
 
-@pytest.mark.parametrize(
-    ("again", "held", "counts_at"),
-    [
-        (Again.HELD, ["w"], 10.1),
-        (Again.NEXT_PRESS, [], 10.1),
-        (Again.AFTER_PAUSE, [], 10.7),
-    ],
-)
-def test_when_released_keys_count_again(again: Again, held: list[str], counts_at: float) -> None:
-    keys = Keys(first_s=0.6, repeat_s=0.3)
-    keys.press("w", at(10))
-    keys.release(again, at(10.1))
-    assert keys.held(at(10.1)) == held
-    assert keys.is_muted(at(10.699)) is (again is Again.AFTER_PAUSE)
-    keys.press("w", at(counts_at))
-    assert keys.held(at(counts_at)) == ["w"]
-
-
-def test_a_key_that_is_still_held_extends_the_pause() -> None:
-    keys = Keys(first_s=0.6, repeat_s=0.3)
-    keys.release(Again.AFTER_PAUSE, at(10.1))
-    for still_held in (10.699, 11.298):
-        keys.press("w", at(still_held))
-        assert keys.held(at(still_held)) == []
-    keys.press("w", at(11.898))
-    assert keys.held(at(11.898)) == ["w"]
-
-
 def test_the_age_of_a_press() -> None:
     assert Press("w", at(10)).age_s(at(12.5)) == 2.5
-
-
-def test_a_deadman_counts_after_it_was_up() -> None:
-    deadman, held = Deadman(2.0), []
-    assert not deadman.is_held
-    for down in (True, True, False, True):
-        deadman.update(down, 0, at(10))
-        held.append(deadman.is_held)
-    deadman.drop()
-    for down in (True, False, True):
-        held.append(deadman.is_held)
-        deadman.update(down, 0, at(10))
-    assert [*held, deadman.is_held] == [False, False, False, True, False, False, False, True]
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def drive_off(it: Terminal, listener: Listener) -> None:
     [
         (Terminal.hang_up, teleop.EXIT_HANGUP),
         (lambda it: it.process.send_signal(signal.SIGTERM), 0),
-        (lambda it: it.type("q"), 0),
+        (lambda it: it.type("\x03"), 0),  # ctrl-c
     ],
 )
 def test_every_end_sends_zeros_and_then_nothing(
