@@ -67,7 +67,7 @@ test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
 fuzz: $(STAMP) ## feed hostile bytes to every parser, SECONDS=60 for each target
 	$(BIN)/python -m verification.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
 
-soak: $(STAMP) ## drive laps with random faults and kill -9 for MINUTES=30, checking memory and more
+soak: $(STAMP) ## faults in random order for MINUTES=30, checking memory and more
 	$(BIN)/python -m verification.soak --minutes $(or $(MINUTES),30)
 
 faults: $(STAMP) ## run the fault campaign; renews docs/faults.md

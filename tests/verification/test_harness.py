@@ -1,16 +1,17 @@
-"""The shared harness: reactions in a trace, growing files, trees of processes."""
+"""The shared harness: reactions in a trace, a growing one, trees of processes."""
 
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from common import motion
 from sim.trace import Command
 from verification.harness.process_stats import tree
-from verification.harness.trace import Tail, first_stop_s, last_move_s
+from verification.harness.trace import TraceFollower, first_stop_s, last_move_s
 from verification.harness.waiting import wait_until
 
 RUN, STOP, BRAKE = motion.Command
@@ -35,19 +36,16 @@ def test_the_first_stop_and_the_last_move_after_a_fault() -> None:
     assert last_move_s(made, round(131e6)) == 0.0
 
 
-def test_a_growing_file_is_read_by_whole_lines(tmp_path: Path) -> None:
-    path = tmp_path / "log"
-    tail = Tail(path)
-    assert tail.read() == b""
+def test_a_growing_trace_is_read_by_whole_lines(tmp_path: Path) -> None:
+    path = tmp_path / "trace"
+    follower = TraceFollower(path)
+    assert follower.follow().commands == []
+    first, second = (msgspec.json.encode(command(ms)) + b"\n" for ms in (1, 2))
     with path.open("ab", buffering=0) as file:
-        file.write(b"one\ntw")
-        assert tail.read() == b"one\n"
-        assert tail.read() == b""
-        file.write(b"o\nthree\n")
-        assert tail.read() == b"two\nthree\n"
-    assert tail.bytes == 14
-    path.write_bytes(b"new\n")  # begun anew
-    assert tail.read() == b"new\n"
+        file.write(first + second[:9])
+        assert [one.mono_ns for one in follower.follow().commands] == [1_000_000]
+        file.write(second[9:])
+        assert [one.mono_ns for one in follower.follow().commands] == [1_000_000, 2_000_000]
 
 
 def test_the_tree_has_children_that_a_thread_started() -> None:

@@ -1,6 +1,6 @@
 """The trace of the simulated board, read while the simulator writes it."""
 
-import os
+import contextlib
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Self
@@ -9,44 +9,26 @@ from common.freshness import NS_PER_S
 from sim.trace import BumperSent, Command, read
 
 
-class Tail:
-    """Reads a growing file, whole lines at a time; a truncated file from its start."""
-
-    def __init__(self, file: Path) -> None:
-        self.bytes = 0  # read so far
-        self._file = file
-
-    def read(self) -> bytes:
-        """Return the lines since the last call; an incomplete line waits."""
-        try:
-            with self._file.open("rb") as file:
-                if os.fstat(file.fileno()).st_size < self.bytes:
-                    self.bytes = 0
-                file.seek(self.bytes)
-                new = file.read()
-        except FileNotFoundError:
-            self.bytes = 0
-            return b""
-        whole = new[: new.rfind(b"\n") + 1]
-        self.bytes += len(whole)
-        return whole
-
-
 class TraceFollower:
     """Collects motion commands and bumper hits from a growing trace."""
 
     def __init__(self, file: Path) -> None:
         self.commands: list[Command] = []
         self.hits: list[BumperSent] = []  # frames from the board that report a pressed bumper
-        self._tail = Tail(file)
+        self._file, self._bytes = file, 0  # read so far
 
     def follow(self) -> Self:
-        """Read what was written since the last call."""
-        for line in read(self._tail.read()):
-            if isinstance(line, Command):
-                self.commands.append(line)
-            elif isinstance(line, BumperSent) and line.pressed:
-                self.hits.append(line)
+        """Read what was written since the last call; an incomplete line waits."""
+        with contextlib.suppress(FileNotFoundError), self._file.open("rb") as file:
+            file.seek(self._bytes)
+            new = file.read()
+            whole = new[: new.rfind(b"\n") + 1]
+            self._bytes += len(whole)
+            for line in read(whole):
+                if isinstance(line, Command):
+                    self.commands.append(line)
+                elif isinstance(line, BumperSent) and line.pressed:
+                    self.hits.append(line)
         return self
 
     def forget(self) -> None:

@@ -1,1 +1,1 @@
-"""Laps with random faults and SIGKILL, and resource usage: ``make soak``."""
+"""Random faults of the catalogue for hours, and resource usage: ``make soak``."""

@@ -1,84 +1,54 @@
-"""The verdict and the faults of a soak, and a short real one."""
+"""The verdict of a soak, and a short real one."""
 
 import subprocess
 import sys
-from itertools import islice
 from pathlib import Path
-from random import Random
 
 import pytest
 
-from verification.soak.faults import KILLED, WIRE, Fault, faults
 from verification.soak.verdict import GROWTH_MAX, Record, Sample, results
 
-KINDS = len(KILLED) + len(WIRE) + 4
 S = range(600)
 SAFETY, RESTARTED = ("safety", 10), ("safety", 11)
+PROCESSES = "router", "sim", "bridge", "bridge/1", "safety", "odom", "driver"
 
 
 def samples(seconds: range = S, rss_per_s: float = 0.0, threads_from_s: int = 999) -> list[Sample]:
     return [Sample(s, 5e7 + rss_per_s * s, 10 + (s >= threads_from_s), 20) for s in seconds]
 
 
-def good() -> Record:
-    return Record(
-        lives={SAFETY: samples()},
-        events=[(s, what) for s in range(0, 600, 10) for what in ("step", "lap finished")],
-        log_bytes=300_000,
-        faults=1,
-        seconds=600.0,
-    )
-
-
 def wrong(record: Record) -> list[str]:
     return [what for what, _, fine in results(record) if not fine]
 
 
-def test_a_good_soak() -> None:
-    assert wrong(good()) == []
-
-
 def test_a_soak_that_observed_nothing() -> None:
-    assert set(wrong(Record())) == {"log", "faults", "longest time without a step done"}
+    assert set(wrong(Record())) == {"log", "faults"}
 
 
 RESOURCES = "safety: threads, descriptors"
-SPREAD = range(0, 600, 10)
 
 
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
+        ({}, []),
         ({"lives": {SAFETY: samples(rss_per_s=0.9 * GROWTH_MAX / 432)}}, []),
         ({"lives": {SAFETY: samples(rss_per_s=1.1 * GROWTH_MAX / 432)}}, ["safety: memory"]),
         ({"lives": {SAFETY: samples(threads_from_s=30)}}, []),
         ({"lives": {SAFETY: samples(threads_from_s=150)}}, [RESOURCES]),
         ({"lives": {SAFETY: samples(range(69))}}, ["safety: memory"]),  # too short
         ({"lives": {SAFETY: samples(), RESTARTED: samples(range(99), 1e6)}}, []),
-        ({"log_bytes": 2100 * 600}, ["log"]),
-        ({"events": [(s, "step") for s in SPREAD]}, ["laps finished"]),
-        (
-            {"events": [(s, what) for s in range(0, 210, 10) for what in ("step", "lap finished")]},
-            ["longest time without a step done"],
-        ),
+        ({"log_bytes": 2_010_000}, ["log"]),
+        ({"violations": ["estop: never, 20.0 ms are allowed"]}, ["outside their limits"]),
         ({"crashes": ["odom"]}, ["crashes"]),
         ({"tracebacks": 1}, ["tracebacks in the log"]),
     ],
 )
 def test_each_limit(change: dict[str, object], expected: list[str]) -> None:
-    record = good()
+    record = Record(lives={SAFETY: samples()}, log_bytes=1_990_000, faults=200, seconds=600.0)
     for name, value in change.items():
         setattr(record, name, value)
     assert wrong(record) == expected
-
-
-def test_faults_are_reproducible_and_each_round_has_every_kind() -> None:
-    def drawn(seed: int) -> list[Fault]:
-        return list(islice(faults(Random(seed)), 2 * KINDS))
-
-    assert drawn(7) == drawn(7) != drawn(8)
-    names = [fault.name for fault in drawn(7)]
-    assert sorted(names[:KINDS]) == sorted(set(names))
 
 
 @pytest.mark.timed
@@ -94,5 +64,4 @@ def test_a_short_soak(tmp_path: Path) -> None:
     bad = [what for what, _, mark in rows if mark.startswith("WRONG")]
     assert all("memory" in what or "threads" in what for what in bad), done.stdout
     assert done.returncode == bool(bad), done.stderr
-    assert {f"| {name}: memory" for name in KILLED} <= {what for what, *_ in rows}
-    assert "kill " in done.stdout
+    assert {f"| {name}: memory" for name in PROCESSES} <= {what for what, *_ in rows}
