@@ -49,11 +49,11 @@ GROUPS = {
         "record": ("run.services:record", "record everything on the bus to files, until Ctrl-C"),
         "info": ("recordings.info", "show the content of a recording"),
         "replay": (
-            "recordings.replay.command",
+            "recordings.replay",
             "play a recording onto the bus, or its raw frames to a bridge",
         ),
         "report": (
-            "recordings.report.command",
+            "recordings.report",
             "HTML report of a recording: path, speeds, stops, streams",
         ),
         "foxglove": ("recordings.foxglove", "stream the bus live to Foxglove or Lichtblick"),

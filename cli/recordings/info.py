@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from cli.inspect import output
 from cli.inspect.session import add_output, wants_json
+from cli.recordings.timeline import Timeline
 from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.keys import ROOT
 from common.text import printable
-from services.recorder.summary import Note, Summary
 
 if TYPE_CHECKING:
     from services.recorder.reader import Reader
@@ -27,12 +27,13 @@ def run(options: argparse.Namespace) -> int:
     """Show each file; return 1 if any is truncated or damaged."""
     complete = True
     for number, file in enumerate(options.files):
-        reader, summary = summarize(file)
+        with open_recording(file) as reader:
+            timeline = timeline_of(reader)
         complete = complete and not (reader.cut or reader.damaged)
         if wants_json(options):
-            output.line(as_json(reader, summary))
+            output.line(as_json(reader, timeline))
         else:
-            print(*([""] if number else []), printable(as_text(reader, summary), "\n"), sep="\n")
+            print(*([""] if number else []), printable(as_text(reader, timeline), "\n"), sep="\n")
     return 0 if complete else 1
 
 
@@ -47,17 +48,15 @@ def open_recording(path: Path) -> "Reader":
     return Reader(path)
 
 
-def summarize(file: Path) -> tuple["Reader", Summary]:
-    """Return the summary of a recording; raise ``RobotError`` if it is not a recording."""
-    summary = Summary()
-    with open_recording(file) as reader:
-        for each in reader:
-            raw = each.sample.raw is not None
-            summary.add(each.key, each.kind, each.message, each.log_ns, raw=raw)
-    return reader, summary
+def timeline_of(reader: "Reader") -> Timeline:
+    """Return the timeline of a recording; raise ``RobotError`` if it is not a recording."""
+    timeline = Timeline()
+    for each in reader:
+        timeline.add(each.key, each.kind, each.message, each.log_ns)
+    return timeline
 
 
-def as_json(reader: "Reader", summary: Summary) -> dict[str, Any]:
+def as_json(reader: "Reader", timeline: Timeline) -> dict[str, Any]:
     """Return the summary as JSON fields."""
     return {
         "file": str(reader.path),
@@ -66,57 +65,75 @@ def as_json(reader: "Reader", summary: Summary) -> dict[str, Any]:
         "cut": reader.cut,
         "damaged_chunks": reader.damaged,
         "about": reader.about,
-        "begin_ns": summary.begin_ns,
-        "duration": round(summary.duration_s, 3),
-        "messages": summary.messages,
-        "versions": summary.versions,
+        "begin_ns": timeline.began_ns,
+        "duration": round(timeline.lasted_s, 3),
+        "messages": timeline.messages,
+        "versions": timeline.versions,
         "keys": {
-            key: {"type": one.kind, "count": one.count, "hz": one.hz, "raw": one.raw,
-                  "faulty": summary.faulty[key]}
-            for key, one in sorted(summary.streams.items())
+            key: {"type": one.kind, "count": len(one.times), "hz": one.hz, "lost": one.lost,
+                  "faulty": one.undecoded}
+            for key, one in sorted(timeline.streams.items())
         },
-        "events": [_as_json(note) for note in summary.events],
-        "latched": [_as_json(note) for note in summary.latched],
+        "stops": [
+            {"at": round(stop.begins_s, 3), "seconds": round(stop.lasts_s, 3),
+             "verdict": stop.verdict, "reasons": stop.reasons, "latched": list(stop.latched)}
+            for stop in timeline.stops
+        ],
+        "events": [
+            {"at": round(each.at_s, 3), "who": each.service, "level": each.event.level,
+             "text": f"{each.event.name}: {each.event.text}"}
+            for each in timeline.events
+        ],
     }  # fmt: skip
 
 
-def as_text(reader: "Reader", summary: Summary) -> str:
+def as_text(reader: "Reader", timeline: Timeline) -> str:
     """Return the summary as text."""
-    about = dict(reader.about)
-    began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime((summary.begin_ns or 0) / NS_PER_S))
-    state = f"truncated, {reader.readable} bytes are readable" if reader.cut else "complete"
-    if reader.damaged:
-        state += f", {reader.damaged} damaged chunks skipped"
-    lines = [
-        f"{reader.path}: {reader.size} bytes, {state}",
-        f"robot {about.get('robot', '?')}, recorded by T2 {about.get('version', '?')}, "
-        f"reason: {about.get('why', '?')}",
-        f"{summary.messages} messages in {summary.duration_s:.1f} s, from {began}"
-        if summary.messages
-        else "no messages",
-    ]
-    if summary.versions:
-        versions = (f"{name} {version}" for name, version in sorted(summary.versions.items()))
+    lines = [_file(reader), _source(reader), _span(timeline)]
+    if timeline.versions:
+        versions = (f"{name} {version}" for name, version in sorted(timeline.versions.items()))
         lines.append(f"versions: {', '.join(versions)}")
     rows = [
         [
             key.removeprefix(f"{ROOT}/"),
             one.kind,
-            str(one.count),
+            str(len(one.times)),
             "-" if one.hz is None else f"{one.hz:.1f}",
+            str(one.lost),
         ]
-        for key, one in sorted(summary.streams.items())
+        for key, one in sorted(timeline.streams.items())
     ]
-    lines += ["", output.table(["key", "type", "messages", "Hz"], rows)]
-    for title, notes in (("latched", summary.latched), ("events", summary.events)):
-        if notes:
-            lines += ["", f"{title}:", *(_as_text(note) for note in notes)]
+    lines += ["", output.table(["key", "type", "messages", "Hz", "lost"], rows)]
+    stops = [
+        f"{stop.begins_s:8.2f} s  {stop.verdict:9}  for {stop.lasts_s:.1f} s: "
+        + " ".join(f"{name}: {printable(text)}" for name, text in stop.reasons.items())
+        for stop in timeline.stops
+    ]
+    events = [
+        f"{each.at_s:8.2f} s  {each.event.level:9}  {each.service}: {each.event.name}: "
+        f"{printable(each.event.text)}"
+        for each in timeline.events
+    ]
+    for title, texts in (("stops", stops), ("events", events)):
+        if texts:
+            lines += ["", f"{title}:", *texts]
     return "\n".join(lines)
 
 
-def _as_json(note: Note) -> dict[str, Any]:
-    return {"at": round(note.at_s, 3), "who": note.service, "level": note.level, "text": note.text}
+def _file(reader: "Reader") -> str:
+    state = f"truncated, {reader.readable} bytes are readable" if reader.cut else "complete"
+    if reader.damaged:
+        state += f", {reader.damaged} damaged chunks skipped"
+    return f"{reader.path}: {reader.size} bytes, {state}"
 
 
-def _as_text(note: Note) -> str:
-    return f"{note.at_s:8.2f} s  {note.level:7}  {note.service}: {printable(note.text)}"
+def _source(reader: "Reader") -> str:
+    robot, version, why = (reader.about.get(name, "?") for name in ("robot", "version", "why"))
+    return f"robot {robot}, recorded by T2 {version}, reason: {why}"
+
+
+def _span(timeline: Timeline) -> str:
+    if timeline.began_ns is None:
+        return "no messages"
+    began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(timeline.began_ns / NS_PER_S))
+    return f"{timeline.messages} messages in {timeline.lasted_s:.1f} s, from {began}"

@@ -1,7 +1,7 @@
 """The black box: buffers the last minutes and writes them when safety latches a cause. Pure.
 
 Theory of operation: a ring buffer holds the newest samples. A latch starts a dump of them and of
-the samples of the next seconds (``recorder.tail``). A dump takes some seconds, so it is written in
+the samples of the next seconds. A dump takes some seconds, so it is written in
 slices and the event loop continues in between. What waits for it stays in the buffer.
 """
 
@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 from common.codec import Sample
 from common.freshness import NS_PER_S
 from common.messages import SafetyState
-from services.recorder.config import MB, Recorder
 
 if TYPE_CHECKING:
     from services.recorder.writer import RecordingWriter
 
+SPAN_NS, TAIL_NS = 120 * NS_PER_S, 10 * NS_PER_S  # kept before a latch, and recorded after it
+SIZE_MAX = 64_000_000  # bytes of memory
 SLICE = 400  # samples written at once: about 30 ms of work
 # Python's memory for a sample besides its bytes, with key and encoding: 450 B by tracemalloc.
 OVERHEAD = 470
@@ -102,11 +103,15 @@ class BlackBox:
     """Buffers samples and writes one dump at a time; the caller handles ``OSError``."""
 
     def __init__(
-        self, settings: Recorder, open_recording: OpenRecording, close_recording: CloseRecording
+        self,
+        open_recording: OpenRecording,
+        close_recording: CloseRecording,
+        span_ns: int = SPAN_NS,
+        tail_ns: int = TAIL_NS,
+        size_max: int = SIZE_MAX,
     ) -> None:
-        self._span_ns = round(settings.black_box * NS_PER_S)
-        self._tail_ns = round(settings.tail * NS_PER_S)
-        self._buffer = RingBuffer(self._span_ns, round(settings.black_box_size * MB))
+        self._span_ns, self._tail_ns = span_ns, tail_ns
+        self._buffer = RingBuffer(span_ns, size_max)
         self._open_recording = open_recording
         self._close_recording = close_recording
         self._dump: Dump | None = None

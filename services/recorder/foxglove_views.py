@@ -77,16 +77,6 @@ _QUATERNION = _table(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
 _POSE = _table(position=_VECTOR, orientation=_QUATERNION)
 
 POSE = _foxglove("PoseInFrame", frame_id=_TEXT, pose=_POSE)
-ODOMETRY = _foxglove(
-    "Odometry",
-    frame_id=_TEXT,
-    child_frame_id=_TEXT,
-    pose=_POSE,
-    linear_velocity=_VECTOR,
-    angular_velocity=_VECTOR,
-    pose_covariance=_NUMBERS,
-    velocity_covariance=_NUMBERS,
-)
 TRANSFORM = _foxglove(
     "FrameTransform",
     parent_frame_id=_TEXT,
@@ -153,16 +143,6 @@ def _odometry(message: Odometry) -> Iterator[View]:
         "rotation": pose["orientation"],
     }
     yield "tf", TRANSFORM, transform
-    fields = {
-        "frame_id": parent,
-        "child_frame_id": child,
-        "pose": pose,
-        "linear_velocity": _vector(x=message.linear),
-        "angular_velocity": _vector(z=message.angular),
-        "pose_covariance": _expanded(message.pose_covariance, (0, 1, 5)),
-        "velocity_covariance": _expanded(message.twist_covariance, (0, 5)),
-    }
-    yield "odometry", ODOMETRY, fields
 
 
 def _log(message: Event, service: str) -> View:
@@ -178,12 +158,3 @@ def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> dict[str, float]:
 def _pose(x: float, y: float, heading: float) -> dict[str, dict[str, float]]:
     rotation = {"z": math.sin(heading / 2), "w": math.cos(heading / 2)}
     return {"position": _vector(x, y), "orientation": {"x": 0.0, "y": 0.0, **rotation}}
-
-
-def _expanded(covariance: tuple[float, ...], axes: tuple[int, ...]) -> list[float]:
-    """Return the 6x6 covariance, row by row, for a covariance of some of its axes."""
-    expanded = [0.0] * 36
-    for row, row_axis in enumerate(axes):
-        for column, column_axis in enumerate(axes):
-            expanded[6 * row_axis + column_axis] = covariance[row * len(axes) + column]
-    return expanded

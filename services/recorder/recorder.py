@@ -11,10 +11,10 @@ from common.errors import MessageError
 from common.messages import SafetyState
 from common.service import Node
 from services.recorder.blackbox import BlackBox, LatchDetector
-from services.recorder.config import MB, RecorderConfig
+from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Encoder
 from services.recorder.retention import StoredFile
-from services.recorder.storage import Storage
+from services.recorder.storage import MB, Storage
 from services.recorder.writer import RecordingWriter, RollingWriter
 
 # `**` does not match chunks that begin with "@": two expressions cover all keys.
@@ -36,8 +36,8 @@ class Recorder:
         robot = node.bus.robot if settings.make_room else None
         self._storage = Storage(Path(settings.folder), settings.free * MB, robot=robot)
         files = (self._open_recording, self._close_recording)
-        self._rolling = RollingWriter(settings, *files) if settings.everything else None
-        self._black_box = BlackBox(settings, *files)
+        self._rolling = RollingWriter(*files) if settings.everything else None
+        self._black_box = BlackBox(*files)
         node.counters.update(recorded=0, not_recorded=0, removed=0)
         self._check_storage(clock.now_ns())
         for each in EVERYTHING:

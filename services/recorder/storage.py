@@ -10,6 +10,7 @@ from pathlib import Path
 from common.freshness import NS_PER_S
 from services.recorder.retention import KEEP, StoredFile, to_remove
 
+MB = 1_000_000
 HYSTERESIS = 1.1  # factor on the free space that is required before recording continues
 RETRY_NS = 10 * NS_PER_S  # after a disk error
 
@@ -70,9 +71,7 @@ class Storage:
         enough = self.has_room or bool(removed)
         self.has_room = left >= self._free_min * (1.0 if enough else HYSTERESIS)
         if not self.has_room:
-            self.problem = (
-                f"{left / 1e6:.0f} MB are left, recorder.free is {self._free_min / 1e6:g}"
-            )
+            self.problem = f"{left / MB:.0f} MB are left, recorder.free is {self._free_min / MB:g}"
         return removed
 
     def on_error(self, error: OSError, now_ns: int) -> None:

@@ -14,9 +14,9 @@ from mcap.writer import Writer
 from common.codec import Sample
 from common.freshness import NS_PER_S
 from services.recorder.blackbox import CloseRecording, OpenRecording
-from services.recorder.config import MB, Recorder
 from services.recorder.mcap_codec import Channel, Encoder, Entry
 
+SIZE_MAX, TIME_MAX_NS = 200_000_000, 600 * NS_PER_S  # of a file of a continuous recording
 ABOUT = "t2"  # name of the metadata record: robot, version and reason of the recording
 
 
@@ -92,10 +92,13 @@ class RollingWriter:
     """Continuous recording, one file after another; the caller handles ``OSError``."""
 
     def __init__(
-        self, settings: Recorder, open_recording: OpenRecording, close_recording: CloseRecording
+        self,
+        open_recording: OpenRecording,
+        close_recording: CloseRecording,
+        size_max: int = SIZE_MAX,
+        time_max_ns: int = TIME_MAX_NS,
     ) -> None:
-        self._size_max = settings.roll_size * MB
-        self._time_max_ns = round(settings.roll_time * NS_PER_S)
+        self._size_max, self._time_max_ns = size_max, time_max_ns
         self._open_recording = open_recording
         self._close_recording = close_recording
         self._recording: RecordingWriter | None = None

@@ -8,16 +8,15 @@ import pytest
 from common.codec import Sample
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
-from services.recorder.config import MB, Recorder
 from services.recorder.mcap_codec import Encoder
 from services.recorder.reader import Reader
 from services.recorder.retention import StoredFile
-from services.recorder.storage import Storage
+from services.recorder.storage import MB, Storage
 from services.recorder.writer import RecordingWriter
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, MONO_NS, sample
 
-SETTINGS = Recorder(roll_size=1.0, roll_time=10.0, black_box=10.0, tail=2.0)
+SPAN_NS, TAIL_NS = 10 * NS_PER_S, 2 * NS_PER_S  # of the black box
 OLD, MIDDLE, NEW = "001-20260101-000000", "001-20260201-000000", "001-20260301-000000"
 CONTINUOUS = [f"{stamp}.mcap" for stamp in (OLD, MIDDLE, NEW)]
 INCIDENTS = [f"{stamp}-latch-contact.mcap" for stamp in (OLD, MIDDLE, NEW)]

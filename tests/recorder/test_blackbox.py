@@ -1,14 +1,23 @@
 """Ring buffer, latch detection and dumps of the black box."""
 
 import pytest
-from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from services.recorder.blackbox import OVERHEAD, SLICE, BlackBox, LatchDetector, RingBuffer
-from services.recorder.config import MB
+from services.recorder.blackbox import (
+    OVERHEAD,
+    SIZE_MAX,
+    SLICE,
+    BlackBox,
+    LatchDetector,
+    RingBuffer,
+)
 from tests.recorder import samples
-from tests.recorder.files_fixture import SETTINGS, Files, at, ns
+from tests.recorder.files_fixture import SPAN_NS, TAIL_NS, Files, at, ns
 from tests.recorder.samples import bare
+
+
+def box_of(files: Files, size_max: int = SIZE_MAX) -> BlackBox:
+    return BlackBox(files.open, files.close, SPAN_NS, TAIL_NS, size_max)
 
 
 def kept(buffer: RingBuffer) -> list[bytes]:
@@ -44,7 +53,7 @@ def test_a_flood_on_one_key_removes_no_sample_of_the_others(files: Files, count:
     limit = 1_000_000
     buffer = RingBuffer(100 * NS_PER_S, limit)
     flood = [bare("tel/flood", bytes(limit // count), at_s=15) for _ in range(5 * count)]
-    box = BlackBox(replace(SETTINGS, black_box_size=limit / MB), files.open, files.close)
+    box = box_of(files, limit)
     before, after = [at(second) for second in range(10, 16)], at(16)
     for each in (*before, *flood, after):
         buffer.add(each)
@@ -70,7 +79,7 @@ def test_after_a_huge_sample_the_next_largest_key_loses_samples() -> None:
 
 
 def test_a_slow_disk_loses_no_sample_of_a_dump(files: Files) -> None:
-    box = BlackBox(SETTINGS, files.open, files.close)
+    box = box_of(files)
     box.add(at(0))
     box.trigger(["contact"], ns(0))
     for second in range(1, 30):  # the buffer holds 10 s
@@ -82,28 +91,20 @@ def test_a_slow_disk_loses_no_sample_of_a_dump(files: Files) -> None:
     assert len(list(box._buffer.since(0))) == 11
 
 
-def test_only_new_latches_are_reported() -> None:
+@pytest.mark.parametrize(
+    ("states", "found"),
+    [
+        (([], ["b"], ["b"], ["a", "b"], [], ["b"]), [[], ["b"], [], ["a"], [], ["b"]]),
+        ((["a"], ["a", "b"]), [[], ["b"]]),  # those of the first state latched before
+    ],
+)
+def test_only_new_latches_are_reported(states: list[list[str]], found: list[list[str]]) -> None:
     latches = LatchDetector()
-    states: tuple[list[str], ...] = (
-        [],
-        ["contact"],
-        ["contact"],
-        ["estop", "contact"],
-        [],
-        ["contact"],
-    )
-    found = [latches.update(samples.state(*names)) for names in states]
-    assert found == [[], ["contact"], [], ["estop"], [], ["contact"]]
-
-
-def test_latches_of_the_first_state_are_ignored() -> None:
-    latches = LatchDetector()
-    assert latches.update(samples.state("estop")) == []
-    assert latches.update(samples.state("estop", "contact")) == ["contact"]
+    assert [latches.update(samples.state(*names)) for names in states] == found
 
 
 def test_a_dump_holds_the_buffered_time_and_the_tail(files: Files) -> None:
-    box = BlackBox(SETTINGS, files.open, files.close)
+    box = box_of(files)
     box.write(ns(0))
     for second in range(30):
         box.add(at(second))
@@ -116,7 +117,7 @@ def test_a_dump_holds_the_buffered_time_and_the_tail(files: Files) -> None:
 
 
 def test_further_latches_extend_a_dump_up_to_a_limit(files: Files) -> None:
-    box = BlackBox(SETTINGS, files.open, files.close)
+    box = box_of(files)
     for second in range(30):
         box.add(at(second))
         if second >= 5:
@@ -128,7 +129,7 @@ def test_further_latches_extend_a_dump_up_to_a_limit(files: Files) -> None:
 
 
 def test_a_dump_is_written_in_slices(files: Files) -> None:
-    box = BlackBox(SETTINGS, files.open, files.close)
+    box = box_of(files)
     for _ in range(3 * SLICE):
         box.add(at(0))
     box.trigger(["contact"], ns(0))
@@ -139,7 +140,7 @@ def test_a_dump_is_written_in_slices(files: Files) -> None:
 
 
 def test_close_writes_all_pending_samples(files: Files) -> None:
-    box = BlackBox(SETTINGS, files.open, files.close)
+    box = box_of(files)
     box.close()
     for second in range(3):
         box.add(at(second))
@@ -150,7 +151,7 @@ def test_close_writes_all_pending_samples(files: Files) -> None:
 
 
 def test_finish_discards_pending_samples(files: Files) -> None:
-    box = BlackBox(SETTINGS, files.open, files.close)
+    box = box_of(files)
     box.finish()
     for _ in range(SLICE + 5):
         box.add(at(0))
@@ -163,7 +164,7 @@ def test_finish_discards_pending_samples(files: Files) -> None:
 
 
 def test_a_dump_without_samples_writes_no_file(files: Files) -> None:
-    box = BlackBox(SETTINGS, files.open, files.close)
+    box = box_of(files)
     box.trigger(["contact"], ns(0))
     box.flush()
     for second in (1, 5):

@@ -11,7 +11,6 @@ from common.messages import SONAR_NAMES, Event, Health, Link, Message, SafetySta
 from common.settings import Vehicle
 from services.recorder.foxglove_views import (
     LOG,
-    ODOMETRY,
     POSE,
     SCAN,
     TRANSFORM,
@@ -24,7 +23,7 @@ from tests.recorder import samples
 
 VEHICLE = Vehicle(length=1.0, width=0.6)
 AT_NS = 1_700_000_000_250_000_000
-VIEWS = (POSE, ODOMETRY, TRANSFORM, SCAN, LOG)
+VIEWS = (POSE, TRANSFORM, SCAN, LOG)
 ALL = [schema_of(kind) for kind in MESSAGE_TYPES.values()] + list(VIEWS)
 
 
@@ -53,18 +52,6 @@ def test_pose_orientation_follows_the_heading() -> None:
     transform = made["foxglove/tf"][1]
     assert (transform["parent_frame_id"], transform["child_frame_id"]) == ("odom", "base_link")
     assert (transform["translation"], transform["rotation"]) == tuple(pose.values())
-
-
-def test_covariances_of_x_y_and_yaw() -> None:
-    fields = views_of(samples.odometry())["foxglove/odometry"][1]
-    assert fields["linear_velocity"]["x"] == 0.5
-    assert fields["angular_velocity"]["z"] == -0.25
-    pose = fields["pose_covariance"]
-    assert [pose[0], pose[1], pose[5]] == [1.0, 2.0, 3.0]
-    assert [pose[30], pose[31], pose[35]] == [7.0, 8.0, 9.0]
-    twist = fields["velocity_covariance"]
-    assert [twist[0], twist[5], twist[30], twist[35]] == [10.0, 11.0, 12.0, 13.0]
-    assert (sum(pose), sum(twist), len(pose), len(twist)) == (45.0, 46.0, 36, 36)
 
 
 def test_a_non_finite_pose_has_no_view() -> None:
@@ -126,6 +113,6 @@ def test_optional_fields_have_their_non_null_type() -> None:
 
 def test_views_have_foxglove_schema_names() -> None:
     assert {one.name for one in VIEWS} == {
-        "foxglove.PoseInFrame", "foxglove.Odometry", "foxglove.FrameTransform",
+        "foxglove.PoseInFrame", "foxglove.FrameTransform",
         "foxglove.LaserScan", "foxglove.Log",
     }  # fmt: skip

@@ -69,7 +69,6 @@ def test_files_have_an_index_and_view_topics(tmp_path: Path) -> None:
         "t2/v1/001/tel/mine": "",
         "foxglove/pose": "foxglove.PoseInFrame",
         "foxglove/tf": "foxglove.FrameTransform",
-        "foxglove/odometry": "foxglove.Odometry",
     }
     found, _ = read(made.path)
     assert [each.kind for each in found] == ["Odometry", ""]

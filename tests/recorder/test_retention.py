@@ -2,8 +2,8 @@
 
 import pytest
 
-from services.recorder.config import MB
 from services.recorder.retention import removable, to_remove
+from services.recorder.storage import MB
 from tests.recorder.files_fixture import CONTINUOUS, INCIDENTS, OLD, names, stored
 
 

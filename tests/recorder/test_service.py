@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,10 +23,12 @@ from common.freshness import NS_PER_S
 from common.messages import Event
 from common.service import Node
 from services.recorder import recorder as recorder_module
-from services.recorder.config import MB, RecorderConfig
+from services.recorder.blackbox import BlackBox
+from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Entry
 from services.recorder.reader import Reader
 from services.recorder.recorder import Recorder
+from services.recorder.storage import MB
 from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
@@ -33,6 +36,12 @@ from tests.recorder import samples
 from verification.harness.bus import running
 from verification.harness.host import StallRecorder
 from verification.harness.waiting import PATIENCE_S, wait_until
+
+
+@pytest.fixture(autouse=True)
+def _short_tail(monkeypatch: pytest.MonkeyPatch) -> None:
+    box = partial(BlackBox, tail_ns=NS_PER_S)
+    monkeypatch.setattr(recorder_module, "BlackBox", box)
 
 
 def sets(buses: BusFixture, folder: Path, *more: str) -> list[str]:
@@ -117,7 +126,7 @@ def test_a_latch_writes_the_black_box(buses: BusFixture, tmp_path: Path) -> None
     latched: list[str] = []
     pretend(buses, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
     pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
-    with recorder(buses, tmp_path, "recorder.tail=1"):
+    with recorder(buses, tmp_path):
         received: list[m.Velocity] = []
         buses.bus(lambda bus: bus.subscribe(keys.VELOCITY, lambda a: received.append(a.message)))
         wait_until(lambda: len(received) > 50, "some history")
@@ -174,7 +183,7 @@ def test_an_incident_replaces_old_recordings_on_a_full_disk(
     events = recorder_events(buses)
     latched: list[str] = []
     pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
-    with recorder(buses, tmp_path, "recorder.free=12", "recorder.tail=1"):
+    with recorder(buses, tmp_path, "recorder.free=12"):
         received: list[m.SafetyState] = []
         buses.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: received.append(a.message)))
         wait_until(lambda: len(received) > 10, "safety's state")

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from common.settings import Vehicle
-from services.recorder.config import MB
 from services.recorder.mcap_codec import Encoder
-from services.recorder.storage import RETRY_NS, Storage
+from services.recorder.storage import MB, RETRY_NS, Storage
 from services.recorder.writer import RecordingWriter
 from tests.recorder.files_fixture import CONTINUOUS, INCIDENTS, names
 from tests.recorder.samples import BEGIN_NS

@@ -1,13 +1,14 @@
 """Continuous recording in files of limited size and duration."""
 
-from services.recorder.config import MB
+from common.freshness import NS_PER_S
+from services.recorder.storage import MB
 from services.recorder.writer import RollingWriter
 from tests.recorder import samples
-from tests.recorder.files_fixture import SETTINGS, Files, at, ns
+from tests.recorder.files_fixture import Files, at, ns
 
 
 def test_a_new_file_starts_after_the_time_limit(files: Files) -> None:
-    writer = RollingWriter(SETTINGS, files.open, files.close)
+    writer = RollingWriter(files.open, files.close, MB, 10 * NS_PER_S)
     writer.flush(ns(0))
     for second in range(25):
         writer.write(at(second))
@@ -24,7 +25,7 @@ def test_a_new_file_starts_after_the_time_limit(files: Files) -> None:
 
 
 def test_a_new_file_starts_after_the_size_limit(files: Files) -> None:
-    writer = RollingWriter(SETTINGS, files.open, files.close)
+    writer = RollingWriter(files.open, files.close, MB, 10 * NS_PER_S)
     big = samples.bare("tel/x", bytes(range(256)) * 4000)
     for number in range(6):
         writer.write(big)

@@ -12,6 +12,7 @@ from common.messages import Event, Health
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
+from tests.cli.recordings import drive_fixture
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 
@@ -28,7 +29,7 @@ def path(tmp_path: Path) -> Path:
         made.write(sample("tel/bridge/velocity", samples.velocity(), number / 10, raw=b"x"))
     made.write(sample("tel/safety/state", samples.state(), 1.0))
     made.flush()
-    made.write(sample("tel/safety/state", samples.state("contact"), 1.5))
+    made.write(sample("tel/safety/state", drive_fixture.state(True), 1.5))
     made.write(sample("evt/bridge", Event(name="contact", level="error", text="hit"), 1.5))
     made.write(bare("tel/mine", b"\xc1", at_s=2.0))
     made.close()
@@ -45,7 +46,7 @@ def test_json_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, printed = as_json(capsys, path)
     assert code == 0
     assert printed["keys"][f"{ROOT}/tel/bridge/velocity"] == {
-        "type": "Velocity", "count": 11, "hz": pytest.approx(10.0), "raw": 11, "faulty": 0,
+        "type": "Velocity", "count": 11, "hz": pytest.approx(10.0), "lost": 0, "faulty": 0,
     }  # fmt: skip
     assert printed["keys"][f"{ROOT}/tel/mine"]["type"] == ""
     assert (printed["cut"], printed["damaged_chunks"], printed["bytes"]) == (
@@ -58,7 +59,10 @@ def test_json_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert printed["versions"] == {"odom": "1.2"}
     event = {"at": 1.5, "who": "bridge", "level": "error", "text": "contact: hit"}
     assert printed["events"] == [event]
-    assert [each["text"] for each in printed["latched"]] == ["contact"]
+    assert printed["stops"] == [
+        {"at": 1.5, "seconds": 0.0, "verdict": "brake", "latched": ["contact"],
+         "reasons": {"contact": "The bumper was hit."}}
+    ]  # fmt: skip
 
 
 def test_a_truncated_file_is_summarized_up_to_its_end(
@@ -84,7 +88,9 @@ def test_text_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for message in (
         "complete", "robot 007, recorded by T2 1.2.3", "reason: latch-contact",
         "16 messages in 2.0 s",
-        "versions: odom 1.2", "001/tel/bridge/velocity", "10.0", "latched:", "contact: hit",
+        "versions: odom 1.2", "001/tel/bridge/velocity", "10.0", "stops:",
+        "events:", "contact: hit",
+        "1.50 s  brake      for 0.0 s: contact: The bumper was hit.",
     ):  # fmt: skip
         assert message in shown, message
 

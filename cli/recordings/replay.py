@@ -1,22 +1,28 @@
 """``t2 replay``: play a recording onto the bus, or its raw frames to a bridge."""
 
 import argparse
+import ipaddress
+import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
+from typing import Self
 
-from cli.inspect.addressing import chunks
-from cli.inspect.session import add_options, open_session, positive, until_interrupt
+from cli.inspect.addressing import chunks, topic_of
+from cli.inspect.session import BusSession, add_options, open_session, positive, until_interrupt
 from cli.recordings.info import open_recording
-from cli.recordings.replay.plan import Selection
-from cli.recordings.replay.targets import BoardTarget, BusTarget, SimulatorTarget, Target
+from cli.recordings.selection import Selection, refusal
+from common import keys
 from common.bus.probe import intersects, valid
 from common.cli_args import sources
+from common.codec import Sample
 from common.config import load
+from common.errors import LinkError, RobotError
 from common.freshness import NS_PER_S
+from common.settings import Board
 from services.bridge.config import BridgeConfig
 
 CHECK_S = 1.0  # between two checks of the target
@@ -40,12 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to", dest="end", type=seconds, default=None, metavar="S", help="stop at this second"
     )
-    target = parser.add_mutually_exclusive_group()
-    target.add_argument(
-        "--simulator", action="store_true",
-        help="send the recorded drive requests to a simulated vehicle; refused for a real one",
-    )  # fmt: skip
-    target.add_argument(
+    parser.add_argument(
         "--frames", action="store_true",
         help="act as the board of a bridge on this host: send it the raw frames",
     )  # fmt: skip
@@ -73,7 +74,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 @contextmanager
-def open_target(options: argparse.Namespace) -> Iterator[tuple[Target, Selection]]:
+def open_target(
+    options: argparse.Namespace,
+) -> Iterator[tuple["BoardTarget | BusTarget", Selection]]:
     """Yield the target and the selection of messages."""
     select = partial(
         Selection,
@@ -86,14 +89,76 @@ def open_target(options: argparse.Namespace) -> Iterator[tuple[Target, Selection
     with ExitStack() as stack:
         if options.frames:
             board = load(BridgeConfig, sources(options)).config.board
-            yield stack.enter_context(BoardTarget(board)), select("board")
+            yield stack.enter_context(BoardTarget(board)), select(frames=True)
             return
-        session = stack.enter_context(open_session(options))
-        if options.simulator:
-            yield SimulatorTarget(session, session.robot), select("simulator")
-        else:
-            bus = BusTarget(session, session.robot)
-            yield bus, select("bus", alive=bus.alive())
+        bus = BusTarget(stack.enter_context(open_session(options)))
+        yield bus, select(alive=bus.alive())
+
+
+class BusTarget:
+    """The keys of a robot without a running bridge or safety service."""
+
+    def __init__(self, session: BusSession) -> None:
+        """Raise ``RobotError`` if one of them is running."""
+        self._probe = session.probe
+        self._robot = session.robot
+        self.check()
+
+    def alive(self) -> set[str]:
+        """Return the names of the running services."""
+        tokens = self._probe.alive(keys.live_key(self._robot, "*", "*"))
+        return {token.split("/")[-2] for token in tokens}
+
+    def check(self) -> None:
+        """Raise ``RobotError`` if a bridge or safety service has started."""
+        why = refusal(self._robot, self.alive())
+        if why:
+            raise RobotError(why)
+
+    def play(self, path: str, sample: Sample) -> bool:
+        """Publish the original bytes; return whether anything was sent."""
+        if sample.deleted:
+            return False
+        key = f"{keys.ROOT}/{self._robot}/{path}"
+        topic = topic_of(key)
+        service = topic.service if topic else keys.SLOW
+        self._probe.put(key, sample.payload, sample.encoding, service, sample.raw)
+        return True
+
+
+class BoardTarget:
+    """A bridge on this host: receives the raw frames as if from its board."""
+
+    def __init__(self, board: Board) -> None:
+        """Raise ``RobotError`` if the board is elsewhere, ``LinkError`` if its port is taken."""
+        if not ipaddress.ip_address(board.address).is_loopback:
+            raise RobotError(f"--frames: the board at {board.address} is a real one")
+        self._to = board.listen_address, board.listen_ports[0]
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind((board.address, board.port))
+        except OSError as error:
+            self._socket.close()
+            raise LinkError(
+                f"cannot act as the board at {board.address}:{board.port}: {error.strerror}; "
+                "is a simulated one running?"
+            ) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+    def check(self) -> None:
+        """Do nothing: no condition can change."""
+
+    def play(self, path: str, sample: Sample) -> bool:
+        """Send the raw frame attached to a message; return whether there is one."""
+        if sample.raw is None:
+            return False
+        self._socket.sendto(sample.raw, self._to)
+        return True
 
 
 class Pacer:

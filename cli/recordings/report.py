@@ -1,37 +1,81 @@
-"""The report as one HTML page; all content from the bus is escaped."""
+"""``t2 report FILE...``: an HTML report of each recording, in one self-contained file.
 
+It shows the path, the velocities (requested, allowed, measured), sonar ranges, stops with their
+reasons, events, rates and gaps of each stream. All content from the bus is escaped. It needs the
+extra ``report``.
+"""
+
+import argparse
 from datetime import UTC, datetime
 from pathlib import Path
-
-from jinja2 import Environment, StrictUndefined
+from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import chunks
-from cli.recordings.report import figures
-from cli.recordings.report.fixed_labels import chart
-from cli.recordings.report.timeline import Timeline
+from cli.recordings.info import open_recording, timeline_of
+from cli.recordings.timeline import Timeline
+from common.errors import RobotError
 from common.freshness import NS_PER_S
-from services.recorder.reader import Reader
+from common.text import printable
 
-TEMPLATE = Path(__file__).with_name("page.html")
+if TYPE_CHECKING:
+    from services.recorder.reader import Reader
+
+TEMPLATE = Path(__file__).with_name("report.html")
 EVENTS_MAX = 500
 
 
-def timeline_of(reader: Reader) -> Timeline:
-    """Return the timeline of a recording; raise ``RobotError`` if it is not a recording."""
-    timeline = Timeline()
-    for recorded in reader:
-        timeline.add(recorded.key, recorded.message, recorded.log_ns)
-    return timeline
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="recordings (.mcap)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="HTML",
+        help="output file, for one FILE; by default FILE with the suffix .html",
+    )
 
 
-def page(timeline: Timeline, reader: Reader) -> str:
+def run(options: argparse.Namespace) -> int:
+    """Write a report for each file and print its path; raise ``RobotError`` on the first error."""
+    files: list[Path] = options.files
+    if options.out and len(files) > 1:
+        raise RobotError(f"--out is for one recording, and there are {len(files)} recordings")
+    for file in files:
+        out = options.out or file.with_suffix(".html")
+        write_report(file, out)
+        print(out)
+    return 0
+
+
+def write_report(file: Path, out: Path) -> None:
+    """Write the report of one recording."""
+    if out.exists() and file.exists() and out.samefile(file):
+        raise RobotError(f"{out}: is the recording itself; choose another file with --out")
+    with open_recording(file) as reader:
+        timeline = timeline_of(reader)
+        if timeline.began_ns is None:
+            raise RobotError(f"{file}: contains no messages of the bus")
+        text = printable(page(timeline, reader), "\n")
+    try:
+        out.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RobotError(f"{out}: cannot be written: {error.strerror}") from None
+
+
+def page(timeline: Timeline, reader: "Reader") -> str:
     """Return the page of a recording that has been read to its end."""
+    try:
+        from jinja2 import Environment, StrictUndefined
+
+        from cli.recordings import figures
+    except ImportError as error:
+        raise RobotError(f"a report needs {error.name}: pip install -e '.[report]'") from None
     # The fastest streams first, event-driven keys last.
     streams = sorted(timeline.streams.values(), key=lambda each: (-each.expected_hz, each.key))
     names = [chunks(stream.key)[1] or stream.key for stream in streams]
     has_ranges = any(series.times for series in timeline.ranges.values())
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters |= {"chart": chart, "clock": clock, "figure": figure, "ms": ms}
+    environment.filters |= {"clock": clock, "figure": figure}
     return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
         timeline=timeline,
         title=reader.path.name,
@@ -42,11 +86,10 @@ def page(timeline: Timeline, reader: Reader) -> str:
         path=figures.path(timeline) if timeline.path else "",
         speeds=figures.speeds(timeline),
         ranges=figures.ranges(timeline) if has_ranges else "",
-        arrivals=figures.arrivals(timeline, streams, names),
     )
 
 
-def summary(timeline: Timeline, reader: Reader) -> dict[str, str]:
+def summary(timeline: Timeline, reader: "Reader") -> dict[str, str]:
     """Return the summary at the top of the page, by name."""
     began = datetime.fromtimestamp((timeline.began_ns or 0) / NS_PER_S, UTC)
     robots = sorted({robot for key in timeline.streams if (robot := chunks(key)[0])})
@@ -59,13 +102,12 @@ def summary(timeline: Timeline, reader: Reader) -> dict[str, str]:
         "distance": f"{timeline.distance:.1f} m",
         "stops": f"{len(timeline.stops)}, {while_driving} while driving",
         "services": versions or "no health messages",
-        "messages": f"{sum(len(stream.times) for stream in timeline.streams.values())}"
-        f" on {len(timeline.streams)} keys",
+        "messages": f"{timeline.messages} on {len(timeline.streams)} keys",
         "recorded": ", ".join(f"{name} {value}" for name, value in sorted(reader.about.items())),
     }
 
 
-def warnings(timeline: Timeline, reader: Reader) -> list[str]:
+def warnings(timeline: Timeline, reader: "Reader") -> list[str]:
     """Return warnings about an incomplete recording."""
     found = []
     if reader.cut:
@@ -89,8 +131,3 @@ def clock(seconds: float) -> str:
 def figure(value: float | None, form: str) -> str:
     """Format a number; empty for None."""
     return "" if value is None else format(value, form)
-
-
-def ms(seconds: float | None) -> str:
-    """Format a duration in milliseconds; empty for None."""
-    return "" if seconds is None else f"{1000 * seconds:.1f}"

@@ -1,4 +1,4 @@
-"""Timeline of a recording: time series, path, phases and events for the plots. Pure.
+"""Timeline of a recording, for ``t2 info`` and ``t2 report``: series, path, stops, events. Pure.
 
 Times are seconds since the recording's first message, on the recorder's wall clock. A series holds
 NaN in a gap and for a non-finite value, so that no line is drawn through it.
@@ -9,13 +9,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from cli.recordings.report.stops import Phases, Stop, stops
-from cli.recordings.report.streams import Stream
+from cli.recordings.stops import Phase, Stop, add_state, stops
+from cli.recordings.streams import Stream
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import (
     SONAR_NAMES,
-    Bumper,
     Drive,
     Event,
     Health,
@@ -95,20 +94,24 @@ class Timeline:
     ranges: dict[str, Series] = field(
         default_factory=lambda: {name: Series() for name in SONAR_NAMES}
     )
-    pressed: Phases[bool] = field(default_factory=lambda: Phases(GAP_S))
-    verdicts: Phases[SafetyState] = field(default_factory=lambda: Phases(GAP_S))
+    verdicts: list[Phase] = field(default_factory=list)
     events: list[TimedEvent] = field(default_factory=list)
     streams: dict[str, Stream] = field(default_factory=dict)  # by key
     versions: dict[str, str] = field(default_factory=dict)  # by service
 
-    def add(self, key: str, message: Message | None, log_ns: int) -> None:
-        """Add a message of a key; None for one that could not be decoded."""
+    def add(self, key: str, kind: str, message: Message | None, log_ns: int) -> None:
+        """Add a message of a key and its type; None for one that could not be decoded."""
         self.began_ns = log_ns if self.began_ns is None else self.began_ns
         at_s = (log_ns - self.began_ns) / NS_PER_S
         self.lasted_s = max(self.lasted_s, at_s)
-        self.streams.setdefault(key, Stream(key)).add(at_s, message)
+        self.streams.setdefault(key, Stream(key, kind)).add(at_s, message)
         if message is not None:
             self._add(message, key, at_s)
+
+    @property
+    def messages(self) -> int:
+        """Return the number of messages."""
+        return sum(len(stream.times) for stream in self.streams.values())
 
     @property
     def distance(self) -> float:
@@ -118,7 +121,7 @@ class Timeline:
     @property
     def stops(self) -> list[Stop]:
         """Return the stops commanded by safety."""
-        return stops(self.verdicts.done)
+        return stops(self.verdicts)
 
     def _add(self, message: Message, key: str, at_s: float) -> None:
         """Add a message by its type; other types are only counted."""
@@ -154,16 +157,13 @@ class Timeline:
         self.linear.lower.add(at_s, -message.limits.backward)
         self.angular.upper.add(at_s, message.limits.angular)
         self.angular.lower.add(at_s, -message.limits.angular)
-        value = message.verdict, message.latched, tuple(cause.name for cause in message.causes)
-        self.verdicts.add(at_s, value, message)
+        add_state(self.verdicts, at_s, message, GAP_S)
 
     def _add_sensor_or_report(self, message: Message, key: str, at_s: float) -> None:
         match message:
             case Ultrasonic():
                 for name, distance in zip(SONAR_NAMES, message.ranges, strict=True):
                     self.ranges[name].add(at_s, distance)
-            case Bumper():
-                self.pressed.add(at_s, message.pressed, message.pressed)
             case Event():
                 self.events.append(TimedEvent(at_s, key.rpartition("/")[2], message))
             case Health():

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from cli.recordings.report.timeline import Series, Timeline, downsampled
+from cli.recordings.timeline import Series, Timeline, downsampled
 from common.freshness import NS_PER_S
-from tests.cli.recordings.report import drive_fixture
-from tests.cli.recordings.report.drive_fixture import BEGIN_NS, HIT_S, RESET_S, drive
+from tests.cli.recordings import drive_fixture
+from tests.cli.recordings.drive_fixture import BEGIN_NS, HIT_S, RESET_S, drive
 
 
 @pytest.fixture
@@ -35,11 +35,10 @@ def test_stop_with_reason_and_event(timeline: Timeline) -> None:
     assert [(each.at_s, each.service) for each in timeline.events] == [(HIT_S, "safety")]
 
 
-def test_path_ranges_bumper_and_versions(timeline: Timeline) -> None:
+def test_path_ranges_and_versions(timeline: Timeline) -> None:
     assert timeline.distance == pytest.approx(199 * 0.02)
     assert math.isnan(timeline.ranges["front_left"].values[0])
     assert timeline.ranges["left"].values[0] == 1.0
-    assert [phase.lasts_s for phase in timeline.pressed.done if phase.state] == [pytest.approx(1.0)]
     assert timeline.versions == {"bridge": "0.1.0"}
     assert timeline.lasted_s == pytest.approx(9.95)
 
@@ -77,6 +76,6 @@ def test_downsampling_keeps_peaks_and_gaps() -> None:
 
 def test_time_starts_at_the_first_message() -> None:
     timeline = Timeline()
-    timeline.add("t2/v1/001/tel/mine", None, BEGIN_NS)
-    timeline.add("t2/v1/001/tel/mine", None, BEGIN_NS + 3 * NS_PER_S)
+    timeline.add("t2/v1/001/tel/mine", "", None, BEGIN_NS)
+    timeline.add("t2/v1/001/tel/mine", "", None, BEGIN_NS + 3 * NS_PER_S)
     assert (timeline.lasted_s, timeline.streams["t2/v1/001/tel/mine"].times) == (3.0, [0.0, 3.0])

@@ -12,7 +12,7 @@ HIT_S, RESET_S, END_S = 4.0, 7.0, 10.0
 CONTACT = m.Cause(name="contact", action="brake", age=0.0, text="The bumper was hit.")
 IDLE = m.Cause(name="no_request", action="stop", age=0.0, text="No source requests motion.")
 
-Arrival = tuple[str, m.Message, int]  # key, message, arrival time in ns
+Arrival = tuple[str, str, m.Message, int]  # key, type, message, arrival time in ns
 
 
 def drive() -> Iterator[Arrival]:
@@ -25,7 +25,6 @@ def drive() -> Iterator[Arrival]:
             ("tel/safety/state", state(held, number)),
             ("@cmd/motion", motion(held, number)),
             ("tel/bridge/velocity", m.Velocity(seq=number, boot=2, linear=0.4, angular=0.1)),
-            ("tel/bridge/bumper", m.Bumper(seq=number, boot=2, pressed=held and at_s < HIT_S + 1)),
             ("tel/bridge/ultrasonic", ultrasonic(number)),
             ("tel/odom/odometry", odometry(number)),
         ):
@@ -38,7 +37,7 @@ def drive() -> Iterator[Arrival]:
 
 def at(path: str, message: m.Message, at_s: float) -> Arrival:
     """Return a message with its arrival time, in seconds since the start."""
-    return f"{ROOT}/001/{path}", message, BEGIN_NS + round(at_s * NS_PER_S)
+    return f"{ROOT}/001/{path}", type(message).__name__, message, BEGIN_NS + round(at_s * NS_PER_S)
 
 
 def state(held: bool, number: int = 0) -> m.SafetyState:

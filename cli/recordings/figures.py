@@ -3,26 +3,21 @@
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Sequence
 from itertools import groupby
 
 import ziaplot as zp
 from ziaplot.canvas import Borders, Canvas, ViewBox
 from ziaplot.style import DashTypes, MarkerTypes
 
-from cli.recordings.report.stops import Period
-from cli.recordings.report.streams import Stream
-from cli.recordings.report.timeline import Series, Timeline, VelocitySeries, downsampled
+from cli.recordings.timeline import Series, Timeline, VelocitySeries, downsampled
 
 WIDTH = 1100  # pixels
 REQUESTED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#c5ccd3"
-STOPPED, TEXT, MUTED = "#cf1f26", "#0a0e13", "#8a939c"
-GROUND = "white"
+STOPPED, TEXT = "#cf1f26", "#0a0e13"
 VERDICTS = {
     "run": "#1a7f37", "slow": "#f0b429", "stop": "#8a939c", "brake": "#cf1f26",
     "inhibited": "#7a3fd0",
 }  # fmt: skip
-LEVELS = {"info": MUTED, "warning": "#b35900", "error": STOPPED}
 FRONT = ("front_left", "front", "front_right")
 SONARS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd")
 DASHES: tuple[DashTypes, ...] = ("-", "--", ":", "-.")
@@ -84,50 +79,30 @@ def path(timeline: Timeline) -> str:
     for number, stop in enumerate(timeline.stops, 1):
         place = place_at(timeline, stop.begins_s)
         if place:
-            graph.add(zp.Point(place).marker("x", 5).color(STOPPED))
-            graph.add(zp.Text(*place, f"\u2002{number}", valign="top").color(STOPPED))
+            graph.add(zp.Point(place).marker("x", 5).label(str(number), "SE").color(STOPPED))
     _fit(graph, timeline)
     return svg(graph, 560, "path")
 
 
 def speeds(timeline: Timeline) -> str:
-    """Draw linear and angular velocity over time, with verdicts and events."""
+    """Draw linear and angular velocity over time, with the verdicts."""
     rows = (
         _velocity(timeline, timeline.linear, "linear, m/s"),
         _velocity(timeline, timeline.angular, "angular, rad/s"),
         _verdicts(timeline),
-        _events(timeline),
     )
-    return svg(zp.LayoutV(*rows, row_gap=4, row_heights="5fr 5fr 1fr 2fr"), 700, "speeds")
+    return svg(zp.LayoutV(*rows, row_gap=4, row_heights="4fr 4fr 1fr"), 620, "speeds")
 
 
 def ranges(timeline: Timeline) -> str:
-    """Draw the eight sonar ranges over time, and when the bumper was pressed."""
+    """Draw the eight sonar ranges over time, with the stops."""
     front, rest = _over_time(timeline, "range, m"), _over_time(timeline, "range, m", "time, s")
     for graph, names in ((front, FRONT), (rest, [n for n in timeline.ranges if n not in FRONT])):
         for name, color in zip(names, SONARS, strict=False):
             _line(graph, timeline.ranges[name], color, name.replace("_", " "))
-        for phase in timeline.pressed.done:
-            if phase.state:
-                _span(graph, phase, f"{STOPPED} 50%")
+        for stop in timeline.stops:
+            _span(graph, stop.begins_s, stop.ends_s, f"{STOPPED} 8%")
     return svg(zp.LayoutV(front, rest, row_gap=4), 500, "ranges")
-
-
-def arrivals(timeline: Timeline, streams: Sequence[Stream], names: Sequence[str]) -> str:
-    """Draw the arrivals of each stream, one row each, with gaps in red and silences blank."""
-    graph = _rows(timeline, names, "time, s")
-    for row, stream in enumerate(streams):
-        if not stream.expected_hz:  # event-driven
-            ticks = zp.Scatter(stream.times, [-row] * len(stream.times))
-            graph.add(ticks.marker("|", 5).color(MEASURED))
-            continue
-        _bar(graph, (stream.times[0], stream.times[-1]), row, MEASURED, 5)
-        for silence in stream.silences:
-            _bar(graph, silence, row, GROUND, 5)
-        for gap in stream.gaps:
-            _bar(graph, gap, row, GROUND, 5)
-            _bar(graph, gap, row, STOPPED, 2)
-    return svg(graph, 90 + 24 * len(streams), "arrivals")
 
 
 def place_at(timeline: Timeline, at_s: float) -> tuple[float, float] | None:
@@ -158,18 +133,6 @@ def _over_time(timeline: Timeline, y_name: str | None, x_name: str | None = None
     return graph
 
 
-def _rows(timeline: Timeline, names: Sequence[str], x_name: str | None = None) -> zp.Graph:
-    """Return a graph with a row for each name, the first one on top."""
-    graph = _over_time(timeline, None, x_name)
-    graph.css("Graph.GridY { color: none; }")
-    graph.yrange(0.5 - max(len(names), 1), 0.5)
-    if names:
-        graph.yticks([-row for row in range(len(names))], names)
-    else:
-        graph.noyticks()
-    return graph
-
-
 def _velocity(timeline: Timeline, series: VelocitySeries, label: str) -> zp.Graph:
     graph = _over_time(timeline, label)
     _line(graph, series.upper, LIMIT, "safety's limits", width=2)
@@ -180,30 +143,20 @@ def _velocity(timeline: Timeline, series: VelocitySeries, label: str) -> zp.Grap
     _line(graph, series.measured, MEASURED, "measured")
     top = graph.datarange().ymax
     for number, stop in enumerate(timeline.stops, 1):
-        _span(graph, stop, f"{STOPPED} 8%")
+        _span(graph, stop.begins_s, stop.ends_s, f"{STOPPED} 8%")
         graph.add(zp.Text(stop.begins_s, top, str(number), valign="top").color(STOPPED))
     return graph
 
 
 def _verdicts(timeline: Timeline) -> zp.Graph:
-    graph = _rows(timeline, ["verdict"])
-    phases = timeline.verdicts.done
-    for phase in phases:
-        _span(graph, phase, VERDICTS[phase.state.verdict])
-    for verdict in dict.fromkeys(phase.state.verdict for phase in phases):
+    graph = _over_time(timeline, None, "time, s")
+    graph.css("Graph.GridY { color: none; }")
+    graph.yrange(-0.5, 0.5)
+    graph.yticks([0], ["verdict"])
+    for phase in timeline.verdicts:
+        _span(graph, phase.begins_s, phase.ends_s, VERDICTS[phase.state.verdict])
+    for verdict in dict.fromkeys(phase.state.verdict for phase in timeline.verdicts):
         _line(graph, Series(), VERDICTS[verdict], verdict, width=6)
-    return graph
-
-
-def _events(timeline: Timeline) -> zp.Graph:
-    services = sorted({each.service for each in timeline.events})
-    graph = _rows(timeline, services, "time, s")
-    for level, color in LEVELS.items():
-        events = [each for each in timeline.events if each.event.level == level]
-        if events:
-            rows = [-services.index(each.service) for each in events]
-            ticks = zp.Scatter([each.at_s for each in events], rows)
-            graph.add(ticks.marker("|", 5).color(color))
     return graph
 
 
@@ -220,14 +173,10 @@ def _line(
     graph.add(line.name(label).color(color).strokewidth(width).stroke(dash))
 
 
-def _span(graph: zp.Graph, period: Period, color: str) -> None:
+def _span(graph: zp.Graph, begins_s: float, ends_s: float, color: str) -> None:
     """Shade a period over the graph's full height."""
-    span = zp.Rectangle(period.begins_s, -BEYOND, period.lasts_s, 2 * BEYOND)
+    span = zp.Rectangle(begins_s, -BEYOND, ends_s - begins_s, 2 * BEYOND)
     graph.add(span.fill(color).color("none"))
-
-
-def _bar(graph: zp.Graph, period: tuple[float, float], row: int, color: str, width: float) -> None:
-    graph.add(zp.PolyLine(period, (-row, -row)).color(color).strokewidth(width))
 
 
 def _mark(graph: zp.Graph, place: tuple[float, float], shape: MarkerTypes, label: str) -> None:

@@ -1,21 +1,16 @@
 """Selection of the messages to replay. Pure.
 
 Onto a bus, ``t2 replay`` never plays what moves or stops the vehicle: no drive request, no motion
-command and no emergency stop. To a simulated vehicle it plays only drive requests and emergency
-stops, and the running safety service decides about them; recorded motion commands are never played.
+command and no emergency stop.
 """
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from typing import Literal
 
 from common import keys
 from common.freshness import NS_PER_S
 
-TargetKind = Literal["bus", "simulator", "board"]
-
 DECIDING = ("bridge", "safety")  # services that act, and on whose messages others act
-DRIVE = keys.DRIVE.path.partition("{")[0]
 
 
 def moves(path: str) -> bool:
@@ -45,13 +40,13 @@ def refusal(robot: str, alive: Collection[str]) -> str:
 class Selection:
     """The messages to play; times in seconds since the start of the recording."""
 
-    target: TargetKind
     matches: Callable[[str, str], bool]  # a key expression and a key below the robot
     only: Collection[str] = ()  # key expressions below the robot; empty means all
     skip: Collection[str] = ()
     from_s: float = 0.0
     to_s: float | None = None
     alive: Collection[str] = ()  # running services: their streams are not played
+    frames: bool = False  # to a bridge, not onto a bus
     _begin_ns: int | None = None
     _known: dict[str, bool] = field(default_factory=dict)
 
@@ -73,9 +68,7 @@ class Selection:
         return log_ns - self._begin_ns > self.to_s * NS_PER_S
 
     def _is_allowed(self, path: str) -> bool:
-        if self.target == "simulator":
-            return path == keys.ESTOP_PATH or path.startswith(DRIVE)
-        return self.target == "board" or not (moves(path) or publisher(path) in self.alive)
+        return self.frames or not (moves(path) or publisher(path) in self.alive)
 
     def _is_selected(self, path: str) -> bool:
         wanted = not self.only or any(self.matches(each, path) for each in self.only)

@@ -1,1 +1,0 @@
-"""``t2 replay``: recordings onto the bus, or their raw frames to a bridge."""

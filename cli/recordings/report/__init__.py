@@ -1,1 +1,0 @@
-"""``t2 report``: an HTML report of a recording."""
