@@ -95,7 +95,6 @@ def test_a_service_leaves_the_sections_of_others_alone(settings_dir: SettingsFix
     ("text", "path", "value"),
     [
         ("robot.id=007", "robot.id", "007"),  # text stays text
-        ("robot.id = a ", "robot.id", "a"),
         ("board.listen_ports=4002, 4001", "board.listen_ports", (4002, 4001)),
         ("board.listen_ports=[4002]", "board.listen_ports", (4002,)),
         ("bus.listen=tcp/[::1]:1,ws/[::1]:2", "bus.listen", ("tcp/[::1]:1", "ws/[::1]:2")),
@@ -104,7 +103,6 @@ def test_a_service_leaves_the_sections_of_others_alone(settings_dir: SettingsFix
         ("odom.hold=5e-2", "odom.hold", 0.05),
         ("log.format=json", "log.format", "json"),
         ("safety.sources.web.priority=3", "safety.sources.web.priority", 3),
-        ("odom.turn_noise=2", "odom.turn_noise", 2.0),
     ],
 )  # fmt: skip
 def test_a_set_is_read_as_its_field_wants_it(
@@ -190,10 +188,8 @@ def test_a_wrong_file_is_refused_by_name_value_and_range(
     [
         ("board.port", "--set board.port: should look like board.port=4002"),
         ("=4002", "--set =4002: should look like board.port=4002"),
-        (" =4002", "should look like board.port=4002"),
         ("board.port=", "--set board.port=: board.port = '': Expected `int`, got `str`"),
         ("board..port=3", "--set board..port=3: board.: unknown"),
-        ("port=3", "--set port=3: port: no section 'port'"),
         ("safety.sources.web.lease=99", "safety.sources.web.lease = 99: Expected `float` <= 10.0"),
     ],
 )
@@ -206,7 +202,6 @@ def test_a_wrong_set_is_refused(settings_dir: SettingsFixture, sets: str, senten
     [
         ("T2__BOARD__PORT", "x", "environment T2__BOARD__PORT: board.port = 'x': Expected `int`"),
         ("T2__BOARD", "1", "environment T2__BOARD: board = 1: Expected `object`, got `int`"),
-        ("T2__BORD__PORT", "1", "environment T2__BORD__PORT: bord.port: no section 'bord'"),
         ("T2__", "1", "environment T2__: : no section ''"),
     ],
 )

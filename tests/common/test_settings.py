@@ -1,11 +1,12 @@
-"""Sections that two services share: what they refuse."""
+"""Sections that several services share: what they allow and refuse; the places of sonars."""
 
-import re
+import math
 from typing import Any, ClassVar
 
 import msgspec
 import pytest
 
+from common.messages import SONAR_NAMES
 from common.settings import (
     Board,
     BusSettings,
@@ -15,6 +16,7 @@ from common.settings import (
     Section,
     Vehicle,
     Wire,
+    sonar_mounts,
 )
 
 
@@ -22,144 +24,108 @@ class Guarded(ProtectedSection, frozen=True, kw_only=True):
     """A section with two protections."""
 
     protective: ClassVar[Limits] = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
-    margin: float
-    lease: float
+    margin: float = 0.2
+    lease: float = 0.2
+
+
+NAN, INF = math.nan, math.inf
 
 
 @pytest.mark.parametrize(
-    ("given", "unsafe_overrides"),
+    ("given", "refusal"),
     [
-        ({"margin": 0.05, "lease": 0.5}, ()),  # both ends are allowed
-        ({"margin": 10.0, "lease": 0.0}, ()),
-        ({"margin": 0.0, "lease": 0.5}, ("margin",)),
-        ({"margin": 0.2, "lease": 0.2}, ("margin",)),  # an override does not help
+        ({"margin": 0.05, "lease": 0.5}, ""),  # both ends are allowed
+        ({"margin": 10.0, "lease": 0.0}, ""),
+        ({"margin": 0.0, "unsafe_overrides": ("margin",)}, ""),
+        ({"unsafe_overrides": ("margin",)}, ""),  # an override without need
+        ({"margin": 0.04}, r"margin = 0.04 takes a protection away; allowed is 0.05\.\.10.0"),
+        ({"lease": 0.51, "unsafe_overrides": ("margin",)}, "lease = 0.51 takes a protection away"),
+        ({"margin": NAN}, "margin = nan takes a protection away"),
+        ({"lease": INF}, "lease = inf takes a protection away"),
+        ({"unsafe_overrides": ("speed",)}, "'speed', which takes no protection away"),
     ],
 )
-def test_protections_may_be_kept_or_owned_up_to(
-    given: dict[str, float], unsafe_overrides: tuple[str, ...]
-) -> None:
-    Guarded(**given, unsafe_overrides=unsafe_overrides)
+def test_a_protection_is_taken_away_by_name_only(given: dict[str, Any], refusal: str) -> None:
+    if not refusal:
+        Guarded(**given)
+        return
+    with pytest.raises(ValueError, match=refusal):
+        Guarded(**given)
+
+
+# --- the bus ------------------------------------------------------------------------------------
+
+TLS: dict[str, Any] = {"ca": "ca.pem", "certificate": "c.pem", "private_key": "c.key"}
+LIKE, OPEN = "should look like tcp/", r"lets everybody on the network drive; .*--insecure"
+MEMBERS, PASS = "wants members: the list of `t2 keys`", r"would pass for a service on board, as"
+SOCKET, LIST = "unixsock-stream//run/t2.sock", "members.json"
 
 
 @pytest.mark.parametrize(
-    ("margin", "lease", "unsafe_overrides", "sentence"),
+    ("given", "refusal"),
     [
-        (0.04, 0.5, (), r"margin = 0.04 takes a protection away; allowed is 0.05\.\.10.0"),
-        (0.2, 0.51, ("margin",), "lease = 0.51 takes a protection away"),
-        (float("nan"), 0.5, (), "margin = nan takes a protection away"),
-        (0.2, float("inf"), (), "lease = inf takes a protection away"),
-        (0.2, 0.5, ("speed",), "unsafe_overrides names 'speed', which takes no protection away"),
+        *(
+            ({way: (endpoint,)}, LIKE)
+            for endpoint in ("", "tcp", "tcp/", "tcp/127.0.0.1", "127.0.0.1:7447", "http/a:1")
+            for way in ("listen", "connect")
+        ),
+        *(
+            ({"connect": (endpoint,), **TLS}, "")
+            for endpoint in ("tcp/[::1]:7447", "tls/robot.local:7447", SOCKET,
+                             "tcp/127.0.0.1:7447?rel=1", "tcp/127.0.0.1:7447#iface=lo")
+        ),
+        ({"listen": ()}, "one of listen and connect needs an endpoint"),
+        # What other hosts can reach.
+        *(
+            ({way: (endpoint,)}, OPEN)
+            for endpoint in ("tcp/0.0.0.0:1", "udp/[::]:1", "tcp/192.0.2.1:1", "ws/robot.local:1")
+            for way in ("listen", "uplink")
+        ),
+        ({"listen": ("tcp/0.0.0.0:1",), "insecure": True}, ""),
+        *(
+            ({"listen": (endpoint,)}, "")
+            for endpoint in ("tcp/127.8.8.8:1", "udp/[::1]:1#iface=lo", "ws/localhost:1", SOCKET)
+        ),
+        ({"uplink": ("tcp/127.0.0.1:7448",)}, ""),
+        ({"uplink": ("tcp/127.0.0.1:7448",), "members": LIST}, PASS),
+        ({"uplink": ("tcp/localhost:7448",), "members": LIST}, PASS),
+        ({"uplink": ("tcp/127.0.0.1:7448",), "members": LIST, "listen": (SOCKET,)}, ""),
+        # What needs certificates and members.
+        *(
+            ({way: ("tls/a:1",), "members": LIST, **TLS, name: ""}, f"^tls/a:1 wants {name}: a PEM")
+            for way in ("listen", "connect", "uplink")
+            for name in TLS
+        ),
+        ({"listen": ("quic/0.0.0.0:7447",), **TLS}, MEMBERS),
+        ({"uplink": ("tls/site.example:7447",), **TLS}, MEMBERS),
+        ({"uplink": ("tls/site.example:7447",), "members": LIST, **TLS}, ""),
+        ({"connect": ("tls/10.7.5.220:7447",), **TLS}, ""),  # a client accepts no connections
     ],
-)
-def test_protections_are_not_taken_away_by_accident(
-    margin: float, lease: float, unsafe_overrides: tuple[str, ...], sentence: str
-) -> None:
-    with pytest.raises(ValueError, match=sentence):
-        Guarded(margin=margin, lease=lease, unsafe_overrides=unsafe_overrides)
-
-
-CERTIFIED: dict[str, Any] = {"ca": "ca.pem", "certificate": "c.pem", "private_key": "c.key"}
-
-
-@pytest.mark.parametrize(
-    "endpoint",
-    ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tls/robot.local:7447", "unixsock-stream//run/t2.sock",
-     "tcp/127.0.0.1:7447?rel=1", "tcp/127.0.0.1:7447#iface=lo"],
 )  # fmt: skip
-def test_endpoints_that_zenoh_can_carry(endpoint: str) -> None:
-    assert BusSettings(connect=(endpoint,), **CERTIFIED).endpoints == (endpoint,)
-
-
-@pytest.mark.parametrize(
-    "endpoint",
-    ["", "tcp", "tcp/", "tcp/127.0.0.1", "127.0.0.1:7447", "http/a:1", "unixsock-stream/"],
-)
-def test_other_endpoints_are_refused(endpoint: str) -> None:
-    with pytest.raises(ValueError, match="should look like tcp/"):
-        BusSettings(connect=(endpoint,))
-    with pytest.raises(ValueError, match="should look like tcp/"):
-        BusSettings(listen=(endpoint,))
-
-
-def test_a_bus_needs_an_endpoint() -> None:
-    with pytest.raises(ValueError, match="one of listen and connect needs an endpoint"):
-        BusSettings(listen=(), connect=())
-
-
-def test_services_dial_the_embedded_router_where_they_can_reach_it() -> None:
-    addresses = ("tcp/0.0.0.0:7447", "tcp/[::]:7448", "tcp/10.0.0.1:7449")
-    listening = BusSettings(listen=addresses, insecure=True)
-    assert listening.endpoints == ("tcp/127.0.0.1:7447", "tcp/[::1]:7448", "tcp/10.0.0.1:7449")
-
-
-def test_services_on_board_need_no_certificate() -> None:
-    socket = "unixsock-stream//run/t2/bus.sock"
-    both = BusSettings(listen=("tls/0.0.0.0:7447", socket), members="members.json", **CERTIFIED)
-    assert both.endpoints == (socket,)
-    alone = BusSettings(listen=("tls/0.0.0.0:7447",), members="members.json", **CERTIFIED)
-    assert alone.endpoints == ("tls/127.0.0.1:7447",)
-
-
-@pytest.mark.parametrize(
-    "endpoint", ["tcp/0.0.0.0:1", "tcp/[::]:1", "udp/10.7.5.220:1", "ws/robot.local:1"]
-)
-def test_a_robot_is_not_opened_to_its_network_by_accident(endpoint: str) -> None:
-    with pytest.raises(ValueError, match=r"lets everybody on the network drive; .*--insecure"):
-        BusSettings(listen=("tcp/127.0.0.1:7447", endpoint))
-    assert BusSettings(listen=(endpoint,), insecure=True).listen == (endpoint,)
-
-
-@pytest.mark.parametrize(
-    "endpoint", ["tcp/127.0.0.1:1", "tcp/127.8.8.8:1", "udp/[::1]:1#iface=lo", "ws/localhost:1",
-                 "unixsock-stream//run/t2/bus.sock"],
-)  # fmt: skip
-def test_what_only_this_machine_reaches_may_be_open(endpoint: str) -> None:
-    assert BusSettings(listen=(endpoint,)).listen == (endpoint,)
-
-
-@pytest.mark.parametrize("name", sorted(CERTIFIED))
-@pytest.mark.parametrize("way", ["listen", "connect", "uplink"])
-def test_tls_wants_its_files(way: str, name: str) -> None:
-    given: dict[str, Any] = {
-        way: ("tls/10.7.5.220:7447",),
-        "members": "members.json",
-        **CERTIFIED,
-        name: "",
-    }
-    with pytest.raises(ValueError, match=rf"^tls/10\.7\.5\.220:7447 wants {name}: a PEM file"):
+def test_endpoints_of_the_bus(given: dict[str, Any], refusal: str) -> None:
+    if not refusal:
+        BusSettings(**given)
+        return
+    with pytest.raises(ValueError, match=refusal):
         BusSettings(**given)
 
 
-def test_a_router_on_tls_wants_to_know_its_members() -> None:
-    with pytest.raises(ValueError, match="wants members: the list of `t2 keys`"):
-        BusSettings(listen=("quic/0.0.0.0:7447",), **CERTIFIED)
-    BusSettings(connect=("tls/10.7.5.220:7447",), **CERTIFIED)  # a client lets nobody in
+@pytest.mark.parametrize(
+    ("listen", "endpoints", "onboard"),
+    [
+        (("tcp/0.0.0.0:7447", "tcp/[::]:7448"), ("tcp/127.0.0.1:7447", "tcp/[::1]:7448"), ("tcp",)),
+        (("tls/0.0.0.0:7447", SOCKET), (SOCKET,), ("unixsock-stream",)),
+        (("tls/0.0.0.0:7447",), ("tls/127.0.0.1:7447",), ()),
+    ],
+)
+def test_services_connect_to_the_embedded_router_without_tls_if_they_can(
+    listen: tuple[str, ...], endpoints: tuple[str, ...], onboard: tuple[str, ...]
+) -> None:
+    where = BusSettings(listen=listen, members=LIST, insecure=True, **TLS)
+    assert (where.endpoints, where.onboard) == (endpoints, onboard)
 
 
-@pytest.mark.parametrize("endpoint", ["tcp/192.0.2.1:7447", "udp/[2001:db8::1]:1", "ws/site:1"])
-def test_a_robot_is_not_opened_by_what_it_dials(endpoint: str) -> None:
-    with pytest.raises(ValueError, match=rf"^uplink {re.escape(endpoint)} lets everybody .*--inse"):
-        BusSettings(uplink=(endpoint,))
-    with pytest.raises(ValueError, match="lets everybody on the network drive"):
-        BusSettings(uplink=(endpoint,), members="members.json")
-    assert BusSettings(uplink=(endpoint,), insecure=True).uplink == (endpoint,)
-    assert BusSettings(uplink=("tcp/127.0.0.1:7448",)).uplink == ("tcp/127.0.0.1:7448",)
-
-
-def test_an_uplink_by_tls_wants_to_know_its_members() -> None:
-    uplink = ("tls/site.example:7447",)
-    with pytest.raises(ValueError, match=r"^tls/site.example:7447 wants members: the list of"):
-        BusSettings(uplink=uplink, **CERTIFIED)
-    assert BusSettings(uplink=uplink, members="members.json", **CERTIFIED).onboard == ("tcp",)
-
-
-def test_what_is_dialled_never_passes_for_a_service_on_board() -> None:
-    for endpoint in ("tcp/127.0.0.1:7448", "tcp/localhost:7448"):
-        with pytest.raises(ValueError, match=r"would pass for a service on board, as .* tcp/, too"):
-            BusSettings(uplink=(endpoint,), members="members.json")
-    BusSettings(
-        uplink=(endpoint,), members="members.json", listen=("unixsock-stream//run/t2/bus.sock",)
-    )
+# --- the other sections -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["", "a/b", "*", "$*", "a b", "001\n", "@x", "a?b", "a#b"])
@@ -174,14 +140,12 @@ def test_a_robots_id_is_one_plain_chunk_of_a_key(name: str) -> None:
         ({"address": "robot"}, "address is 'robot', allowed is an IPv4 address"),
         ({"listen_address": ""}, "listen_address is '', allowed is an IPv4 address"),
         ({"address": "::1"}, "address is '::1': the board needs IPv4, allowed is an IPv4 address"),
-        ({"listen_address": "fe80::1"}, "listen_address is 'fe80::1': the board needs IPv4"),
         ({"listen_ports": (4002, 4002)}, "names a port twice"),
         ({"port": 4001}, "port 4001 of 127.0.0.1 is both the board's and in listen_ports"),
+        ({"relay_port": 4003}, "relay_port is 4003, as port: the relay reports from another"),
     ],
 )
-def test_a_board_that_cannot_be_talked_to_is_refused(
-    given: dict[str, object], sentence: str
-) -> None:
+def test_a_board_that_cannot_be_reached_is_refused(given: dict[str, object], sentence: str) -> None:
     with pytest.raises(msgspec.ValidationError, match=sentence):
         msgspec.convert(given, Board)
 
@@ -200,3 +164,15 @@ def test_a_crc_must_be_one_of_16_bits(name: str) -> None:
 def test_sections_refuse_what_they_do_not_know(section: type[Section]) -> None:
     with pytest.raises(msgspec.ValidationError, match="unknown field `colour`"):
         msgspec.convert({"colour": "blue"}, section)
+
+
+def test_sonars_are_on_the_edge_clockwise_from_the_left_and_look_outward() -> None:
+    mounts = sonar_mounts(Vehicle(length=2.0, width=1.0))
+    assert tuple(mount.name for mount in mounts) == SONAR_NAMES
+    degrees = [round(math.degrees(mount.yaw)) for mount in mounts]
+    assert degrees == [90, 45, 0, -45, -90, -135, 180, 135]
+    for mount in mounts:
+        assert abs(mount.x) == 1.0 or abs(mount.y) == 0.5
+        assert mount.x * math.cos(mount.yaw) + mount.y * math.sin(mount.yaw) > 0
+        assert ("left" in mount.name) == (mount.y > 0)
+        assert ("front" in mount.name) == (mount.x > 0)

@@ -9,7 +9,7 @@ import zenoh
 from common import clock, keys
 from common.bus.bus import Arrival, Bus
 from common.errors import MessageError
-from common.messages import Bumper, Drive, ResetRequest
+from common.messages import Bumper, Drive, Event, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
@@ -144,6 +144,31 @@ def test_any_put_and_any_delete_is_an_emergency_stop(buses: BusFixture) -> None:
         count = len(stops)
         until_received(way, lambda count=count: len(stops) > count, "a stop")  # type: ignore[misc]
     assert all(isinstance(received_ns, int) for received_ns in stops)
+
+
+def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
+    names = [f"event_{number}" for number in range(20)]
+    bus = Bus(at(buses.endpoint), buses.robot, buses.loop.post)
+    publisher = bus.publisher(keys.EVENTS, service="bridge")
+
+    def emit(name: str) -> None:
+        publisher.put(Event(name=name, level="info", text=name))
+
+    for name in names[:10]:
+        emit(name)  # before there is a session
+    buses.opened(bus)
+    for name in names[10:]:
+        emit(name)
+    received: list[str] = []
+
+    def hear(arrival: Arrival[Event]) -> None:
+        received.append(arrival.message.name)
+
+    buses.bus(lambda bus: bus.subscribe(keys.EVENTS, hear, depth=128, service="*"))
+    wait_until(lambda: len(received) >= 20, "the events that were")
+    emit("one more")
+    wait_until(lambda: "one more" in received, "the next one")
+    assert received == [*names, "one more"]
 
 
 def test_a_closed_bus_calls_nobody_and_hurts_nobody(buses: BusFixture) -> None:
