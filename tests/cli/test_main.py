@@ -68,7 +68,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         ("schema", "TYPE"),
         ("record", "--folder"),
         ("info", "FILE"),
-        ("replay", "--simulator"),
+        ("replay", "--frames"),
         ("foxglove", "--port"),
         ("completion", "fish"),
     ],
