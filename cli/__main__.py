@@ -31,19 +31,11 @@ GROUPS = {
     "Inspect": {
         "doctor": ("inspect.doctor", "diagnose the path from this laptop to the wheels"),
         "robots": ("inspect.robots", "the robots on the bus: verdict, speed, driver"),
-        "services": (
-            "inspect.services",
-            "the services on the bus, with publishers and readers of each key",
-        ),
         "health": ("inspect.health", "service health"),
-        "ls": ("inspect.ls", "the active keys: type, rate, publisher"),
+        "ls": ("inspect.ls", "the active keys: type, rate, publishers, readers"),
         "echo": ("inspect.echo", "print messages received on a key"),
-        "hz": ("inspect.measure", "rate, gaps and losses of a key"),
-        "delay": ("inspect.measure", "transport delay of the messages on a key"),
-        "bw": ("inspect.measure", "bandwidth of a key"),
-        "pub": ("inspect.pub", "publish on a key of your own"),
+        "hz": ("inspect.hz", "rate, gaps, losses, bandwidth and delay of keys"),
         "call": ("inspect.call", "call a service, such as safety/reset"),
-        "schema": ("inspect.schema", "the fields of a message type"),
     },
     "Record": {
         "record": ("run.services:record", "record everything on the bus to files, until Ctrl-C"),
@@ -75,6 +67,11 @@ GROUPS = {
 }
 COMMANDS = {name: text for group in GROUPS.values() for name, (_, text) in group.items()}
 PLACES = {name: place for group in GROUPS.values() for name, (place, _) in group.items()}
+REMOVED = {
+    "list": '"t2 ls"', "topic": '"t2 ls", "t2 echo" or "t2 hz"', "services": '"t2 ls --services"',
+    "delay": '"t2 hz"', "bw": '"t2 hz"', "latency": '"t2 health"', "schema": "docs/bus.md",
+    "pub": "zenoh-cli (docs/inspect.md)",
+}  # fmt: skip
 EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 
 
@@ -150,6 +147,8 @@ def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:
         parser.parse_args(words[:1])
     if first.startswith("-"):
         parser.error(f"{first}: options follow the command, as in: t2 COMMAND {first}")
+    if first in REMOVED:
+        parser.error(f"no command {first!r} any more; use {REMOVED[first]}")
     near = get_close_matches(first, COMMANDS, n=1)
     hint = f'did you mean "t2 {near[0]}"?' if near else '"t2 --help" lists the commands'
     parser.error(f"unknown command {first!r}; {hint}")

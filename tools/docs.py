@@ -12,12 +12,12 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from cli.inspect.schema import fields_of
 from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
 from services.safety.core.causes import RULES, SEVERITY, Clears
 from tools import rights_table, sdk, settings_file
+from tools.fields import fields_of
 from verification.harness.results import filled, table
 
 ROOT = Path(__file__).parent.parent

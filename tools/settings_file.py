@@ -3,9 +3,7 @@
 The lines are comments: the defaults have one home, the sections in ``config.py`` of each service.
 """
 
-import inspect
 import json
-import re
 from collections.abc import Iterator
 from enum import Enum
 from typing import Any
@@ -16,6 +14,7 @@ from msgspec import Struct
 from cli.settings import Everything
 from common import settings
 from common.config import flatten
+from tools.fields import fields_of
 
 HEAD = """\
 # T2's settings and their defaults. To change one, remove the `#` before it, or name it in a file of
@@ -23,7 +22,6 @@ HEAD = """\
 # the later one wins. `t2 config` shows the effective settings and their sources.
 # Generated from the code by `make docs`.
 """
-FIELD = re.compile(r"    (?P<name>\w+): .+?(?:  # (?P<why>.+))?$")
 
 
 def text() -> str:
@@ -57,17 +55,8 @@ def _section(path: str, section: Struct) -> Iterator[str]:
 
 def _comments(kind: type[Struct]) -> dict[str, str]:
     """Return the comment of each field: that of its line, or the lines above it."""
-    found, above = {}, []
     sections = [base for base in reversed(kind.__mro__) if issubclass(base, settings.Section)]
-    for line in "".join(map(inspect.getsource, sections)).splitlines():
-        if line.startswith("    # "):
-            above.append(line.removeprefix("    # "))
-            continue
-        field = FIELD.match(line)
-        if field and (field["why"] or above):
-            found[field["name"]] = " ".join([*above, field["why"] or ""]).strip(" .")
-        above = []
-    return found
+    return {field.name: field.why.strip(" .") for base in sections for field in fields_of(base)}
 
 
 def _range(kind: Any, protective: tuple[float, float] | None) -> str:

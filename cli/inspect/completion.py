@@ -6,14 +6,12 @@ from the parser of the command that is being typed. See docs/decisions.md#librar
 
 import argparse
 import os
-from itertools import product
 from pathlib import Path
 
 import argcomplete
 from argcomplete.completers import FilesCompleter, SuppressCompleter
 from argcomplete.shell_integration import shellcode
 
-from cli.inspect.payload import kinds
 from common.keys import CALLS, TOPICS
 
 ZSH = "autoload -Uz compinit && compinit\n"
@@ -54,27 +52,29 @@ def typed_command() -> str:
 
 
 def add_completers(command: str, parser: argparse.ArgumentParser) -> None:
-    """Attach the candidates of keys, types and files to a parser and its subparsers."""
+    """Attach the candidates of keys and files to a parser and its subparsers."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for name, inner in action.choices.items():
                 add_completers(name, inner)
         elif action.type is Path or "FILE" in str(action.metavar):
             setattr(action, "completer", FilesCompleter())  # noqa: B010 (no attribute of Action)
-        elif words := candidates(command, action.metavar):
+        elif action.metavar == "KEY":
+            words = calls() if command == "call" else topics()
             setattr(action, "completer", lambda words=words, **_: words)  # noqa: B010
 
 
-def candidates(command: str, metavar: object) -> dict[str, str]:
-    """Return the known values of an argument with their help; none for free text."""
-    if metavar == "KEY" and command == "call":
-        return {call.path.removeprefix("srv/"): call.what for call in CALLS}
-    if metavar == "KEY" and command != "pub":
-        return {path: topic.what for topic in TOPICS for path in filled(topic.path)}
-    return dict.fromkeys(kinds(), "") if metavar == "TYPE" else {}
+def calls() -> dict[str, str]:
+    """Return the keys of the calls with their help."""
+    return {call.path.removeprefix("srv/"): call.what for call in CALLS}
 
 
-def filled(path: str) -> list[str]:
-    """Return the paths of a topic with the usual values of its placeholders."""
-    parts = [PLACEHOLDERS.get(part, (part,)) for part in path.split("/")]
-    return ["/".join(chosen) for chosen in product(*parts)]
+def topics() -> dict[str, str]:
+    """Return the keys of the topics, with the usual values of their placeholders."""
+    found = {}
+    for topic in TOPICS:
+        names = [name for name in PLACEHOLDERS if name in topic.path]
+        values = [(name, value) for name in names for value in PLACEHOLDERS[name]]
+        for name, value in values or [("", "")]:
+            found[topic.path.replace(name, value)] = topic.what
+    return found

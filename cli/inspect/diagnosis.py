@@ -6,11 +6,14 @@ part of the path is wrong.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeVar
 
 from cli.inspect import remedies
-from common import messages as m
+from common import keys
+from common.keys import Topic
+from common.messages import Health, Message
 
+M = TypeVar("M", bound=Message)
 Level = Literal["ok", "note", "wrong", "unknown"]
 
 NEEDED = ("bridge", "safety", "odom")
@@ -29,20 +32,9 @@ class Finding:
     todo: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Attempt:
-    """Connection attempt to one endpoint; ``trouble`` is empty on success."""
-
-    endpoint: str
-    trouble: str = ""
-    todo: str = ""
-    seconds: float = 0.0
-    tried: bool = True  # UDP cannot be tried
-
-
 @dataclass(slots=True)
 class Observation:
-    """Everything that the doctor has observed on the bus."""
+    """Everything that the doctor has observed on the bus; paths are keys below the robot."""
 
     zenoh: str  # this laptop's versions
     t2: str
@@ -51,61 +43,34 @@ class Observation:
     others: list[str] = field(default_factory=list)  # other robots at the same router
     may_drive: bool | None = None
     may_call: bool | None = None
-    health: dict[str, m.Health] = field(default_factory=dict)
     one_clock: bool = False  # whether the robot runs on this host
     delays_s: list[float] = field(default_factory=list)  # by both wall clocks
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path
     undecodable: dict[str, str] = field(default_factory=dict)  # reason by path
-    first_link: m.Link | None = None
-    link: m.Link | None = None
-    switches: m.Switches | None = None
-    bumper: m.Bumper | None = None
-    ultrasonic: m.Ultrasonic | None = None
-    drivers: dict[str, m.Driver] = field(default_factory=dict)  # motor drivers by side
-    safety: m.SafetyState | None = None
-    requests: dict[str, set[int]] = field(default_factory=dict)  # boots by source of requests
+    first: dict[str, Message] = field(default_factory=dict)  # message by path
+    newest: dict[str, Message] = field(default_factory=dict)  # message by path
     ros_tokens: list[str] = field(default_factory=list)  # of all nodes of ROS 2
     ros_place: tuple[int, str] | None = None  # domain and namespace of the gateway
-    motion: set[int] = field(default_factory=set)  # boots on @cmd/motion
+
+    def add(self, path: str, message: Message) -> None:
+        """Add a message."""
+        self.first.setdefault(path, message)
+        self.newest[path] = message
+
+    def of(self, topic: Topic[M], **names: str) -> M | None:
+        """Return the newest message of a topic."""
+        found = self.newest.get(topic.path.format(**names))
+        return found if isinstance(found, topic.message) else None
+
+    def health(self) -> dict[str, Health]:
+        """Return the newest health message of each service."""
+        return {each.service: each for each in self.newest.values() if isinstance(each, Health)}
 
     def sent_hz(self, path: str) -> float:
         """Return the rate at which a stream is sent, by its publisher's health; 0 if unknown."""
-        publisher = self.health.get(path.split("/")[1])
+        publisher = self.of(keys.HEALTH, service=path.split("/")[1])
         rates = publisher.rates if publisher else {}
         return next((hz for key, hz in rates.items() if key.endswith(f"/{path}")), 0.0)
-
-    def add(self, message: m.Message, name: str) -> None:
-        """Keep the newest message of each type; ``name`` is the last chunk of its key."""
-        match message:
-            case m.Health():
-                self.health[message.service] = message
-            case m.Link():
-                self.first_link = self.first_link or message
-                self.link = message
-            case m.Driver():
-                self.drivers[name] = message
-            case m.SafetyState():
-                self.safety = message
-            case m.Drive():
-                self.requests.setdefault(name, set()).add(message.boot)
-            case m.Motion():
-                self.motion.add(message.boot)
-            case m.Switches() | m.Bumper() | m.Ultrasonic():
-                setattr(self, name, message)
-
-
-def network(attempts: list[Attempt]) -> Iterator[Finding]:
-    """Report the router's endpoints; one that answers is enough."""
-    reached = any(not attempt.trouble for attempt in attempts)
-    for attempt in attempts:
-        if attempt.trouble:
-            level: Level = "note" if reached else "wrong"
-            yield Finding("network", level, f"{attempt.endpoint}: {attempt.trouble}", attempt.todo)
-        elif attempt.tried:
-            took = f"{attempt.seconds * 1000:.1f} ms"
-            yield Finding("network", "ok", f"{attempt.endpoint} answers in {took}")
-        else:
-            yield Finding("network", "unknown", f"{attempt.endpoint} cannot be tested by itself")
 
 
 def router(seen: Observation) -> Iterator[Finding]:
@@ -129,8 +94,9 @@ def robot(seen: Observation, name: str) -> Iterator[Finding]:
 
 def services(seen: Observation) -> Iterator[Finding]:
     """Report services that are missing, duplicate or hang."""
+    healths = seen.health()
     for name in sorted({*NEEDED, *seen.instances}):
-        count, health = seen.instances.get(name, 0), seen.health.get(name)
+        count, health = seen.instances.get(name, 0), healths.get(name)
         if not count:
             yield Finding("services", "wrong", f"{name} is not running", remedies.START)
         elif count > 1 and name in NEEDED:
@@ -147,11 +113,12 @@ def services(seen: Observation) -> Iterator[Finding]:
 
 def versions(seen: Observation) -> Iterator[Finding]:
     """Report different versions on robot and laptop."""
-    other = {name: h.version for name, h in seen.health.items() if h.version != seen.t2}
+    healths = seen.health()
+    other = {name: h.version for name, h in healths.items() if h.version != seen.t2}
     for name, version in sorted(other.items()):
         text = f"{name} is T2 {version}, this laptop {seen.t2}"
         yield Finding("versions", "note", text, remedies.UPDATE)
-    if seen.health and not other:
+    if healths and not other:
         yield Finding("versions", "ok", f"T2 {seen.t2} everywhere")
     for path, reason in sorted(seen.undecodable.items()):
         yield Finding("versions", "wrong", f"{path}: {reason}", remedies.UNDECODABLE)

@@ -11,16 +11,15 @@ import ssl
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from pathlib import Path
 
 from cli.inspect import diagnosis, output, remedies
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
-from cli.inspect.diagnosis import Attempt, Finding, Observation, diagnose_bus, network
+from cli.inspect.diagnosis import Finding, Observation, diagnose_bus
 from cli.inspect.payload import read
 from cli.inspect.ros_graph import diagnose_ros, place
-from cli.inspect.services import discover, routers
 from cli.inspect.session import add_duration, add_options, settings, until_interrupt, wants_json
 from cli.inspect.vehicle import diagnose_vehicle
 from common import keys
@@ -39,6 +38,7 @@ CONNECT_S = 2.0
 ROS_S = 1.0  # a router that denies the query does not answer
 ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
 STREAMS = ("tcp", "tls", "ws")
+ROUTER = "@/*/*"
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
 TONES = {"ok": "good", "note": "note", "wrong": "bad"}
 
@@ -64,8 +64,10 @@ def run(options: argparse.Namespace) -> int:
 def findings(config: Shared, seconds: float) -> Iterator[Finding]:
     """Yield the findings in order; without a router the rest is unknown."""
     attempts = [connect(endpoint, config.bus) for endpoint in config.bus.endpoints]
-    yield from network(attempts)
-    if all(each.trouble for each in attempts):
+    is_reached = any(each.level != "wrong" for each in attempts)
+    for each in attempts:
+        yield replace(each, level="note") if is_reached and each.level == "wrong" else each
+    if not is_reached:
         yield Finding("router", "unknown", "router unreachable; later checks are skipped")
         return
     try:
@@ -85,26 +87,28 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
     yield from diagnose_ros(seen)
 
 
-def connect(endpoint: str, bus: BusSettings) -> Attempt:
+def connect(endpoint: str, bus: BusSettings) -> Finding:
     """Connect to one endpoint with a plain socket, to find problems below Zenoh."""
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]
+    trouble, todo, took_s = "", remedies.KEYS, 0.0
     if protocol == "unixsock-stream":
-        exists = Path(address).exists()
-        return Attempt(endpoint, "" if exists else "the socket file is missing", remedies.NO_SOCKET)
-    if protocol not in STREAMS:
-        return Attempt(endpoint, tried=False)
-    name, _, port = address.rpartition(":")
-    host = name.strip("[]")
-    begin_s, took_s = time.monotonic(), 0.0
-    try:
-        with socket.create_connection((host, int(port)), CONNECT_S) as plain:
-            took_s = time.monotonic() - begin_s
-            trouble = handshake(plain, host, bus) if protocol == "tls" else ""
-            todo = remedies.KEYS
-    except OSError as error:
-        trouble, todo = explain(error, host)
-    return Attempt(endpoint, trouble, todo, took_s)
+        trouble, todo = "" if Path(address).exists() else "the file is missing", remedies.NO_SOCKET
+    elif protocol not in STREAMS:
+        return Finding("network", "unknown", f"{endpoint} cannot be tested by itself")
+    else:
+        name, _, port = address.rpartition(":")
+        host = name.strip("[]")
+        begin_s = time.monotonic()
+        try:
+            with socket.create_connection((host, int(port)), CONNECT_S) as plain:
+                took_s = time.monotonic() - begin_s
+                trouble = handshake(plain, host, bus) if protocol == "tls" else ""
+        except OSError as error:
+            trouble, todo = explain(error, host)
+    if trouble:
+        return Finding("network", "wrong", f"{endpoint}: {trouble}", todo)
+    return Finding("network", "ok", f"{endpoint} answers in {took_s * 1000:.1f} ms")
 
 
 def explain(error: OSError, host: str) -> tuple[str, str]:
@@ -144,13 +148,15 @@ def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
 def observe(opened: Probe, robot: str, seconds: float) -> Observation:
     """Return the observation of one robot."""
     seen = Observation(zenoh=version("eclipse-zenoh"), t2=VERSION)
-    texts = (str(each.get("version", "")) for each in routers(opened))
-    seen.routers = [text.removeprefix("v").partition("-")[0] for text in texts]
+    for answer in opened.query(ROUTER):  # empty where the admin space is closed
+        if isinstance(record := read(answer.payload, answer.encoding).value, dict):
+            version_text = str(record.get("version", ""))
+            seen.routers.append(version_text.removeprefix("v").partition("-")[0])
     listen(opened, robot, seconds, seen)
-    members = discover(opened, robot)
-    seen.instances = Counter(member.name for member in members if member.instance)
     present = [chunks(token) for token in opened.alive(keys.live_key("*", "*", "*"))]
-    on_board = {name for name, path in present if path.split("/")[1] in diagnosis.NEEDED}
+    running = [(name, path.split("/")[1]) for name, path in present]
+    seen.instances = Counter(service for name, service in running if name == robot)
+    on_board = {name for name, service in running if service in diagnosis.NEEDED}
     seen.others = sorted(on_board - {robot})
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
@@ -194,7 +200,7 @@ def add_sample(sample: Sample, seen: Observation, host: int) -> None:
     if path.startswith("tel/"):
         seen.delays_s.append((sample.wall_ns - message.t_ns) / NS_PER_S)
         seen.one_clock |= host != 0 and message.host == host
-    seen.add(message, path.rsplit("/", 1)[-1])
+    seen.add(path, message)
 
 
 def as_text(finding: Finding) -> str:

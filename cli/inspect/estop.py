@@ -3,23 +3,29 @@
 The order is repeated until safety reports the latch: a router that drops it, by its access rules or
 on a bad link, reports nothing. Each addressed robot must confirm. Robots that the router does not
 know at this moment cannot be listed.
+
+``--keepalive NAME`` keeps an emergency stop alive from a terminal, as a pendant does: safety brakes
+and latches when this program ends, hangs or loses the robot.
 """
 
 import argparse
+import select
 import sys
 import time
 from collections.abc import Sequence
+from typing import TextIO
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks
-from cli.inspect.session import add_options, decoded, open_session, repeated
-from common import codec, keys
+from cli.inspect.client import SafetyClient
+from cli.inspect.session import add_options, open_session, repeated, until_interrupt
+from common import keys
 from common.bus.probe import Probe
 from common.errors import LinkError, RobotError
-from common.messages import SafetyState
+from common.messages import EstopKeepalive, KeepaliveState, SafetyState
 
-TIMEOUT_S = 3.0
-REPEAT_S = 0.1
+TIMEOUT_S = 3.0  # without a router
+KEEPALIVE_S = 0.1
 SWITCH = "USE THE VEHICLE'S OWN SWITCH"
 MOVES = ("bridge", "safety")  # a robot without these services cannot move
 
@@ -33,47 +39,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser)
 
 
-def run(options: argparse.Namespace, robot: str | None = None) -> int:
-    """Stop the robot of the options, or another one; retry while no router is reachable."""
-    if getattr(options, "keepalive", None):
+def run(options: argparse.Namespace) -> int:
+    """Stop the robot of the options; retry while no router is reachable."""
+    if options.keepalive:
         return keep_alive(options)
     end_s = time.monotonic() + TIMEOUT_S
     while True:
         try:
             with open_session(options) as session:
-                return stop(session.probe, robot or session.robot, repeated(options))
+                client = SafetyClient(session.probe, session.robot)
+                return stop(client, repeated(options))
         except LinkError as error:
             if time.monotonic() > end_s:
                 raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
 
 
-def keep_alive(options: argparse.Namespace) -> int:
-    """Keep the emergency stop of one robot alive."""
-    from cli.inspect import keepalive  # it uses this module
-
-    with open_session(options) as session:
-        if "*" in session.robot:
-            raise RobotError("--keepalive works on one robot at a time; name it")
-        return keepalive.hold(session, options.keepalive)
-
-
-def stop(probe: Probe, robot: str, settings: str = "") -> int:
+def stop(client: SafetyClient, settings: str = "") -> int:
     """Stop one robot, or several by a key expression; return 1 if one does not confirm in time.
 
     ``settings`` are the options that advised commands repeat.
     """
-    _order(probe, robot)  # before anything else
-    probe.listen(keys.SAFETY.on(robot))
+    probe, robot = client.probe, client.robot
+    client.order_stop(robot)  # before anything else
     expected = expected_robots(probe, robot)
-    confirmed: set[str] = set()
-    end_s = time.monotonic() + TIMEOUT_S
-    while not confirmed >= expected and time.monotonic() < end_s:
-        # By name, too: a driver's certificate may allow its own robots only, not an expression.
-        for each in (robot, *sorted(expected - confirmed - {robot})):
-            _order(probe, each)
-        for sample in probe.samples(REPEAT_S):
-            if any("estop" in state.latched for state in decoded([sample], SafetyState)):
-                confirmed.add(chunks(sample.key)[0])
+    # By name, too: a driver's certificate may allow its own robots only, not an expression.
+    confirmed = client.stop(expected)
     missing = sorted(expected - confirmed)
     if missing == [robot]:
         if seen := other_robots(probe, robot):
@@ -132,5 +122,50 @@ def is_barred(probe: Probe, robot: str) -> bool:
     return bool(serves) and not probe.has_reader(*commands)
 
 
-def _order(probe: Probe, robot: str) -> None:
-    probe.put(keys.estop_key(robot), b"", codec.ENCODING, keys.ESTOP_CLASS)
+def keep_alive(options: argparse.Namespace) -> int:
+    """Keep an emergency stop alive until Ctrl-C; return 1 when safety does not expect its name."""
+    with open_session(options) as session:
+        if "*" in session.robot:
+            raise RobotError("--keepalive works on one robot at a time; name it")
+        name, robot = options.keepalive, session.robot
+        client = SafetyClient(session.probe, robot, source=name)
+        ours = kept(client.fresh_state(), name)
+        print(f"Keeping the emergency stop of robot {robot} alive as {name}.")
+        print("Enter: EMERGENCY STOP. Ctrl-C ends this program: the robot then brakes and latches.")
+        with until_interrupt():
+            follow(client, name)
+    print(f"Ended: within {ours.timeout:g} s robot {robot} brakes and latches.", end=" ")
+    print("To go on, start this again, then reset.")
+    return 0
+
+
+def kept(state: SafetyState, name: str) -> KeepaliveState:
+    """Return safety's state of this name; raise ``RobotError`` if it does not expect it."""
+    known = {one.source: one for one in state.estop_keepalives}
+    if name not in known:
+        names = f"it expects {', '.join(known)}" if known else "it expects no keepalive"
+        raise RobotError(f"safety does not expect {name!r}: {names}; see safety.estop_keepalive")
+    return known[name]
+
+
+def follow(client: SafetyClient, name: str) -> None:
+    """Publish at 10 Hz, print each change of state, and stop the robot on Enter."""
+    shown = ""
+    watched: list[TextIO] = [sys.stdin] if sys.stdin else []  # closed in some supervisors
+    while True:
+        client.put(keys.ESTOP_KEEPALIVE, EstopKeepalive(echo=0))
+        if client.state and (line := described(client.state, name)) != shown:
+            print(line, flush=True)
+            shown = line
+        if select.select(watched, [], [], 0)[0]:
+            if sys.stdin.readline():
+                stop(client)
+            else:
+                watched = []  # the end of a file is no key
+        client.until(lambda: False, KEEPALIVE_S)
+
+
+def described(state: SafetyState, name: str) -> str:
+    """Return the state as a line."""
+    alive = any(one.source == name and one.alive for one in state.estop_keepalives)
+    return f"{'alive' if alive else 'NOT ALIVE'}  {state.verdict.upper()}  {state.text}"

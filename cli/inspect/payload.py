@@ -8,7 +8,6 @@ import msgspec
 from msgspec import Struct
 
 from common import codec, keys
-from common import messages as m
 from common.errors import MessageError
 
 UNREADABLE = (msgspec.MsgspecError, RecursionError, UnicodeDecodeError, ValueError)
@@ -21,11 +20,6 @@ class Reading:
     kind: str  # Odometry, json, text, msgpack, bytes, empty
     value: Any
     complaint: str = ""
-
-    @property
-    def boot(self) -> Any:
-        """The sender's boot id from the header; None without one."""
-        return self.value.get("boot") if isinstance(self.value, dict) else None
 
 
 def read(payload: bytes, encoding: str) -> Reading:
@@ -47,11 +41,10 @@ def read(payload: bytes, encoding: str) -> Reading:
 
 @cache
 def kinds() -> dict[str, type[Struct]]:
-    """Return every struct of the bus contract by its name."""
+    """Return every message, request and reply of the bus by its name."""
     of_calls: list[type[Struct]] = [k for call in keys.CALLS for k in (call.request, call.reply)]
-    inner: tuple[type[Struct], ...] = (m.Cause, m.Limits, m.Durations, m.Message)
     of_topics: list[type[Struct]] = [topic.message for topic in keys.TOPICS]
-    return {kind.__name__: kind for kind in (*of_topics, *of_calls, *inner)}
+    return {kind.__name__: kind for kind in (*of_topics, *of_calls)}
 
 
 def at(value: Any, path: str) -> Any:

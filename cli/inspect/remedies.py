@@ -52,7 +52,7 @@ DOWNSAMPLED = (
     "otherwise the network is too slow. The services on board receive all of it"
 )
 NOT_HERE = "the network or the router drops it: move closer to the access point; see `t2 hz`"
-ONE_DRIVER = "stop one of the two programs; `t2 services` lists them"
+ONE_DRIVER = "stop one of the two programs; `t2 ls --services` lists them"
 LIMIT = "`t2 echo safety/state --field limit_sources` shows who limits, and why"
 LIMIT_SILENT = "start its program, check its network and certificate; see safety.limits"
 RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"
@@ -67,9 +67,6 @@ ROS_NO_NODE = (
 ROS_DOMAIN = "set ROS_DOMAIN_ID of these nodes, or ros2.domain of the robot"
 ROS_TYPE = "use the type of the table in docs/ros2.md; see ros2.cmd_vel"
 ROS_HASH = "its ROS 2 distribution or its copy of this type is another one; Humble is not supported"
-ROS_QOS = "use durability volatile; tf_static, robot_description and hardware/e_stop are latched"
-ROS_NO_READER = "`ros2 topic echo /odom` shows whether topics arrive; check ros2.namespace"
-ROS_ONE_DRIVER = "one at a time drives: stop the others, or put twist_mux before them"
 
 # By the names of the causes in safety's state.
 CAUSES = {

@@ -71,31 +71,22 @@ def discover(probe: Probe, robot: str) -> dict[str, Robot]:
         found[name].services.add(path.split("/")[1])
     wanted = {keys.SAFETY.on(name) for name, each in found.items() if "safety" in each.services}
     wanted |= {keys.VELOCITY.on(name) for name, each in found.items() if "bridge" in each.services}
-    for key, sample in newest(probe, wanted).items():
-        update(found[chunks(key)[0]], sample)
-    return found
-
-
-def newest(probe: Probe, wanted: set[str]) -> dict[str, Sample]:
-    """Return the newest sample of each key, as soon as all wanted ones have arrived."""
-    samples: dict[str, Sample] = {}
+    newest: dict[str, Sample] = {}
     with until_interrupt():
         for sample in probe.samples(LISTEN_S):
-            samples[sample.key] = sample
-            if samples.keys() >= wanted:
+            newest[sample.key] = sample
+            if newest.keys() >= wanted:
                 break
-    return samples
-
-
-def update(robot: Robot, sample: Sample) -> None:
-    """Store a decoded sample; report an invalid one."""
-    try:
-        if sample.key.endswith(keys.SAFETY.path):
-            robot.state = codec.decode(sample.payload, SafetyState)
-        else:
-            robot.velocity = codec.decode(sample.payload, Velocity)
-    except MessageError as error:
-        output.warn(f"t2 robots: {sample.key}: {error}")
+    for key, sample in newest.items():
+        robot_of = found[chunks(key)[0]]
+        try:
+            if key.endswith(keys.SAFETY.path):
+                robot_of.state = codec.decode(sample.payload, SafetyState)
+            else:
+                robot_of.velocity = codec.decode(sample.payload, Velocity)
+        except MessageError as error:
+            output.warn(f"t2 robots: {key}: {error}")
+    return found
 
 
 def as_json(name: str, robot: Robot) -> dict[str, Any]:

@@ -56,8 +56,6 @@ def diagnose_ros(seen: Observation) -> Iterator[Finding]:
     theirs = [peer for peer in peers if peer.zid not in own]
     for peer in theirs:
         yield from _endpoint(peer, ours)
-    if any(node.domain == domain for node in others):
-        yield from _traffic(ours, theirs, names.absolute(namespace, "cmd_vel"))
 
 
 def _nodes(others: list[Node], domain: int) -> Iterator[Finding]:
@@ -90,32 +88,6 @@ def _endpoint(peer: Peer, ours: list[Peer]) -> Iterator[Finding]:
         hashes = f"{peer.hash[:SHORT]} instead of {same_type[0].hash[:SHORT]}"
         text = f"{what} with type hash {hashes}: nothing arrives"
         yield Finding("ros", "wrong", text, remedies.ROS_HASH)
-    elif _misses_history(peer, same_type):
-        text = f"{what} as transient local, the topic is volatile: only new messages arrive"
-        yield Finding("ros", "note", text, remedies.ROS_QOS)
-
-
-def _misses_history(peer: Peer, ours: list[Peer]) -> bool:
-    """Return whether a subscription wants earlier messages of a topic that keeps none."""
-    is_latched = any(names.is_latched(own.qos) for own in ours)
-    return peer.kind == "subscription" and names.is_latched(peer.qos) and not is_latched
-
-
-def _traffic(ours: list[Peer], theirs: list[Peer], cmd_vel: str) -> Iterator[Finding]:
-    """Report the nodes that command, and whether anyone reads."""
-    topics = {own.topic for own in ours if own.kind == "publisher"}
-    readers = {peer.node for peer in theirs if peer.kind == "subscription" and peer.topic in topics}
-    if not readers:
-        text = "no node subscribes to a topic of the gateway"
-        yield Finding("ros", "note", text, remedies.ROS_NO_READER)
-    drivers = sorted(
-        peer.node for peer in theirs if peer.kind == "publisher" and peer.topic == cmd_vel
-    )
-    if len(drivers) > 1:
-        text = f"{cmd_vel} has {len(drivers)} publishers: {', '.join(drivers)}"
-        yield Finding("ros", "note", text, remedies.ROS_ONE_DRIVER)
-    elif drivers:
-        yield Finding("ros", "ok", f"{drivers[0]} publishes {cmd_vel}")
 
 
 def _is_on(token: str, domain: int) -> bool:

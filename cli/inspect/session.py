@@ -14,7 +14,6 @@ from common.cli_args import add_sources, sources
 from common.codec import Sample
 from common.config import load
 from common.errors import MessageError
-from common.loop import Loop
 from common.settings import Shared
 
 
@@ -136,23 +135,6 @@ def decoded(received: Iterable[Sample | Answer], kind: type[codec.S]) -> Iterato
     for each in received:
         with suppress(MessageError):
             yield codec.decode(each.payload, kind)
-
-
-@contextmanager
-def interruptible(loop: Loop) -> Iterator[list[int]]:
-    """Stop the loop on SIGINT or SIGTERM while the context lasts; yield the signals received."""
-    received: list[int] = []
-
-    def stop(number: int, _: object) -> None:
-        received.append(number)
-        loop.stop()
-
-    before = {name: signal.signal(name, stop) for name in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield received
-    finally:
-        for name, handler in before.items():
-            signal.signal(name, handler)
 
 
 @contextmanager

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from cli.inspect import remedies
 from cli.inspect.diagnosis import Finding, Level, Observation
-from common.keys import BUMPER, MILEAGE, ODOMETRY, ULTRASONIC, VELOCITY
-from common.messages import SONAR_NAMES, Driver, Link, Relay
+from common import keys
+from common.messages import SONAR_NAMES, Link, Message, Relay
 
-STREAMS = (VELOCITY, MILEAGE, BUMPER, ULTRASONIC, ODOMETRY)
+STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOMETRY)
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
 SONARS = {
     "fault": ("is faulty", remedies.SONAR_FAULT),
@@ -19,19 +19,16 @@ def diagnose_vehicle(seen: Observation) -> Iterator[Finding]:
     """Return all findings behind the bridge, and safety's state last."""
     if not seen.instances.get("bridge"):
         yield Finding("link", "unknown", "the board is unknown without a bridge")
-    elif seen.link is None:
+    elif (now := seen.of(keys.LINK)) is None:
         yield Finding("link", "unknown", "the bridge does not report the board")
     else:
-        yield from relay(seen.link.relay, seen.t2)
-        yield from link(seen.link, seen.first_link)
-        if seen.link.state == "up":
-            yield from switches(seen)
-            yield from streams(seen)
-            yield from sensors(seen)
-            yield from drivers(seen.drivers)
+        yield from relay(now.relay, seen.t2)
+        yield from link(now, seen.first[keys.LINK.path])
+        if now.state == "up":
+            for check in (switches, streams, sensors, drivers):
+                yield from check(seen)
         else:
             yield Finding("sensors", "unknown", "no sensor data without the board")
-    yield from driving(seen)
     yield from safety(seen)
 
 
@@ -52,7 +49,7 @@ def relay(now: Relay | None, t2: str) -> Iterator[Finding]:
         yield Finding("relay", "note", text, remedies.RELAY_UPDATE)
 
 
-def link(now: Link, before: Link | None) -> Iterator[Finding]:
+def link(now: Link, before: Message) -> Iterator[Finding]:
     """Report the link to the board, with rejected and unsent frames since ``before``."""
     if now.state == "never":
         text = f"no frame received from the board at {now.board}"
@@ -62,13 +59,13 @@ def link(now: Link, before: Link | None) -> Iterator[Finding]:
         text = f"the board at {now.board} is silent"
         yield Finding("link", "wrong", text, remedies.BOARD_LOST)
         return
-    earlier = before.rejected if before else {}
-    new = {reason: n - earlier.get(reason, 0) for reason, n in now.rejected.items()}
+    earlier = before if isinstance(before, Link) else now
+    new = {reason: n - earlier.rejected.get(reason, 0) for reason, n in now.rejected.items()}
     bad = ", ".join(f"{n} {reason}" for reason, n in new.items() if n > 0)
     if bad:
         text = f"the bridge rejects frames of the board: {bad}"
         yield Finding("link", "note", text, remedies.BOARD_REFUSED)
-    unsent = now.send_errors - (before.send_errors if before else 0)
+    unsent = now.send_errors - earlier.send_errors
     if unsent > 0:
         text = f"the system failed to send {unsent} datagrams to the board"
         yield Finding("link", "wrong", text, remedies.SEND_ERRORS)
@@ -80,7 +77,7 @@ def link(now: Link, before: Link | None) -> Iterator[Finding]:
 
 def switches(seen: Observation) -> Iterator[Finding]:
     """Report the board's own emergency brakes."""
-    echo = seen.switches
+    echo = seen.of(keys.SWITCHES)
     positions = {
         "ultrasonic": echo and echo.ultrasonic_brake,
         "bumper": echo and echo.bumper_brake,
@@ -118,28 +115,28 @@ def streams(seen: Observation) -> Iterator[Finding]:
 
 
 def sensors(seen: Observation) -> Iterator[Finding]:
-    """Report the bumper and each sonar."""
-    if seen.bumper and seen.bumper.pressed:
-        yield Finding("bumper", "wrong", "the bumper is pressed", remedies.BUMPER)
-    elif seen.bumper:
-        yield Finding("bumper", "ok", "the bumper is free")
-    if seen.ultrasonic:
-        yield from sonars(seen.ultrasonic.status)
+    """Report the bumper, and each untrusted sonar."""
+    if bumper := seen.of(keys.BUMPER):
+        if bumper.pressed:
+            yield Finding("bumper", "wrong", "the bumper is pressed", remedies.BUMPER)
+        else:
+            yield Finding("bumper", "ok", "the bumper is free")
+    if ultrasonic := seen.of(keys.ULTRASONIC):
+        bad = [(name, SONARS[status])
+               for name, status in zip(SONAR_NAMES, ultrasonic.status, strict=True)
+               if status in SONARS]  # fmt: skip
+        for name, (text, todo) in bad:
+            yield Finding("sonar", "wrong", f"the {name.replace('_', ' ')} sonar {text}", todo)
+        if not bad:
+            yield Finding("sonar", "ok", "all eight sonars measure")
 
 
-def sonars(statuses: tuple[str, ...]) -> Iterator[Finding]:
-    """Report each untrusted sonar."""
-    bad = [(name, SONARS[status]) for name, status in zip(SONAR_NAMES, statuses, strict=True)
-           if status in SONARS]  # fmt: skip
-    for name, (text, todo) in bad:
-        yield Finding("sonar", "wrong", f"the {name.replace('_', ' ')} sonar {text}", todo)
-    if not bad:
-        yield Finding("sonar", "ok", "all eight sonars measure")
-
-
-def drivers(by_side: dict[str, Driver]) -> Iterator[Finding]:
+def drivers(seen: Observation) -> Iterator[Finding]:
     """Report the motor drivers' faults."""
-    for side, driver in sorted(by_side.items()):
+    for side in ("left", "right"):
+        driver = seen.of(keys.DRIVER, side=side)
+        if not driver:
+            continue
         for fault in driver.faults:
             meaning = remedies.FAULTS.get(fault, "not documented in the manual")
             text = f"the {side} motor driver reports {fault}: {meaning}"
@@ -148,26 +145,9 @@ def drivers(by_side: dict[str, Driver]) -> Iterator[Finding]:
             yield Finding("drivers", "ok", f"the {side} motor driver reports no fault")
 
 
-def driving(seen: Observation) -> Iterator[Finding]:
-    """Report the sources of drive requests, and duplicate programs."""
-    if len(seen.motion) > 1:
-        yield Finding("driving", "wrong", "two programs publish @cmd/motion", remedies.TWICE)
-    for source, boots in sorted(seen.requests.items()):
-        if len(boots) > 1:
-            text = f"{len(boots)} programs drive as {source}"
-            yield Finding("driving", "wrong", text, remedies.ONE_DRIVER)
-    if len(seen.requests) > 1:
-        names = ", ".join(sorted(seen.requests))
-        text = f"{names} request motion at once; the one with the highest priority drives"
-        yield Finding("driving", "note", text)
-    elif not any(len(boots) > 1 for boots in seen.requests.values()):
-        name = next(iter(seen.requests), "no source")
-        yield Finding("driving", "ok", f"{name} requests motion")
-
-
 def safety(seen: Observation) -> Iterator[Finding]:
     """Report the causes in safety's state, with safety's texts."""
-    state = seen.safety
+    state = seen.of(keys.SAFETY)
     if state is None:
         yield Finding("safety", "unknown", "safety publishes no state")
         return

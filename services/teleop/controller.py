@@ -30,7 +30,7 @@ RESET_TIMEOUT_S = 1.0  # safety refuses an older reset
 UNHEARD = "no state of safety for 1 s: controls released; check it with `t2 doctor`"
 NOT_CONFIRMED = (
     "RESET NOT CONFIRMED: safety's state does not show the effect of the reset; "
-    "look at the vehicle, then at `t2 services`"
+    "look at the vehicle, then at `t2 ls --services`"
 )
 # The topics of the view, and how long (s) their last message is shown.
 TOPICS: dict[str, tuple[Any, float, str]] = {

@@ -1,4 +1,4 @@
-"""Operator's calls by ``t2 call``: defaults from safety's state, and confirmation."""
+"""``t2 call``: replies, refusals, an operator's defaults from safety's state, confirmation."""
 
 from collections.abc import Callable
 from functools import partial
@@ -8,7 +8,7 @@ import msgspec
 import pytest
 import zenoh
 
-from cli.inspect import call as command
+from cli.inspect import client
 from common import codec, keys
 from common import messages as m
 from common.bus.bus import Bus, Caller
@@ -135,11 +135,55 @@ def test_given_values_are_kept(buses: BusFixture, tool: Tool) -> None:
 def test_no_operators_call_without_a_state(
     buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(command, "STATE_S", 0.3)
+    monkeypatch.setattr(client, "STATE_S", 0.3)
     for key in ("safety/reset", "odom/reset", "bridge/switches"):
         result = tool("call", key)
         assert (result.code, result.out) == (1, "")
-        assert "no state of safety within 1 s" in result.err
+        assert "no state of safety within 0.3 s" in result.err
+
+
+def test_replies_and_refusals(buses: BusFixture, tool: Tool) -> None:
+    def led(request: m.LedRequest, caller: Caller[m.Done]) -> None:
+        if request.channel:
+            caller.refuse("no such lamp")
+        else:
+            caller.reply(m.Done(text="lit"))
+
+    pretend(buses, "bridge", {}, lambda bus: bus.serve(keys.SET_LED, led))
+    whole = f"t2/v1/{buses.robot}/srv/bridge/led"
+    first = '{"channel": 0, "mode": 1}'
+    for key in ("led", "bridge/led", "/srv/bridge/led", whole):
+        result = tool("call", key, first)
+        assert (result.code, result.lines) == (0, [{"text": "lit", "boot": 0}])
+    assert tool("call", "bridge/led", first, "--text").out == "text: lit\nboot: 0\n"
+    result = tool("call", "bridge/led", '{"channel": 1, "mode": 1}')
+    assert (result.code, result.out) == (1, "")
+    assert result.err == "t2 call: refused: no such lamp\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "phrase"),
+    [
+        (("bridge/led", '{"channel": 1, "mode": 0}', "--timeout", "0.3"), 1,
+         "bridge does not answer"),
+        (("mine/x",), 1, "no call mine/x; `t2 call` lists the calls"),
+        (("reset",), 1, "reset is ambiguous: safety/reset, odom/reset"),
+        (("bridge/led", '{"chanel": 1}'), 2, "not a LedRequest"),
+        (("safety/reset", '{"causes": [99999999999999999999999]}'), 2, "not a ResetRequest"),
+        (("safety/reset", "{"), 2, "is not JSON"),
+        (("safety/reset", "[1]"), 2, "is not an object"),
+        (("safety/*",), 2, "matches several keys"),
+    ],
+)  # fmt: skip
+def test_calls_that_fail(words: tuple[str, ...], code: int, phrase: str, tool: Tool) -> None:
+    result = tool("call", *words)
+    assert (result.code, result.out) == (code, "")
+    assert phrase in result.err
+
+
+def test_list_of_calls(tool: Tool) -> None:
+    assert {line["key"] for line in tool("call").lines} == {call.path for call in keys.CALLS}
+    assert "clear the named causes" in tool("call", "--text").out
 
 
 def test_invalid_states_are_ignored(buses: BusFixture, tool: Tool) -> None:

@@ -49,12 +49,10 @@ def offered(shell_script: str, *words: str) -> set[str]:
         (("echo", "tel/o"), {"tel/odom/odometry", "tel/odom/health"}),
         (("echo", "odometry", "--fi"), {"--field"}),
         (("call", "safety/r"), {"safety/reset"}),
-        (("schema", "Odo"), {"Odometry"}),
         (("wire", "dec"), {"decode"}),
         (("echo", "--config", "pyproject.t"), {"pyproject.toml"}),
         (("wire", "decode", "pyproject.t"), {"pyproject.toml"}),
         (("echo", "-o", "j"), {"json"}),
-        (("pub", "tel/o"), set()),
         (("completion", "f"), {"fish"}),
     ],
 )

@@ -10,14 +10,11 @@ from typing import Any
 import pytest
 
 from cli.inspect import remedies
-from cli.inspect.doctor import connect
-from common import keys
-from common.bus.bus import Bus
-from common.loop import Loop
-from common.messages import Drive
+from cli.inspect.doctor import connect, findings
+from common.settings import BusSettings, Shared
 from sim.requests import Bumper, Freeze, Sonar
 from tests.cli.inspect.tool import Tool
-from verification.harness.bus import at, bus_on, router_process, running
+from verification.harness.bus import at, router_process
 from verification.harness.ports import free_port
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
@@ -99,25 +96,6 @@ def test_a_frozen_board(stack: RunningStack, doctor: Doctor) -> None:
     stack.control.do(Freeze(seconds=0.0))
 
 
-def test_a_second_driver(stack: RunningStack, doctor: Doctor) -> None:
-    sources: list[Any] = []
-
-    def request(_: int) -> None:
-        for source in sources:
-            source.put(Drive(linear=0.0, angular=0.0, echo=0))
-
-    def declare(bus: Bus) -> None:
-        sources.append(bus.publisher(keys.DRIVE, source="web"))
-
-    with (
-        running(Loop()) as loop,
-        bus_on(stack.endpoint, loop, declare),
-        bus_on(stack.endpoint, loop, declare),
-    ):
-        loop.post(lambda: loop.every(0.05, request))
-        until_wrong(doctor, "driving", remedies.ONE_DRIVER)
-
-
 def test_missing_services_and_their_return(stack: RunningStack, doctor: Doctor) -> None:
     # The router drops a stopped process, but not one whose loop hangs.
     stack.processes["odom"].send_signal(signal.SIGSTOP)
@@ -163,12 +141,11 @@ def test_an_endpoint_that_is_not_a_router(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not connect("udp/127.0.0.1:7447", at()).tried
+    assert connect("udp/127.0.0.1:7447", at()).level == "unknown"
     assert connect(f"unixsock-stream/{tmp_path}/no.sock", at()).todo == remedies.NO_SOCKET
-    assert connect(f"unixsock-stream/{tmp_path}", at()).trouble == ""
+    assert connect(f"unixsock-stream/{tmp_path}", at()).level == "ok"
     with socket.create_server(("127.0.0.1", 0)) as server:
-        reached = connect(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1", at())
-    assert (reached.trouble, reached.tried) == ("", True)
+        assert connect(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1", at()).level == "ok"
     for error, todo in (
         (socket.gaierror(), remedies.NO_NAME),
         (TimeoutError(), remedies.NO_ROUTE),
@@ -179,6 +156,14 @@ def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
             raise error
 
         monkeypatch.setattr(socket, "create_connection", fail)
-        attempt = connect("tcp/robot:7447", at())
-        assert attempt.trouble
-        assert attempt.todo == todo
+        found = connect("tcp/robot:7447", at())
+        assert (found.level, found.todo) == ("wrong", todo)
+
+
+def test_one_reachable_endpoint_is_enough() -> None:
+    reached, absent = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
+    with router_process(reached):
+        config = Shared(bus=BusSettings(connect=(absent, reached)))
+        first, second, *_ = findings(config, 0.1)
+    assert (first.level, first.todo) == ("note", remedies.REFUSED)
+    assert (second.where, second.level) == ("network", "ok")

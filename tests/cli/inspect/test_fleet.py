@@ -1,21 +1,22 @@
-"""Several robots: their list, and an emergency stop of one, a site or all."""
+"""Emergency stop of one robot, a site or all, and the list of robots."""
 
 import contextlib
+import threading
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import pytest
 
 from cli.inspect import estop, robots
+from cli.inspect.client import SafetyClient
+from common import client as machine
 from common import keys
 from common.bus.bus import Bus
-from common.bus.session import router
+from common.cli_args import EXIT_LINK
 from common.messages import Limits, SafetyState, Velocity
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
-from verification.harness.bus import listening
+from verification.harness.bus import router_process
 from verification.harness.ports import free_port
-from verification.harness.waiting import wait_until
 
 Join = Callable[[str], BusFixture]
 LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)
@@ -91,7 +92,7 @@ def test_unconfirmed_robots_are_named(
     Robot(join("berlin-002"), obeys=False)
     pretend(join("berlin-003"), "bridge", {})  # its safety has died
     pretend(join("berlin-004"), "dashboard", {})  # a laptop
-    monkeypatch.setattr(estop, "TIMEOUT_S", 1.0)
+    monkeypatch.setattr(machine, "ESTOP_TICKS", 20)
     result = t2("estop", "--site", "berlin")
     assert result.code == 1
     assert "Robot berlin-001 is stopped." in result.out
@@ -107,19 +108,54 @@ def test_a_driver_of_some_robots_stops_them_by_name(
 ) -> None:
     """Access rules allow the keys of its own robots, but not a key expression."""
     robot = Robot(join("berlin-001"))
-    order = estop._order
-    monkeypatch.setattr(estop, "_order", lambda probe, to: None if "*" in to else order(probe, to))
+    order = SafetyClient.order_stop
+    monkeypatch.setattr(
+        SafetyClient, "order_stop", lambda self, to: None if "*" in to else order(self, to)
+    )
     assert t2("estop", "--all").code == 0
     assert robot.stops
 
 
-def test_stop_of_an_empty_site(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(estop, "TIMEOUT_S", 0.2)
+def test_stop_of_an_empty_site(t2: Tool) -> None:
     result = t2("estop", "--site", "nowhere")
     assert (result.code, result.out) == (1, "")
     assert result.err.startswith(
         "t2 estop: sent, but no robot found. If one moves, USE THE VEHICLE'S"
     )
+
+
+def test_an_unconfirmed_stop_repeats_the_settings(
+    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(machine, "ESTOP_TICKS", 6)
+    robot = Robot(join("a"), obeys=False)
+    result = t2("estop", robot="a")
+    assert (result.code, result.out) == (1, "")
+    assert f"`t2 doctor --robot a --set bus.connect={t2.endpoint}`" in result.err
+    assert "USE THE VEHICLE'S OWN SWITCH" in result.err
+    assert len(robot.stops) > 2
+
+
+@pytest.mark.parametrize("word", ["ls", "health", "robots", "estop"])
+def test_without_a_router(word: str, t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(estop, "TIMEOUT_S", 0.1)
+    nowhere = Tool(f"tcp/127.0.0.1:{free_port()}", "001", t2.capsys)
+    result = nowhere(word)
+    assert (result.code, result.out) == (EXIT_LINK, "")
+    assert f"no router answers at {nowhere.endpoint}" in result.err
+    assert "t2 doctor" in result.err
+    assert ("NOT SENT, USE THE VEHICLE'S OWN SWITCH" in result.err) == (word == "estop")
+
+
+def test_a_stop_waits_for_a_restarted_router(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine, "ESTOP_TICKS", 6)
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with contextlib.ExitStack() as stack:
+        late = threading.Timer(1.0, lambda: stack.enter_context(router_process(where)))
+        late.start()
+        result = Tool(where, "001", t2.capsys)("estop")
+        late.join()
+    assert "sent, but safety of robot 001 does not confirm" in result.err
 
 
 @pytest.mark.parametrize(
@@ -128,6 +164,10 @@ def test_stop_of_an_empty_site(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> Non
         (("estop", "--site", "north-east"), "'north-east' is not a site"),
         (("estop", "--site", "berlin", "--all"), "not allowed with"),
         (("call", "safety/reset", "--robot", "berlin-$*"), "one robot at a time"),
+        (("doctor", "--robot", "*"), "one robot at a time"),
+        (("echo", "tel//x"), "is not a key"),
+        (("echo", "tel/x", "--count", "0"), "--count"),
+        (("hz", "tel/x", "--duration", "nan"), "--duration"),
     ],
 )
 def test_invalid_arguments(words: tuple[str, ...], phrase: str, t2: Tool) -> None:
@@ -188,20 +228,3 @@ def test_no_robots(t2: Tool) -> None:
     result = t2("robots", "--site", "nowhere")
     assert (result.code, result.out) == (1, "")
     assert "no robot found" in result.err
-
-
-@pytest.mark.parametrize("place", ["on board", "at the site"])
-def test_services_of_a_robot_that_dials_a_site(
-    place: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Its router is a peer and not listed as a member, neither on board nor at the site."""
-    own, site = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
-    tool = Tool({"on board": own, "at the site": site}[place], "berlin-001", capsys)
-
-    def found() -> dict[str, Any]:
-        return {line["name"]: line["publishes"] for line in tool("services").lines}
-
-    with router(listening(site)), router(listening(own, site)), BusFixture(own) as buses:
-        buses.robot = "berlin-001"
-        pretend(buses, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
-        wait_until(lambda: found() == {"bridge": {"tel/bridge/velocity": []}}, "the bridge alone")

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from cli.inspect.keepalive import described, refusal, timeout_s
+from cli.inspect.estop import described, kept
 from common import keys
 from common.bus.bus import Arrival, Bus
+from common.errors import RobotError
 from common.messages import EstopKeepalive, KeepaliveState, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
@@ -94,10 +95,9 @@ def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
 
 
 def test_texts() -> None:
-    assert refusal(None, "pendant").startswith("safety publishes no state")
-    assert "it expects no keepalive" in refusal(safety_state(), "pendant")
     known = safety_state(estop_keepalives=(KNOWN,))
-    assert refusal(known, "pendant") == ""
+    assert kept(known, "pendant") is KNOWN
+    with pytest.raises(RobotError, match="it expects no keepalive"):
+        kept(safety_state(), "pendant")
     assert described(known, "pendant") == "alive  RUN  Driving."
     assert described(safety_state(), "pendant").startswith("NOT ALIVE")
-    assert (timeout_s(known, "pendant"), timeout_s(safety_state(), "pendant")) == (1.0, 0.0)

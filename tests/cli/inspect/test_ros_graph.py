@@ -49,7 +49,6 @@ def test_a_planner_that_fits() -> None:
     found = diagnosed(*OURS, NAV.token, RVIZ.token, READS, DRIVES)
     assert [(each.level, each.text) for each in found] == [
         ("ok", "nodes on domain 0: /nav, /screen/rviz"),
-        ("ok", "/nav publishes /cmd_vel"),
     ]
 
 
@@ -112,31 +111,6 @@ def test_a_client_with_another_hash() -> None:
     wrong = client.replace(HASHES[TRIGGER], "RIHS01_00")
     finding = only(diagnosed(*OURS, NAV.token, READS, wrong), "wrong")
     assert finding.text.startswith("/nav calls /hardware/e_stop_trigger with type hash RIHS01_00 ")
-
-
-def test_a_latched_subscriber_of_a_volatile_topic() -> None:
-    wanted = NAV.endpoint_token(6, "MS", "/odom", ODOM, names.QOS_LATCHED)
-    finding = only(diagnosed(*OURS, NAV.token, wanted), "note")
-    assert finding.text == (
-        "/nav subscribes to /odom as transient local, the topic is volatile: only new messages "
-        "arrive"
-    )
-    assert finding.todo == remedies.ROS_QOS
-    latched = NAV.endpoint_token(6, "MS", "/tf_static", "tf2_msgs/msg/TFMessage", names.QOS_LATCHED)
-    assert not [each for each in diagnosed(*OURS, NAV.token, latched) if each.level != "ok"]
-
-
-def test_nobody_subscribes() -> None:
-    finding = only(diagnosed(*OURS, NAV.token, DRIVES), "note")
-    assert finding.text == "no node subscribes to a topic of the gateway"
-    assert finding.todo == remedies.ROS_NO_READER
-
-
-def test_two_publishers_of_commands() -> None:
-    joy = RVIZ.endpoint_token(3, "MP", "/cmd_vel", TWIST, names.QOS)
-    finding = only(diagnosed(*OURS, NAV.token, RVIZ.token, READS, DRIVES, joy), "note")
-    assert finding.text == "/cmd_vel has 2 publishers: /nav, /screen/rviz"
-    assert finding.todo == remedies.ROS_ONE_DRIVER
 
 
 def test_topics_of_others_are_their_business() -> None:

@@ -17,23 +17,18 @@ def at(seconds: float, seq: int | None = None, boot: int = 1, size: int = 10) ->
     return StreamSample(round(seconds * NS_PER_S), size, seq, boot)
 
 
-def test_the_rate_and_the_gaps() -> None:
-    figures = measured(at(0.0, 1), at(0.1, 2), at(0.4, 3)).rate()
-    assert figures == {
-        "hz": pytest.approx(5.0), "min": pytest.approx(0.1), "max": pytest.approx(0.3),
-        "std_dev": pytest.approx(0.1), "lost": 0, "window": 3,
-    }  # fmt: skip
+def test_rate_gaps_and_bandwidth() -> None:
+    figures = measured(at(0.0, 1, size=500), at(0.1, 2, size=100), at(0.4, 3, size=300)).figures()
+    assert (figures["hz"], figures["lost"], figures["window"]) == (pytest.approx(5.0), 0, 3)
+    assert figures["gap"] == pytest.approx({"min": 0.1, "max": 0.3, "std_dev": 0.1})
+    assert (figures["bytes_per_s"], figures["bytes"]) == (pytest.approx(1000.0), 300.0)
 
 
-@pytest.mark.parametrize("samples", [(), (at(1.0, 1),)])
-def test_fewer_than_two_samples_have_no_rate(samples: tuple[StreamSample, ...]) -> None:
-    figures = measured(*samples).rate()
-    assert (figures["hz"], figures["min"], figures["max"], figures["std_dev"]) == (None,) * 4
+@pytest.mark.parametrize("samples", [(), (at(1.0, 1),), (at(1.0), at(1.0))])
+def test_without_a_span_there_is_no_rate(samples: tuple[StreamSample, ...]) -> None:
+    figures = measured(*samples).figures()
+    assert (figures["hz"], figures["bytes_per_s"]) == (None, None)
     assert figures["window"] == len(samples)
-
-
-def test_two_simultaneous_samples_have_no_rate() -> None:
-    assert measured(at(1.0), at(1.0)).rate()["hz"] is None
 
 
 def test_losses_are_counted_per_sender() -> None:
@@ -45,40 +40,17 @@ def test_losses_are_counted_per_sender() -> None:
 
 def test_the_window_limits_samples_and_not_the_count() -> None:
     stats = measured(*(at(second) for second in (0, 10, 11, 12)), window=3)
-    assert stats.rate()["hz"] == pytest.approx(1.0)
+    assert stats.rate_hz() == pytest.approx(1.0)
     assert (stats.count, len(stats.samples)) == (4, 3)
 
 
 def test_the_delay() -> None:
     delays = [0.001 * number for number in range(1, 101)]
-    figures = measured(*(StreamSample(0, 1, delay_s=each, clock="host") for each in delays)).delay()
-    assert figures["mean"] == pytest.approx(0.0505)
-    assert (figures["min"], figures["max"]) == (0.001, 0.1)
-    assert figures["p50"] == pytest.approx(0.051)
-    assert figures["p99"] == 0.1
-    assert (figures["clock"], figures["window"]) == ("host", 100)
-
-
-def test_no_delay_without_a_timestamp() -> None:
-    figures = measured(at(0.0), at(1.0)).delay()
-    assert (figures["mean"], figures["p99"], figures["clock"], figures["window"]) == (
-        None,
-        None,
-        None,
-        0,
-    )
-
-
-def test_the_bandwidth() -> None:
-    figures = measured(at(0.0, size=500), at(0.5, size=100), at(2.0, size=300)).bandwidth()
-    assert figures == {"bytes_per_s": 200.0, "mean": 300.0, "min": 100, "max": 500, "window": 3}
-
-
-def test_the_bandwidth_of_one_sample_and_of_none() -> None:
-    assert measured(at(1.0)).bandwidth()["bytes_per_s"] is None
-    assert measured().bandwidth() == {
-        "bytes_per_s": None, "mean": None, "min": None, "max": None, "window": 0,
-    }  # fmt: skip
+    samples = [StreamSample(0, 1, delay_s=each, clock="host") for each in delays]
+    figures = measured(*samples).figures()
+    assert figures["delay"] == pytest.approx({"min": 0.001, "p50": 0.051, "p99": 0.1, "max": 0.1})
+    assert measured(*samples).figures()["clock"] == "host"
+    assert measured(at(0.0)).figures()["delay"] == dict.fromkeys(("min", "p50", "p99", "max"))
 
 
 def test_quantiles() -> None:

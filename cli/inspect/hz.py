@@ -1,9 +1,8 @@
-"""``t2 hz``, ``t2 delay`` and ``t2 bw``: rate, transport delay and bandwidth of keys.
+"""``t2 hz``: rate, gaps, losses, bandwidth and transport delay of keys, in one table.
 
-``hz`` shows the average rate, the gaps between two samples, and samples lost by ``seq``. ``delay``
-uses the host's monotonic clock where sender and receiver share it (clock ``host``), else both wall
-clocks, whose offset is then part of the result (clock ``wall``). ``bw`` counts payloads and
-attachments, without the protocol overhead.
+The delay is by the host's monotonic clock where sender and receiver share it (clock ``host``), else
+by both wall clocks, whose offset is then part of the result (clock ``wall``). Bandwidth counts
+payloads and attachments, without the protocol overhead.
 """
 
 import argparse
@@ -11,7 +10,6 @@ import time
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, expression, short
-from cli.inspect.payload import read
 from cli.inspect.session import (
     BusSession,
     add_end,
@@ -20,19 +18,18 @@ from cli.inspect.session import (
     until_interrupt,
     whole,
 )
-from cli.inspect.stream_stats import StreamSample, StreamStats
+from cli.inspect.stream_stats import StreamStats, stream_sample
 from common.bus.publisher import host_id
-from common.codec import Sample
 from common.errors import RobotError
-from common.freshness import NS_PER_S
 
 REPORT_S = 1.0
 WINDOW = 10_000
-MEASURES = {"hz": StreamStats.rate, "delay": StreamStats.delay, "bw": StreamStats.bandwidth}
+HEAD = ("key", "Hz", "gap ms: min", "max", "lost", "kB/s", "bytes", "delay ms: p50", "p99", "max",
+        "clock")  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the three commands."""
+    """Add this command's options."""
     add_key(parser)
     parser.add_argument(
         "--window", "-w", type=whole, default=WINDOW, metavar="N", help="of the last N samples"
@@ -73,7 +70,7 @@ def follow(
         if time.monotonic() - reported_s >= REPORT_S:
             reported_s += REPORT_S
             if silent:
-                output.warn(f"t2 {options.command}: no new messages")
+                output.warn("t2 hz: no new messages")
             else:
                 report(streams, options)
             silent = True
@@ -83,33 +80,30 @@ def follow(
 
 def report(streams: dict[str, StreamStats], options: argparse.Namespace) -> None:
     """Print the figures of every key."""
-    measure = MEASURES[options.command]
-    rows = [{"key": key, **measure(stats)} for key, stats in sorted(streams.items())]
-    head = [column.replace("_", " ") for column in rows[0]]
-    output.rows(rows, head, lambda row: list(map(cell, row, row.values())), options.output)
+    rows = [{"key": key, **stats.figures()} for key, stats in sorted(streams.items())]
+    output.rows(rows, HEAD, as_cells, options.output)
     if options.output != "json":
         print(flush=True)
 
 
-def cell(name: str, value: float | int | str | None) -> str:
-    """Return a figure as text."""
-    if value is None:
-        return "-"
-    if isinstance(value, str | int):
-        return str(value)
-    return f"{value:.2f}" if name in ("hz", "bytes_per_s") or value >= 10 else f"{value:.6f}"
+def as_cells(row: output.Row) -> list[str]:
+    """Return one key as table cells: times in ms, sizes in bytes, bandwidth in kB/s."""
+    delay, gap = row["delay"], row["gap"]
+    return [
+        row["key"],
+        number(row["hz"]),
+        number(gap["min"], 1000),
+        number(gap["max"], 1000),
+        str(row["lost"]),
+        number(row["bytes_per_s"], 0.001),
+        number(row["bytes"]),
+        number(delay["p50"], 1000),
+        number(delay["p99"], 1000),
+        number(delay["max"], 1000),
+        row["clock"] or "-",
+    ]
 
 
-def stream_sample(sample: Sample, host: int) -> StreamSample:
-    """Return the measured values of a sample; its header is read, whatever its type."""
-    header = read(sample.payload, sample.encoding).value
-    if not isinstance(header, dict):
-        return StreamSample(sample.received_ns, sample.size)
-    numbers = {name: value for name, value in header.items() if isinstance(value, int)}
-    delay_s, clock = None, ""
-    if numbers.get("mono_ns") and host and numbers.get("host") == host:
-        delay_s, clock = (sample.received_ns - numbers["mono_ns"]) / NS_PER_S, "host"
-    elif numbers.get("t_ns"):
-        delay_s, clock = (sample.wall_ns - numbers["t_ns"]) / NS_PER_S, "wall"
-    seq, boot = numbers.get("seq"), numbers.get("boot")
-    return StreamSample(sample.received_ns, sample.size, seq, boot, delay_s, clock)
+def number(value: float | None, factor: float = 1.0) -> str:
+    """Return a figure in another unit as text."""
+    return "-" if value is None else f"{value * factor:.2f}"

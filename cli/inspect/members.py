@@ -1,20 +1,26 @@
-"""Graph of sessions on the bus with the keys that they publish, read and answer. Pure.
+"""Sessions on the bus with the keys that they publish, read and answer.
 
 Sources are liveliness tokens and the router's admin space, which lists the sessions that have
 declared a key. A service's session also declares its token, which gives the session's name. A
 session without a token (a tool, safety's session for the emergency stop) has a part of its id for a
-name.
+name. The admin space lists declarations, not traffic. Without it only the tokens are known. It
+omits keys that begin with ``@`` (eclipse-zenoh 1.10.2).
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from cli.inspect.addressing import chunks, short
+from cli.inspect.addressing import chunks
+from cli.inspect.payload import read
+from common import keys
+from common.bus.probe import Probe
 
 ROLES = {"publisher": "publishes", "subscriber": "reads", "queryable": "answers"}
 ZENOH_OWN = "@adv"  # declarations of Zenoh itself below a key
+# The router of a robot that connects to a site's router is a peer there.
+ADMIN = "@/*/*/*/t2/v1/{robot}/**"
 
 
 @dataclass(slots=True)
@@ -30,13 +36,15 @@ class Member:
     answers: set[str] = field(default_factory=set)
 
 
-@dataclass(frozen=True, slots=True)
-class Edge:
-    """A publisher and a reader of one key."""
-
-    sender: str
-    key: str
-    reader: str
+def discover(probe: Probe, robot: str) -> list[Member]:
+    """Return the sessions on the bus except this one."""
+    tokens = probe.alive(keys.live_key(robot, "*", "*"))
+    declared = {
+        each.key: read(each.payload, each.encoding).value
+        for each in probe.query(ADMIN.format(robot=robot))
+        if not each.refusal
+    }
+    return members(tokens, declared, without=(probe.zid,))
 
 
 def members(
@@ -68,33 +76,6 @@ def title(member: Member, found: Sequence[Member]) -> str:
     """Return a unique name of a member."""
     same = [each for each in found if (each.robot, each.name) == (member.robot, member.name)]
     return f"{member.name}:{member.instance[:4]}" if len(same) > 1 else member.name
-
-
-def edges(found: Sequence[Member], intersects: Callable[[str, str], bool]) -> list[Edge]:
-    """Return all edges; ``intersects`` compares two key expressions."""
-    links = {
-        Edge(title(sender, found), key, title(reader, found))
-        for sender in found
-        for key in sender.publishes
-        for reader in found
-        if reader is not sender and any(intersects(key, read) for read in reader.reads)
-    }
-    return sorted(links, key=lambda edge: (edge.sender, edge.key, edge.reader))
-
-
-def dot(found: Sequence[Member], links: Iterable[Edge], robot: str) -> str:
-    """Return the graph in the DOT language: one arrow per pair, labelled with its keys."""
-    between: dict[tuple[str, str], list[str]] = {}
-    for link in links:
-        between.setdefault((link.sender, link.reader), []).append(short(link.key, robot))
-    lines = ["digraph t2 {", "  rankdir=LR; node [shape=box];"]
-    for member in found:
-        style = "" if member.instance else " [style=dashed]"
-        lines.append(f'  "{title(member, found)}"{style};')
-    for (sender, reader), keys in between.items():
-        label = "\\n".join(keys)
-        lines.append(f'  "{sender}" -> "{reader}" [label="{label}"];')
-    return "\n".join([*lines, "}"])
 
 
 def by_boot(found: Iterable[Member]) -> dict[int | None, Member]:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cli.inspect.graph import Edge, Member, by_boot, dot, edges, members, title
+from cli.inspect.members import Member, by_boot, members, title
 
 TOKENS = ["t2/v1/7/live/bridge/1a", "t2/v1/7/live/safety/2b", "t2/v1/7/live/odd"]
 
@@ -17,7 +17,6 @@ DECLARED = dict(
         entry("token", "t2/v1/7/live/safety/2b", "zs"),
         entry("token", "t2/v1/7/live/other/3c", "zx"),
         entry("publisher", "t2/v1/7/tel/bridge/bumper", "zb"),
-        entry("publisher", "t2/v1/7/tel/safety/state", "zs"),
         entry("subscriber", "t2/v1/7/tel/bridge/bumper", "zs", "me"),
         entry("subscriber", "t2/v1/7/tel/**", "stranger-1"),
         entry("queryable", "t2/v1/7/srv/safety/reset", "zs"),
@@ -28,16 +27,8 @@ DECLARED = dict(
 )  # fmt: skip
 
 
-def found() -> list[Member]:
-    return members(TOKENS, DECLARED, without=("me",))
-
-
-def intersects(one: str, other: str) -> bool:
-    return one == other or other.endswith("**")
-
-
 def test_services_have_names_and_other_sessions_ids() -> None:
-    bridge, safety, other = found()
+    bridge, safety, other = members(TOKENS, DECLARED, without=("me",))
     assert (bridge.name, bridge.robot, bridge.instance, bridge.zid) == ("bridge", "7", "1a", "zb")
     assert bridge.publishes == {"t2/v1/7/tel/bridge/bumper"}
     assert safety.reads == {"t2/v1/7/tel/bridge/bumper"}
@@ -49,31 +40,15 @@ def test_tokens_are_enough_without_the_admin_space() -> None:
     assert [each.name for each in members(TOKENS, {})] == ["bridge", "safety"]
 
 
-def test_edges() -> None:
-    assert edges(found(), intersects) == [
-        Edge("bridge", "t2/v1/7/tel/bridge/bumper", "safety"),
-        Edge("bridge", "t2/v1/7/tel/bridge/bumper", "stranger"),
-        Edge("safety", "t2/v1/7/tel/safety/state", "stranger"),
-    ]
-
-
 def test_members_of_one_name_have_unique_titles() -> None:
     two = [Member("safety", robot="7", instance=each) for each in ("aaaa1", "bbbb2")]
     assert [title(each, two) for each in two] == ["safety:aaaa", "safety:bbbb"]
     assert title(two[0], [two[0], Member("safety", robot="8", instance="cc")]) == "safety"
 
 
-def test_dot() -> None:
-    shown = dot(found(), edges(found(), intersects), "7")
-    assert shown.startswith("digraph t2 {")
-    assert '  "bridge" -> "safety" [label="tel/bridge/bumper"];' in shown
-    assert '  "stranger" [style=dashed];' in shown
-    assert shown.count("{") == shown.count("}") == 1
-
-
 def test_services_by_boot() -> None:
-    strange = Member("x", instance="no number")
-    assert {boot: member.name for boot, member in by_boot([*found(), strange]).items()} == {
+    found = [*members(TOKENS, DECLARED), Member("x", instance="no number")]
+    assert {boot: member.name for boot, member in by_boot(found).items()} == {
         0x1A: "bridge",
         0x2B: "safety",
     }

@@ -1,0 +1,145 @@
+"""Client of safety for a tool: the state machines of ``common.client`` on a probe.
+
+Everything runs in the tool's own thread: messages are taken and the drive request of each tick is
+sent only inside ``until``. While a tool waits for its user nothing is sent, which is a release.
+"""
+
+import secrets
+import time
+from collections.abc import Callable, Iterable
+from itertools import count
+from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from cli.inspect.addressing import chunks
+from cli.inspect.session import decoded
+from common import clock, codec, keys
+from common.bus.bus import no_answer, not_allowed
+from common.bus.probe import Answer, Probe
+from common.bus.publisher import host_id
+from common.client import DriveRequests, EstopRepetition, EstopStep, ResetCheck
+from common.codec import Sample
+from common.errors import RobotError
+from common.keys import Call, Topic
+from common.messages import Drive, ResetDone, SafetyState, SourceMessage
+
+TICK_S = 0.05  # as ``common.client`` expects
+STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
+
+
+class SafetyClient:
+    """Client of one robot's safety; a key expression as robot serves ``stop`` only."""
+
+    def __init__(self, probe: Probe, robot: str, source: str = "") -> None:
+        """Listen to safety; ``source`` is the name in drive requests and keepalives."""
+        self.probe = probe
+        self.robot = robot
+        self.states: dict[str, SafetyState] = {}  # the newest by robot
+        self.requested: Drive | None = None  # sent on each tick, with its neutral requests
+        self._source = source
+        self._drive = DriveRequests()
+        self._stops: dict[str, EstopRepetition] = {}
+        self._header = {"boot": secrets.randbits(63), "host": host_id()}
+        self._seq = count(1)
+        self._due_s = 0.0
+        probe.listen(keys.SAFETY.on(robot))
+
+    @property
+    def state(self) -> SafetyState | None:
+        """The newest state of the robot."""
+        return self.states.get(self.robot)
+
+    def until(self, condition: Callable[[], object], timeout_s: float) -> bool:
+        """Receive and tick until the condition holds or the timeout expires; return which."""
+        end_s = time.monotonic() + timeout_s
+        while True:
+            now_s = time.monotonic()
+            if now_s >= self._due_s:
+                self._due_s = now_s + TICK_S
+                self.tick()
+            if condition():
+                return True
+            if now_s >= end_s:
+                return False
+            if sample := self.probe.take(min(end_s, self._due_s) - now_s):
+                self.receive(sample)
+
+    def receive(self, sample: Sample) -> None:
+        """Take one message of the bus."""
+        robot, path = chunks(sample.key)
+        if path == keys.SAFETY.path:
+            for state in decoded([sample], SafetyState):
+                self.states[robot] = state
+
+    def tick(self) -> None:
+        """Send what is due."""
+        if drive := self._drive.tick(self.requested):
+            self.put(keys.DRIVE, drive)
+        for robot, stop in self._stops.items():
+            if stop.tick(self.states.get(robot)) is not EstopStep.NONE:
+                self.order_stop(robot)
+
+    def put(self, topic: Topic[Any], message: SourceMessage) -> None:
+        """Publish a message of this source, with its header and the newest heartbeat."""
+        whole = replace(
+            message, seq=next(self._seq), t_ns=time.time_ns(), mono_ns=clock.now_ns(),
+            echo=self.state.heartbeat if self.state else 0, **self._header,
+        )  # fmt: skip
+        key = topic.on(self.robot, source=self._source)
+        self.probe.put(key, codec.encode(whole), codec.encoding(topic.message), topic.service)
+
+    def order_stop(self, robot: str) -> None:
+        """Publish an emergency stop once."""
+        self.probe.put(keys.estop_key(robot), b"", codec.ENCODING, keys.ESTOP_CLASS)
+
+    def stop(self, robots: Iterable[str]) -> set[str]:
+        """Repeat an emergency stop until all have latched it; return the robots that have."""
+        self._stops = {robot: EstopRepetition() for robot in robots}
+        for stop in self._stops.values():
+            stop.start()
+        while any(stop.is_pending for stop in self._stops.values()):
+            if "*" in self.robot:  # for robots that are not known here
+                self.order_stop(self.robot)
+            self.until(lambda: False, TICK_S)
+        return {robot for robot, state in self.states.items() if "estop" in state.latched}
+
+    def fresh_state(self) -> SafetyState:
+        """Return a state that arrives from now on; raise ``RobotError`` without one."""
+        self.states.clear()
+        if not self.until(lambda: self.state, STATE_S) or self.state is None:
+            raise RobotError(
+                f"no state of safety within {STATE_S:g} s: is safety running? run `t2 doctor`"
+            )
+        return self.state
+
+    def call(self, call: Call[Any, Any], request: Struct, timeout_s: float = 2.0) -> list[Answer]:
+        """Return the answers to a call; raise ``RobotError`` without any."""
+        key = call.on(self.robot)
+        answers = self.probe.query(key, codec.encode(request), timeout_s)
+        if not answers:
+            raise RobotError(f"{key}: {self._why_unanswered(call, key)}")
+        return answers
+
+    def is_reset(self, seen: SafetyState, answers: Iterable[Answer]) -> bool:
+        """Return whether safety's state soon shows the reset that one of the answers claims."""
+        checks = []
+        for done in decoded(answers, ResetDone):
+            checks.append(ResetCheck(seen))
+            checks[-1].answer(done)
+
+        def outcomes() -> list[bool | None]:
+            return [check.outcome(self.state, clock.now_ns()) for check in checks]
+
+        self.until(lambda: None not in (found := outcomes()) or True in found, float("inf"))
+        return True in outcomes()
+
+    def _why_unanswered(self, call: Call[Any, Any], key: str) -> str:
+        """Return why: the service is absent or hangs, or the router drops the call.
+
+        The router announces no queryable to a certificate that may not call it.
+        """
+        runs = self.probe.alive(keys.live_key(self.robot, call.server, "*"))
+        barred = runs and not self.probe.has_server(key)
+        return not_allowed(call.server) if barred else no_answer(call.server)
