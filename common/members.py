@@ -20,15 +20,30 @@ ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site
 OPERATORS_SOURCES = ("teleop", "web", "checkout")  # of the operator's screens
 
 
-class Member(Struct, frozen=True, kw_only=True):
-    """One certificate; ``common_name`` is ``ROLE.NAME.SERIAL`` and never reused."""
+class Profile(Struct, frozen=True, kw_only=True):
+    """Whom a certificate is for, and what it permits."""
 
-    common_name: str
     role: Role
     name: Name
     robots: tuple[str, ...] = ()  # that a driver, device or ros may use, or that a robot is
     sources: tuple[SourceName, ...] = ()  # that a driver or device may use; empty: any of a driver
-    addresses: tuple[str, ...] = ()  # addresses of a router; empty in older lists
+    addresses: tuple[str, ...] = ()  # IP addresses and host names of a router
+
+    @property
+    def label(self) -> str:
+        """Return role and name, also the name of its folder."""
+        return f"{self.role}.{self.name}"
+
+    @property
+    def listens(self) -> bool:
+        """Return whether it is a router."""
+        return self.role in ("robot", "site")
+
+
+class Member(Profile, frozen=True, kw_only=True):
+    """One certificate; ``common_name`` is ``ROLE.NAME.SERIAL`` and never reused."""
+
+    common_name: str
     expires: datetime  # UTC
     revoked: bool = False
 

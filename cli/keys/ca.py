@@ -20,10 +20,11 @@ from cryptography.hazmat.primitives.serialization import (
     load_pem_private_key,
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from msgspec.structs import asdict
 
-from cli.keys.profile import Profile, Span, is_ip
+from cli.keys.member_list import Span, common_name, is_ip
 from common.errors import RobotError
-from common.members import Member
+from common.members import Member, Profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,7 @@ class CertificateAuthority:
         """Sign a certificate for a new key."""
         key = ec.generate_private_key(ec.SECP256R1())
         serial = x509.random_serial_number()
-        name = profile.common_name(serial)
+        name = common_name(profile, serial)
         authority = x509.SubjectKeyIdentifier.from_public_key(self.key.public_key())
         server = [ExtendedKeyUsageOID.SERVER_AUTH] if profile.listens else []
         extensions = [
@@ -87,11 +88,7 @@ class CertificateAuthority:
             self.certificate.subject, _name(name), key, span, extensions, is_ca=False
         )
         signed = unsigned.serial_number(serial).sign(self.key, hashes.SHA256())
-        member = Member(
-            common_name=name, role=profile.role, name=profile.name, robots=profile.robots,
-            sources=profile.sources, addresses=profile.addresses,
-            expires=signed.not_valid_after_utc,
-        )  # fmt: skip
+        member = Member(**asdict(profile), common_name=name, expires=signed.not_valid_after_utc)
         return Issued(certificate_pem(signed), key_pem(key), member)
 
 
@@ -130,8 +127,8 @@ def _unsigned(
         key_agreement=False, encipher_only=False, decipher_only=False,
     )  # fmt: skip
     builder = x509.CertificateBuilder(issuer, name, key.public_key())
-    builder = builder.not_valid_before(datetime.fromtimestamp(span.begins_s, UTC))
-    builder = builder.not_valid_after(datetime.fromtimestamp(span.ends_s, UTC))
+    builder = builder.not_valid_before(datetime.fromtimestamp(span[0], UTC))
+    builder = builder.not_valid_after(datetime.fromtimestamp(span[1], UTC))
     constraints = x509.BasicConstraints(ca=is_ca, path_length=0 if is_ca else None)
     builder = builder.add_extension(constraints, critical=True)
     builder = builder.add_extension(usage, critical=True)

@@ -7,7 +7,7 @@ and ``list`` shows them. Guide: docs/keys.md; rights of each role: docs/security
 import argparse
 from pathlib import Path
 
-from cli.keys.profile import DAYS
+from cli.keys.member_list import DAYS
 from common.errors import RobotError
 from common.members import OPERATORS_SOURCES, ROLES
 
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     issue = _verb(verbs, "issue", "create a certificate, and the folder for its machine")
     renew = _verb(verbs, "renew", "create the next certificate; the previous one stays valid")
     revoke = _verb(verbs, "revoke", "revoke the certificates of a member")
-    shown = _verb(verbs, "list", "list every certificate, and what expires soon")
+    _verb(verbs, "list", "list every certificate, and what expires soon")
     init.add_argument("--site", default="t2", metavar="NAME", help="t2 by default")
     init.add_argument(
         "--passphrase", action="store_true", help="ask for a passphrase, to encrypt the CA's key"
@@ -34,15 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_rights(issue)
     _add_signing(issue)
     _add_signing(renew)
-    for verb in (init, issue, renew):
-        verb.add_argument(
-            "--passphrase-file", type=Path, metavar="FILE",
-            help="file with the passphrase of the CA's key",
-        )  # fmt: skip
     revoke.add_argument(
         "--serial", type=_serial, help="only the certificate whose name ends with this serial"
     )
-    shown.add_argument("--json", action="store_true", help="one JSON object")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,11 +3,10 @@
 from collections.abc import Iterator, Sequence
 
 from cli.keys.machine_settings import MEMBERS, SETTINGS, connected, endpoints, ros_override
-from cli.keys.profile import EVERY_ROBOT, Profile
-from common.members import OPERATORS_SOURCES, Member, Role
+from cli.keys.member_list import EVERY_ROBOT
+from common.members import OPERATORS_SOURCES, Member, Profile, Role
 
 PLACE = "/etc/t2/keys"  # on a router's machine, as in the systemd units and compose.yaml
-UNKNOWN = "; its address is not in the member list"
 # A container's router starts with generated rules: they must be generated again first.
 IN_CONTAINERS = "docker compose up -d --force-recreate router-settings router"
 USED_BY: dict[Role, str] = {
@@ -31,40 +30,38 @@ def authority_created(folder: str, site: str, until: str, encrypted: bool) -> It
     yield "  t2 keys issue driver NAME --robot 001"
 
 
-def certificate_issued(
-    profile: Profile, member: Member, target: str, routers: Sequence[Profile]
-) -> Iterator[str]:
+def certificate_issued(member: Member, target: str, routers: Sequence[Profile]) -> Iterator[str]:
     """Yield the instructions for a new certificate: where to copy it, which routers to update."""
     yield f"{member.common_name}, valid until {member.expires:%Y-%m-%d}"
-    if profile.listens:
-        yield f"  addresses {', '.join(profile.addresses)}; valid at no other address"
-    if profile.role in ("driver", "ros"):
-        yield f"  may move {_robots(profile)}"
-    if profile.sources:
-        verb = "drives" if profile.role == "driver" else f"limits {_robots(profile)}"
-        yield f"  {verb} as {' or '.join(profile.sources)}; no other source is allowed"
-        if set(OPERATORS_SOURCES).isdisjoint(profile.sources):
+    if member.listens:
+        yield f"  addresses {', '.join(member.addresses)}; valid at no other address"
+    if member.role in ("driver", "ros"):
+        yield f"  may move {_robots(member)}"
+    if member.sources:
+        verb = "drives" if member.role == "driver" else f"limits {_robots(member)}"
+        yield f"  {verb} as {' or '.join(member.sources)}; no other source is allowed"
+        if set(OPERATORS_SOURCES).isdisjoint(member.sources):
             yield "  may not reset, release or set the brake switches: no operator's source"
     yield ""
-    if profile.listens:
-        yield f"1. Copy the folder to the {profile.role}'s computer only:"
-        yield f"     scp -rp {target}/. {_host(profile)}:{PLACE}"
+    if member.listens:
+        yield f"1. Copy the folder to the {member.role}'s computer only:"
+        yield f"     scp -rp {target}/. {_host(member)}:{PLACE}"
         yield "2. There, give the files to the user that runs the router, and restart it:"
         yield f"     t2 router --config {PLACE}/{SETTINGS}"
     else:
-        yield f"1. Copy the folder {target} to {profile.name}'s computer only."
+        yield f"1. Copy the folder {target} to {member.name}'s computer only."
         yield "2. On that computer:"
-        yield from _use(profile, target, routers)
-    others = [each for each in routers if each.label != profile.label]
-    if others or not profile.listens:  # a router's own folder holds the list
+        yield from _use(member, target, routers)
+    others = [each for each in routers if each.label != member.label]
+    if others or not member.listens:  # a router's own folder holds the list
         yield from _update_routers("3. ", target, others)
 
 
-def certificate_renewed(role: Role, name: str, old: Member) -> Iterator[str]:
+def certificate_renewed(old: Member) -> Iterator[str]:
     """Yield the instructions for the previous certificate."""
     serial = old.common_name.rpartition(".")[2]
     yield f"The previous one stays valid until {old.expires:%Y-%m-%d}. Once the new one is in use:"
-    yield f"     t2 keys revoke {role} {name} --serial {serial}"
+    yield f"     t2 keys revoke {old.role} {old.name} --serial {serial}"
 
 
 def certificates_revoked(
@@ -87,9 +84,8 @@ def _update_routers(number: str, target: str, routers: Sequence[Profile]) -> Ite
     else:
         yield f"{number}Copy {MEMBERS} to each router and restart it:"
     for router in routers:
-        host, unknown = (_host(router), "") if router.addresses else ("HOST", UNKNOWN)
-        copy = f"scp -p {folder}/{MEMBERS} {host}:{PLACE}/{MEMBERS}"
-        yield f"     {copy}  # {router.role} {router.name}{unknown}"
+        copy = f"scp -p {folder}/{MEMBERS} {_host(router)}:{PLACE}/{MEMBERS}"
+        yield f"     {copy}  # {router.role} {router.name}"
     yield "   A router in a container needs this instead of a restart:"
     yield f"     {IN_CONTAINERS}"
 

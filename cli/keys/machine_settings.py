@@ -6,7 +6,8 @@ Its paths are relative, so that the folder works at any place.
 import json
 from collections.abc import Sequence
 
-from cli.keys.profile import EVERY_ROBOT, LOCAL, VEHICLE, Profile
+from cli.keys.member_list import EVERY_ROBOT, LOCAL, VEHICLE
+from common.members import Profile
 
 PORT = 7447
 SOCKET = "unixsock-stream//run/t2/bus.sock"  # for on-board clients, protected by file permissions
@@ -90,7 +91,7 @@ def _robot_routers(profile: Profile, routers: Sequence[Profile]) -> list[Profile
     """Return the routers of a member's robots; the manual's addresses if none is known."""
     any_robot = not profile.robots or EVERY_ROBOT in profile.robots
     return [router for router in routers if any_robot or router.name in profile.robots] or [
-        Profile("robot", "", addresses=VEHICLE)
+        Profile(role="robot", name="", addresses=VEHICLE)
     ]
 
 

@@ -1,19 +1,138 @@
-"""The member list: lookup, addition, revocation, and the output of ``t2 keys list``. Pure."""
+"""The member list: valid profiles, lookup, revocation, and the output of ``t2 keys list``. Pure.
 
+Routers of robots and sites listen: their certificates hold addresses and are valid for both ends of
+a link. All other members only connect, and their certificates are not valid for a router.
+"""
+
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal
+from ipaddress import ip_address
+from typing import Annotated, Literal
 
+import msgspec
+from msgspec import Meta
 from msgspec.structs import replace
 
 from cli.inspect import output
-from cli.keys.profile import DAY_S, DAYS, EVERY_ROBOT, LISTENERS, Profile
-from common.errors import RobotError
-from common.members import Member, Members, Role
+from common.errors import ConfigError, RobotError
+from common.members import OPERATORS_SOURCES, Member, Members, Profile, Role
+from common.settings import Name, SourceName
 
+DAY_S = 86_400
+CA_DAYS = 3650
+DAYS = 365
+EARLY_S = DAY_S  # valid from a day ago: clocks differ, and a wrong time zone is up to 14 h
 SOON_DAYS = 30
+
+BOUND: tuple[Role, ...] = ("driver", "device", "ros")  # to robots
+SOURCED: tuple[Role, ...] = ("driver", "device")  # to sources
+LOCAL = ("localhost", "127.0.0.1")  # for clients on the same host, or through a tunnel
+VEHICLE = ("192.168.201.1", "10.7.5.220")  # on its own Wi-Fi and on its cable (manual 1 and 1.1)
+EVERY_ROBOT = "*"
+LONGEST = 48  # of a name: a common name has 64 characters (RFC 5280), ours role and serial too
+NAMES = f"1 to {LONGEST} letters, digits, dots, hyphens and underscores"
+SOURCE_NAMES = (
+    "a lowercase letter, then up to 31 lowercase letters, digits, hyphens and underscores, as in "
+    "safety.sources and safety.limits"
+)
+LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?"
+HOST = re.compile(rf"(?=.{{1,253}}\Z)(?!(.*\.)?\d+\Z)({LABEL}\.)*{LABEL}\Z")  # no 300.1.1.1
 HEAD = ("role", "name", "robots", "sources", "until", "state", "certificate")
 
+Span = tuple[float, float]  # validity of a certificate, in seconds since 1970
 State = Literal["valid", "expires soon", "expired", "revoked"]
+
+
+# --- a new certificate --------------------------------------------------------------------------
+
+
+def profile(
+    role: Role,
+    name: str,
+    robots: Sequence[str] = (),
+    addresses: Sequence[str] = (),
+    sources: Sequence[str] = (),
+) -> Profile:
+    """Return the profile for the given options; raise ``ConfigError`` if they are invalid."""
+    for each in (name, *(robot for robot in robots if robot != EVERY_ROBOT)):
+        _check(each, Annotated[Name, Meta(max_length=LONGEST)], f"{each!r} is not a name: {NAMES}")
+    for source in sources:
+        _check(source, SourceName, f"--source {source!r} is not a source name: {SOURCE_NAMES}")
+    _check_rights(role, robots, sources)
+    addresses = _addresses(role, addresses)
+    return Profile(
+        role=role,
+        name=name,
+        robots=(name,) if role == "robot" else tuple(dict.fromkeys(robots)),
+        addresses=tuple(dict.fromkeys(addresses)),
+        sources=tuple(dict.fromkeys(sources)),
+    )
+
+
+def default_sources(role: Role, name: str) -> tuple[str, ...]:
+    """Return the sources of a member for which none are given."""
+    return {"driver": OPERATORS_SOURCES, "device": (name,)}.get(role, ())
+
+
+def span(now_s: float, days: int, authority_ends_s: float) -> Span:
+    """Return the validity of a new certificate; it never exceeds the authority's."""
+    left = days_left(authority_ends_s, now_s)
+    if left < 1:
+        raise RobotError(
+            "the CA has expired; `t2 keys init --folder NEW` creates another, and every "
+            "certificate must be issued again"
+        )
+    if not 1 <= days <= left:
+        raise ConfigError(f"--days {days}: allowed is 1..{left}, the remaining validity of the CA")
+    return now_s - EARLY_S, now_s + days * DAY_S
+
+
+def common_name(profile: Profile, serial: int) -> str:
+    """Return a unique name: access is granted and revoked by it."""
+    return f"{profile.label}.{serial:040x}"[: len(profile.label) + 9]
+
+
+def is_ip(address: str) -> bool:
+    """Return whether an address is an IP address, not a host name."""
+    try:
+        ip_address(address)
+    except ValueError:
+        return False
+    return True
+
+
+def _check(text: str, kind: object, problem: str) -> None:
+    try:
+        msgspec.convert(text, kind)
+    except msgspec.ValidationError:
+        raise ConfigError(problem) from None
+
+
+def _check_rights(role: Role, robots: Sequence[str], sources: Sequence[str]) -> None:
+    """Reject robots and sources for other roles, and a member without robots that needs one."""
+    if role in BOUND and not robots:
+        raise ConfigError(f"a {role} needs --robot ID for each of its robots, or --every")
+    if role not in BOUND and robots:
+        raise ConfigError(f"--robot and --every are for drivers, devices and ros, not for a {role}")
+    if role not in SOURCED and sources:
+        raise ConfigError(f"--source is for drivers and devices; a {role} uses no source")
+
+
+def _addresses(role: Role, given: Sequence[str]) -> Sequence[str]:
+    """Return the addresses of a certificate; localhost is always one of a router."""
+    for address in given:
+        if not is_ip(address) and not HOST.match(address):
+            raise ConfigError(f"--address {address!r} is neither an IP address nor a host name")
+    if role == "robot":
+        given = given or VEHICLE
+    elif role == "site" and not given:
+        raise ConfigError("a site's router needs --address: robots and laptops connect to it")
+    elif role != "site" and given:
+        raise ConfigError(f"--address is for routers; a {role} only connects")
+    return (*given, *LOCAL) if given else ()
+
+
+# --- the list -----------------------------------------------------------------------------------
 
 
 def of(members: Members, role: Role, name: str) -> tuple[Member, ...]:
@@ -37,21 +156,10 @@ def newest_of_each(members: Members) -> Mapping[tuple[Role, str], Member]:
     return {(member.role, member.name): member for member in members.welcome}
 
 
-def addresses_of(member: Member) -> tuple[str, ...]:
-    """Return the addresses of a member; raise ``RobotError`` for a router without any."""
-    if member.role in LISTENERS and not member.addresses:
-        name = f"{member.role} {member.name}"
-        raise RobotError(
-            f"the member list has no address of {name}; its certificate needs one: "
-            f"`t2 keys renew {name} --address HOST`"
-        )
-    return member.addresses
-
-
-def routers(members: Members) -> list[Profile]:
-    """Return the admitted routers, each with the addresses of its latest certificate."""
-    newest = sorted(newest_of_each(members).items())
-    return [Profile(*who, addresses=it.addresses) for who, it in newest if who[0] in LISTENERS]
+def routers(members: Members) -> list[Member]:
+    """Return the latest certificate of each admitted router."""
+    newest = newest_of_each(members)
+    return [newest[who] for who in sorted(newest) if newest[who].listens]
 
 
 def check_free(members: Members, role: Role, name: str, now_s: float) -> None:
@@ -62,11 +170,6 @@ def check_free(members: Members, role: Role, name: str, now_s: float) -> None:
             f"{role} {name} has a certificate until {good[-1].expires:%Y-%m-%d}; "
             f"`t2 keys renew {role} {name}` makes another, `revoke` revokes it"
         )
-
-
-def added(members: Members, member: Member) -> Members:
-    """Return the list with a new member."""
-    return replace(members, members=(*members.members, member))
 
 
 def revoked(
@@ -111,36 +214,15 @@ def as_table(members: Members, now_s: float) -> str:
     return output.table(HEAD, rows)
 
 
-def as_json(members: Members, ca_ends_s: float, now_s: float) -> dict[str, object]:
-    """Return the list as JSON fields."""
-    return {
-        "site": members.site,
-        "authority": {"days": days(ca_ends_s, now_s)},
-        "certificates": [
-            {
-                "common_name": member.common_name,
-                "role": member.role,
-                "name": member.name,
-                "robots": list(member.robots),
-                "sources": list(member.sources),
-                "expires": f"{member.expires:%Y-%m-%dT%H:%M:%SZ}",
-                "days": days(member.expires.timestamp(), now_s),
-                "state": state(member, now_s),
-            }
-            for member in members.members
-        ],
-    }
-
-
 def advice(members: Members, ca_ends_s: float, now_s: float) -> Iterator[str]:
     """Yield what expires, with the command to renew it; skip renewed certificates."""
-    left = days(ca_ends_s, now_s)
+    left = days_left(ca_ends_s, now_s)
     if left < DAYS:
         yield f"the CA {_expiry(left)}: create another with `t2 keys init --folder NEW`"
     for member in newest_of_each(members).values():
         if state(member, now_s) in ("expires soon", "expired"):
             name = f"{member.role} {member.name}"
-            left = days(member.expires.timestamp(), now_s)
+            left = days_left(member.expires.timestamp(), now_s)
             yield f"{name} {_expiry(left)}: `t2 keys renew {name}`"
 
 
@@ -156,7 +238,7 @@ def sources(member: Member) -> str:
     return " ".join(member.sources) or "-"
 
 
-def days(ends_s: float, now_s: float) -> int:
+def days_left(ends_s: float, now_s: float) -> int:
     """Return the number of whole days left; negative after the expiry."""
     return int((ends_s - now_s) // DAY_S)
 

@@ -16,7 +16,6 @@ import msgspec
 from cli.keys import member_list
 from cli.keys.ca import CertificateAuthority, Issued, certificate_pem, key_pem
 from cli.keys.machine_settings import CA, CERTIFICATE, MEMBERS, PRIVATE_KEY, SETTINGS, bus_toml
-from cli.keys.profile import Profile
 from common import members as member_files
 from common.errors import RobotError
 from common.members import Members
@@ -77,23 +76,18 @@ class Folder:
             if (self.path / router.label / CERTIFICATE).exists():
                 _write(self.path / router.label / MEMBERS, _as_file(members), PUBLIC)
 
-    def write_machine(
-        self, profile: Profile, issued: Issued, members: Members, *, settings: bool
-    ) -> Path:
+    def write_machine(self, issued: Issued, members: Members, *, settings: bool) -> Path:
         """Write the folder for a machine and return it; with ``settings``, also ``bus.toml``."""
-        target = self.path / profile.label
-        others = [
-            each
-            for each in member_list.routers(members)
-            if each.addresses and each.label != profile.label
-        ]
+        target = self.path / issued.member.label
+        routers = member_list.routers(members)
+        others = [each for each in routers if each.label != issued.member.label]
         with _os_errors(target):
             target.mkdir(mode=0o700, exist_ok=True)
         _write(target / PRIVATE_KEY, issued.private_key, SECRET)
         _write(target / CERTIFICATE, issued.certificate, PUBLIC)
         _write(target / CA, self.certificate(), PUBLIC)
         if settings or not (target / SETTINGS).exists():
-            _write(target / SETTINGS, bus_toml(profile, others).encode(), PUBLIC)
+            _write(target / SETTINGS, bus_toml(issued.member, others).encode(), PUBLIC)
         return target
 
 

@@ -1,8 +1,11 @@
 """Members of a small site at a fixed time."""
 
 from datetime import UTC, datetime, timedelta
+from typing import Any
 
-from common.members import Member, Members, Role
+from msgspec.structs import asdict
+
+from common.members import Member, Members, Profile, Role
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
 NOW_S = NOW.timestamp()
@@ -15,14 +18,24 @@ def member(
     days: float = 300,
     *,
     revoked: bool = False,
-    addresses: tuple[str, ...] = (),
+    **fields: Any,
 ) -> Member:
     """Return a member whose certificate is valid for so many days."""
+    robots = {"robots": ("001",) if role in ("driver", "robot") else ()}
+    who = Profile(role=role, name=name, **(robots | fields))
+    return certified(who, serial, days, revoked=revoked)
+
+
+def certified(
+    who: Profile, serial: str = "00000001", days: float = 300, *, revoked: bool = False
+) -> Member:
+    """Return the member with a certificate for this profile."""
     return Member(
-        common_name=f"{role}.{name}.{serial}", role=role, name=name,
-        robots=("001",) if role in ("driver", "robot") else (), addresses=addresses,
-        expires=NOW + timedelta(days=days), revoked=revoked,
-    )  # fmt: skip
+        **asdict(who),
+        common_name=f"{who.label}.{serial}",
+        expires=NOW + timedelta(days=days),
+        revoked=revoked,
+    )
 
 
 def members(*each: Member) -> Members:

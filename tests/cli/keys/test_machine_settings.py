@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from cli.keys.machine_settings import SOCKET, bus_toml, endpoints
-from cli.keys.profile import Profile, profile
+from cli.keys.member_list import profile
 from cli.settings import Everything
 from common.config import Sources, load
-from common.members import ROLES
+from common.members import Profile
 from common.settings import Shared
 
-ROBOT = profile("robot", "001", (), ())
+ROBOT = profile("robot", "001")
 OTHER = profile("robot", "002", (), ("robot-2.lan", "fd00::2"))
 SITE = profile("site", "berlin", (), ("site.example",))
 ANNA = profile("driver", "anna", ("001",), ())
@@ -43,8 +43,12 @@ def test_a_site_has_no_robot_id() -> None:
         (ANNA, [ROBOT, OTHER], ["tls/192.168.201.1:7447", "tls/10.7.5.220:7447"]),
         (ANNA, [OTHER], ["tls/192.168.201.1:7447", "tls/10.7.5.220:7447"]),
         (ANNA, [ROBOT, SITE], ["tls/site.example:7447"]),
-        (Profile("driver", "b", ("*",)), [OTHER], ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"]),
-        (Profile("viewer", "b"), [OTHER], ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"]),
+        (
+            Profile(role="driver", name="b", robots=("*",)),
+            [OTHER],
+            ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"],
+        ),
+        (Profile(role="viewer", name="b"), [OTHER], ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"]),
     ],
 )
 def test_other_members_connect(who: Profile, routers: list[Profile], endpoints: list[str]) -> None:
@@ -60,7 +64,10 @@ def test_other_members_connect(who: Profile, routers: list[Profile], endpoints: 
     [(("001",), {"id": "001"}), (("001", "002"), None), (("*",), None), ((), None)],
 )
 def test_the_robot_id_is_set_for_a_single_robot(robots: tuple[str, ...], chosen: object) -> None:
-    assert tomllib.loads(bus_toml(Profile("driver", "b", robots), [])).get("robot") == chosen
+    assert (
+        tomllib.loads(bus_toml(Profile(role="driver", name="b", robots=robots), [])).get("robot")
+        == chosen
+    )
 
 
 @pytest.mark.parametrize(
@@ -75,7 +82,7 @@ def test_the_robot_id_is_set_for_a_single_robot(robots: tuple[str, ...], chosen:
 def test_screens_use_an_allowed_source(
     sources: tuple[str, ...], expected: dict[str, object], tmp_path: Path
 ) -> None:
-    who = Profile("driver", "b", ("001",), (), sources)
+    who = Profile(role="driver", name="b", robots=("001",), sources=sources)
     table = tomllib.loads(bus_toml(who, [ROBOT]))
     assert {name: table[name] for name in table if name in ("teleop", "dashboard")} == expected
     file = tmp_path / "bus.toml"
@@ -86,15 +93,8 @@ def test_screens_use_an_allowed_source(
 
 
 def test_a_device_drives_no_screen() -> None:
-    assert "source" not in bus_toml(Profile("device", "x", ("001",), (), ("lidar",)), [ROBOT])
+    assert "source" not in bus_toml(profile("device", "x", ("001",), (), ("lidar",)), [ROBOT])
 
 
 def test_a_local_router_is_reached_on_localhost() -> None:
     assert endpoints([profile("site", "x", (), ("127.0.0.1",))]) == ["tls/localhost:7447"]
-
-
-@pytest.mark.parametrize("role", ROLES)
-def test_the_first_line_names_the_member(role: str) -> None:
-    others = (Profile(name, "x") for name in ("device", "viewer", "fleet", "ros"))
-    who = next(each for each in (ROBOT, SITE, ANNA, *others) if each.role == role)
-    assert bus_toml(who, []).startswith(f"# Bus settings of {role} {who.name}")

@@ -1,12 +1,23 @@
-"""Changes of the member list, and the output of ``t2 keys list``."""
+"""Profiles, validity, changes of the member list, and the output of ``t2 keys list``."""
 
-import msgspec
+from typing import Any
+
 import pytest
 
 from cli.keys import member_list
-from cli.keys.profile import DAY_S
-from common.errors import RobotError
-from common.members import Member, Members
+from cli.keys.member_list import (
+    CA_DAYS,
+    DAY_S,
+    DAYS,
+    EARLY_S,
+    LOCAL,
+    VEHICLE,
+    common_name,
+    profile,
+    span,
+)
+from common.errors import ConfigError, RobotError
+from common.members import ROLES, Member, Members, Profile, Role
 from tests.cli.keys.site_fixture import NOW_S, member, members
 
 OLD = member("driver", "anna", "00000001", 10)
@@ -16,6 +27,110 @@ OTHER = member("driver", "ann", "00000001")
 SAME_NAME = member("viewer", "anna")
 LONG_S = NOW_S + 3000 * DAY_S
 SITE = members(OLD, NEW, GONE, OTHER, SAME_NAME)
+
+
+# --- profiles -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        (("robot", "001"), {"robots": ("001",), "addresses": VEHICLE + LOCAL}),
+        (("robot", "001", (), ("robot.example", "fd00::1", "robot.example")),
+         {"robots": ("001",), "addresses": ("robot.example", "fd00::1", *LOCAL)}),
+        (("site", "berlin", (), ("10.0.0.1", "localhost")),
+         {"addresses": ("10.0.0.1", "localhost", "127.0.0.1")}),
+        (("driver", "anna", ("001", "002", "001")), {"robots": ("001", "002")}),
+        (("driver", "anna", ("*",)), {"robots": ("*",)}),
+        (("driver", "planner", ("001",), (), ("nav", "nav-2", "nav")),
+         {"robots": ("001",), "sources": ("nav", "nav-2")}),
+        (("driver", "anna", ("001",), (), ("n" * 32,)),
+         {"robots": ("001",), "sources": ("n" * 32,)}),
+    ],
+)  # fmt: skip
+def test_valid_profiles(given: tuple[Any, ...], found: dict[str, tuple[str, ...]]) -> None:
+    assert profile(*given) == Profile(role=given[0], name=given[1], **found)
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_routers_listen(role: Role) -> None:
+    assert Profile(role=role, name="x").listens is (role in ("robot", "site"))
+
+
+@pytest.mark.parametrize("source", ["", "*", "Nav", "nav/x", "1nav", "n" * 33, "nav\n", "**"])
+def test_invalid_sources(source: str) -> None:
+    with pytest.raises(ConfigError, match="is not a source name"):
+        profile("driver", "anna", ("001",), (), (source,))
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("driver", "anna"), "a driver needs --robot ID"),
+        (("viewer", "guest", ("001",)), "are for drivers, devices and ros, not for a viewer"),
+        (("robot", "001", ("002",)), "are for drivers, devices and ros, not for a robot"),
+        (("ros", "laptop"), "a ros needs --robot ID"),
+        (("fleet", "control", (), ("10.0.0.1",)), "a fleet only connects"),
+        (("site", "berlin"), "a site's router needs --address"),
+        (("driver", "../anna", ("001",)), "'../anna' is not a name"),
+        (("driver", "", ("001",)), "'' is not a name"),
+        (("driver", "a" * 49, ("001",)), "is not a name"),
+        (("driver", "anna", ("0 1",)), "'0 1' is not a name"),
+        (("driver", "anna\n", ("001",)), "'anna\\n' is not a name"),
+        (("viewer", "hall", (), (), ("nav",)), "--source is for drivers and devices; a viewer"),
+        (("ros", "laptop", ("001",), (), ("ros2",)), "--source is for drivers and devices; a ros"),
+    ],
+)
+def test_invalid_profiles(given: tuple[Any, ...], message: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        profile(*given)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "address", ["robot", "robot-1", "r1.lan", "xn--bcher-kva.example", "10.7.5.220", "fd00::1"]
+)
+def test_addresses(address: str) -> None:
+    assert profile("site", "x", (), (address,)).addresses[0] == address
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "300.1.1.1", "10.7.5", "a b", "-a.example", "a..b", "a.", "tls/a", "a:7447", "*.a.example",
+     "a" * 64, "a\n", ".".join(["a" * 63] * 4)],
+)  # fmt: skip
+def test_invalid_addresses(address: str) -> None:
+    with pytest.raises(ConfigError, match="is neither an IP address nor a host name"):
+        profile("site", "x", (), (address,))
+
+
+def test_the_common_name_ends_with_the_start_of_the_serial() -> None:
+    who = Profile(role="driver", name="anna")
+    assert common_name(who, 0x3F2A91BC << 128) == "driver.anna.3f2a91bc"
+    assert common_name(who, 1 << 128) == "driver.anna.00000001"
+    longest = max(len(common_name(Profile(role=role, name="a" * 48), 1)) for role in ROLES)
+    assert longest <= 64  # RFC 5280, ub-common-name
+
+
+def test_validity_of_a_certificate() -> None:
+    now_s = 1e9
+    assert span(now_s, DAYS, now_s + CA_DAYS * DAY_S) == (now_s - EARLY_S, now_s + 365 * DAY_S)
+
+
+@pytest.mark.parametrize("days", [0, -1, 11])
+def test_a_certificate_never_exceeds_the_authority(days: int) -> None:
+    assert span(0.0, 10, 10.5 * DAY_S)[1] == 10 * DAY_S
+    with pytest.raises(ConfigError, match=rf"--days {days}: allowed is 1..10, the remaining"):
+        span(0.0, days, 10.5 * DAY_S)
+
+
+@pytest.mark.parametrize("left_s", [DAY_S - 1, 0, -1])
+def test_an_expired_authority_signs_nothing(left_s: int) -> None:
+    with pytest.raises(RobotError, match="the CA has expired"):
+        span(1e9, 1, 1e9 + left_s)
+
+
+# --- the list -----------------------------------------------------------------------------------
 
 
 def test_newest_skips_revoked_certificates() -> None:
@@ -38,25 +153,8 @@ def test_a_name_is_free_without_a_valid_certificate() -> None:
 def test_routers_have_the_addresses_of_their_latest_certificate() -> None:
     old, new = (member("robot", "002", serial, addresses=(where,))
                 for serial, where in (("1", "10.0.0.1"), ("2", "10.0.0.2")))  # fmt: skip
-    gone, of_before = member("robot", "003", revoked=True), member("robot", "001")
-    site = member("site", "berlin", addresses=("site.example",))
-    found = member_list.routers(members(site, old, new, gone, of_before, OLD))
-    assert [(each.label, each.addresses) for each in found] == [
-        ("robot.001", ()), ("robot.002", ("10.0.0.2",)), ("site.berlin", ("site.example",)),
-    ]  # fmt: skip
-
-
-def test_a_router_without_addresses_is_an_error() -> None:
-    assert member_list.addresses_of(member("robot", "002", addresses=("10.0.0.1",))) == (
-        "10.0.0.1",
-    )
-    assert member_list.addresses_of(NEW) == ()
-    with pytest.raises(RobotError, match=r"no address of robot 002.*`t2 keys renew robot 002 "):
-        member_list.addresses_of(member("robot", "002"))
-
-
-def test_added() -> None:
-    assert member_list.added(members(OLD), NEW) == members(OLD, NEW)
+    gone, site = member("robot", "003", revoked=True), member("site", "berlin")
+    assert member_list.routers(members(site, old, new, gone, OLD)) == [new, site]
 
 
 def test_revoke_all_certificates_of_a_member() -> None:
@@ -109,9 +207,7 @@ def test_states(who: Member, expected: str) -> None:
 
 
 def test_the_table() -> None:
-    every = msgspec.structs.replace(
-        member("driver", "ben", "00000002"), robots=("*",), sources=("nav", "web")
-    )
+    every = member("driver", "ben", "00000002", robots=("*",), sources=("nav", "web"))
     site = members(member("driver", "anna"), every, member("viewer", "guest", days=-1))
     assert member_list.as_table(site, NOW_S).splitlines() == [
         "role    name   robots  sources       until  state    certificate",
@@ -119,25 +215,6 @@ def test_the_table() -> None:
         "driver  ben    every   nav web  2027-09-17  valid    driver.ben.00000002",
         "viewer  guest  -       -        2026-11-20  expired  viewer.guest.00000001",
     ]
-
-
-def test_for_programs() -> None:
-    assert member_list.as_json(members(member("driver", "anna", days=12.5)), LONG_S, NOW_S) == {
-        "site": "berlin",
-        "authority": {"days": 3000},
-        "certificates": [
-            {
-                "common_name": "driver.anna.00000001",
-                "role": "driver",
-                "name": "anna",
-                "robots": ["001"],
-                "sources": [],
-                "expires": "2026-12-04T00:00:00Z",
-                "days": 12,
-                "state": "expires soon",
-            }
-        ],
-    }
 
 
 def test_advice_names_the_renewal_command() -> None:

@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 
 from cli.keys.ca import CertificateAuthority
-from cli.keys.profile import DAY_S, Profile, Span, profile
+from cli.keys.member_list import DAY_S, profile
 from cli.keys.store import Folder, locked
 from common.errors import RobotError
-from common.members import Members
+from common.members import Members, Profile
 from tests.cli.keys.site_fixture import member, members
 from verification.harness.waiting import wait_until
 
-SPAN = Span(1.8e9, 1.8e9 + 10 * DAY_S)
-ROBOT = profile("robot", "001", (), ())
-DRIVER = profile("driver", "anna", ("001",), ())
+SPAN = 1.8e9, 1.8e9 + 10 * DAY_S
+ROBOT = profile("robot", "001")
+DRIVER = profile("driver", "anna", ("001",))
 
 
 def no_passphrase() -> bytes:
@@ -37,7 +37,7 @@ def folder(tmp_path: Path) -> Folder:
 def create_machine(folder: Folder, who: Profile, *, settings: bool = True) -> Path:
     issued = folder.authority(None, no_passphrase).issue(who, SPAN)
     listed = Members(site="berlin", members=(*folder.read().members, issued.member))
-    target = folder.write_machine(who, issued, listed, settings=settings)
+    target = folder.write_machine(issued, listed, settings=settings)
     folder.write(listed)
     return target
 
