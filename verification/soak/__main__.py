@@ -86,7 +86,7 @@ def main() -> int:
     record = Record()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        with StallRecorder() as stalls, stack_fixture(options.out, shipped=False) as fixture:
+        with StallRecorder() as stalls, stack_fixture(options.out) as fixture:
             soak(fixture, stalls, record, options.seed, options.minutes * 60)
     except KeyboardInterrupt:
         print("interrupted", flush=True)
