@@ -36,9 +36,3 @@ PORTS = ports()
 def udp_ports(count: int) -> list[int]:
     """Return this many free UDP ports."""
     return [free_port(socket.SOCK_DGRAM) for _ in range(count)]
-
-
-def accepts_connections(port: int) -> bool:
-    """Return whether a process listens on a TCP port of 127.0.0.1."""
-    with socket.socket() as sock:
-        return sock.connect_ex(("127.0.0.1", port)) == 0

@@ -1,1 +1,1 @@
-"""The gateway to ROS 2 with independent peers, older versions of Zenoh, and its cost."""
+"""The gateway to ROS 2 with independent peers and older versions of Zenoh."""

@@ -74,12 +74,9 @@ class Endpoint:
         self._sequence += 1
         return struct.pack("<qqB16s", self._sequence, time.time_ns(), 16, self._gid)
 
-    def send(self, twist: Twist, *, blocks: bool = False) -> None:
-        """Publish a command; with ``blocks`` it waits for space, as reliable publishers of ROS."""
-        control = zenoh.CongestionControl.BLOCK if blocks else zenoh.CongestionControl.DROP
-        self._session.put(
-            self.key, twist.encode(), attachment=self.attachment(), congestion_control=control
-        )
+    def send(self, twist: Twist) -> None:
+        """Publish a command."""
+        self._session.put(self.key, twist.encode(), attachment=self.attachment())
 
     def close(self) -> None:
         """Undeclare the token, as when the publisher is destroyed."""
@@ -101,11 +98,6 @@ class PlainPeer:
     def close(self) -> None:
         """Close the session."""
         self.session.close()
-
-    def sees_gateway(self) -> bool:
-        """Return whether liveliness tokens of the gateway exist."""
-        replies = self.session.liveliness().get("@ros2_lv/0/**", timeout=PATIENCE_S)
-        return any("/%/%/t2" in str(reply.ok.key_expr) for reply in replies if reply.ok)
 
     def description(self) -> str:
         """Return the latched /robot_description."""
@@ -140,10 +132,10 @@ class PlainPeer:
 
 
 class Driver:
-    """Publishes the current command at 20 Hz in a thread; None publishes nothing."""
+    """Publishes the current command at 20 Hz in a thread."""
 
     def __init__(self, peer: PlainPeer) -> None:
-        self.twist: Twist | None = Twist()
+        self.twist = Twist()
         self._publisher = Endpoint(peer.session, *COMMANDS)
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -157,8 +149,7 @@ class Driver:
 
     def _run(self) -> None:
         while not self._ends.wait(PERIOD_S):
-            if (twist := self.twist) is not None:
-                self._publisher.send(twist)
+            self._publisher.send(self.twist)
 
 
 def text(payload: bytes, at: int) -> str:

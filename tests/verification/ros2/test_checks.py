@@ -1,6 +1,7 @@
-"""The plain peer's bytes, the rows of the table, and one real check."""
+"""The plain peer's bytes, and one real check."""
 
-import contextlib
+import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -8,11 +9,7 @@ import pytest
 from services.ros2 import cdr, names
 from verification.ros2 import __main__ as program
 from verification.ros2 import plain_peer
-from verification.ros2.peers import held_reset
 from verification.ros2.plain_peer import Twist, text
-from verification.ros2.robot import Robot
-
-NO_NODE = Path("not-built")
 
 
 def test_the_plain_peer_agrees_with_the_gateway() -> None:
@@ -25,17 +22,9 @@ def test_the_plain_peer_agrees_with_the_gateway() -> None:
     assert text(cdr.encode("std_msgs/msg/String", ("<robot/>",)), 4) == "<robot/>"
 
 
-def test_a_failed_check_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(_: Robot) -> str:
-        raise AssertionError("moved 0.50 m")
-
-    monkeypatch.setattr(program, "robot_with_gateway", lambda *_: contextlib.nullcontext())
-    row = program.run("fails", fails, NO_NODE)
-    assert row == ("fails", "AssertionError: moved 0.50 m", "FAILED")
-
-
 @pytest.mark.timed
 @pytest.mark.campaign
-def test_one_check() -> None:
-    _, observed, mark = program.run("held_reset", held_reset, NO_NODE)
+def test_the_check_of_an_older_zenoh_with_ours() -> None:
+    python = Path(sys.executable)
+    _, observed, mark = program.run("ours", partial(program.exercised, python=python), python)
     assert mark == "ok", observed
