@@ -33,15 +33,6 @@ def test_a_receiver_notes_the_numbers_that_it_saw() -> None:
     assert heartbeat.is_late(71, NS_PER_S, NS_PER_S)
 
 
-def test_only_the_newest_are_kept() -> None:
-    heartbeat = START
-    for _ in range(CAPACITY + 1):
-        heartbeat = heartbeat.beat(NS_PER_S)
-    assert len(heartbeat.sent) == CAPACITY
-    assert heartbeat.is_late(1001, NS_PER_S, NS_PER_S)
-    assert not heartbeat.is_late(1002, NS_PER_S, NS_PER_S)
-
-
 def test_heartbeats_rise_and_are_forgotten_in_the_end() -> None:
     beat = Heartbeat(1000)
     assert beat.is_late(1000, 0, 10)
