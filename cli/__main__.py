@@ -19,50 +19,53 @@ from common.text import printable
 
 GROUPS = {
     "Run": {
-        "up": ("run.up", "the whole stack with a simulated vehicle, until Ctrl-C"),
-        "demo": ("demo.command", "a simulated T2 drives a lap through the real services"),
-        "drive": ("run.services:drive", "drive from this terminal, by keys or gamepad"),
-        "dashboard": ("run.services:dashboard", "show, drive and stop the robot in a browser"),
-        "estop": ("inspect.estop", "emergency stop: a robot, a site or all, until a reset"),
-        "router": ("run.router", "the embedded Zenoh router alone"),
-        "sim": ("run.services:sim", "the simulated vehicle alone"),
-        "ros2": ("run.services:ros2", "the gateway to ROS 2: topics, services and cmd_vel"),
+        "up": ("cli.run.up", "the whole stack with a simulated vehicle, until Ctrl-C"),
+        "demo": ("cli.demo.command", "a simulated T2 drives a lap through the real services"),
+        "drive": ("services.teleop.__main__", "drive from this terminal, by keys or gamepad"),
+        "dashboard": ("services.dashboard.__main__", "show, drive and stop the robot in a browser"),
+        "estop": ("cli.inspect.estop", "emergency stop: a robot, a site or all, until a reset"),
+        "router": ("cli.run.router", "the embedded Zenoh router alone"),
+        "sim": ("sim.__main__", "the simulated vehicle alone"),
+        "ros2": ("services.ros2.__main__", "the gateway to ROS 2: topics, services and cmd_vel"),
     },
     "Inspect": {
-        "doctor": ("inspect.doctor", "diagnose the path from this laptop to the wheels"),
-        "robots": ("inspect.robots", "the robots on the bus: verdict, speed, driver"),
-        "health": ("inspect.health", "service health"),
-        "ls": ("inspect.ls", "the active keys: type, rate, publishers, readers"),
-        "echo": ("inspect.echo", "print messages received on a key"),
-        "hz": ("inspect.hz", "rate, gaps, losses, bandwidth and delay of keys"),
-        "call": ("inspect.call", "call a service, such as safety/reset"),
+        "doctor": ("cli.inspect.doctor", "diagnose the path from this laptop to the wheels"),
+        "robots": ("cli.inspect.robots", "the robots on the bus: verdict, speed, driver"),
+        "health": ("cli.inspect.health", "service health"),
+        "ls": ("cli.inspect.ls", "the active keys: type, rate, publishers, readers"),
+        "echo": ("cli.inspect.echo", "print messages received on a key"),
+        "hz": ("cli.inspect.hz", "rate, gaps, losses, bandwidth and delay of keys"),
+        "call": ("cli.inspect.call", "call a service, such as safety/reset"),
     },
     "Record": {
-        "record": ("run.services:record", "record everything on the bus to files, until Ctrl-C"),
-        "info": ("recordings.info", "show the content of a recording"),
+        "record": ("cli.recordings.record", "record everything on the bus to files, until Ctrl-C"),
+        "info": ("cli.recordings.info", "show the content of a recording"),
         "replay": (
-            "recordings.replay",
+            "cli.recordings.replay",
             "play a recording onto the bus, or its raw frames to a bridge",
         ),
         "report": (
-            "recordings.report",
+            "cli.recordings.report",
             "HTML report of a recording: path, speeds, stops, streams",
         ),
-        "foxglove": ("recordings.foxglove", "stream the bus live to Foxglove or Lichtblick"),
+        "foxglove": ("cli.recordings.foxglove", "stream the bus live to Foxglove or Lichtblick"),
         "metrics": (
-            "run.services:metrics",
+            "services.metrics.__main__",
             "export health, link, safety and odometry to Prometheus",
         ),
     },
     "Commission": {
-        "checkout": ("commission.command", "check the real vehicle before its first drive"),
-        "wire": ("wire.command", "decode captured frames"),
+        "checkout": ("cli.commission.command", "check the real vehicle before its first drive"),
+        "wire": ("cli.wire.command", "decode captured frames"),
     },
     "Administer": {
-        "config": ("settings", "show the effective configuration and the source of each value"),
-        "install": ("run.install", "install the services as systemd units on this computer"),
-        "keys": ("keys.command", "create, renew, revoke and list certificates"),
-        "completion": ("inspect.completion", "print the shell completion for bash, zsh or fish"),
+        "config": ("cli.settings", "show the effective configuration and the source of each value"),
+        "install": ("cli.run.install", "install the services as systemd units on this computer"),
+        "keys": ("cli.keys.command", "create, renew, revoke and list certificates"),
+        "completion": (
+            "cli.inspect.completion",
+            "print the shell completion for bash, zsh or fish",
+        ),
     },
 }
 COMMANDS = {name: text for group in GROUPS.values() for name, (_, text) in group.items()}
@@ -164,10 +167,8 @@ def overview() -> str:
 
 
 def module(name: str) -> Any:
-    """Import the module of a command, or return the ``ServiceCommand`` that stands for it."""
-    path, _, function = PLACES[name].partition(":")
-    found = import_module(f"cli.{path}")
-    return getattr(found, function)() if function else found
+    """Import the module of a command."""
+    return import_module(PLACES[name])
 
 
 if __name__ == "__main__":

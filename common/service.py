@@ -22,7 +22,7 @@ from common.bus.bus import Bus
 from common.bus.drive import DriveLink, LinkWatch
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION, arguments, needs_extra, sources
-from common.config import Loaded, load
+from common.config import Loaded, Sources, load
 from common.errors import ConfigError, LinkError, RobotError
 from common.freshness import NS_PER_S
 from common.loop import Loop
@@ -145,8 +145,19 @@ def run(
     priority: int = 0,
 ) -> int:
     """Run a service; return its exit code. ``priority`` is one of ``realtime``'s."""
+    return run_with(name, root, build, sources(arguments(name).parse_args(argv)), priority)
+
+
+def run_with(
+    name: str,
+    root: type[C],
+    build: Callable[[Node[C]], object],
+    settings: Sources,
+    priority: int = 0,
+) -> int:
+    """Run a service with these sources of settings; return its exit code."""
     try:
-        loaded = load(root, sources(arguments(name).parse_args(argv)))
+        loaded = load(root, settings)
         if priority and loaded.config.robot.realtime:
             realtime.request(priority)  # before threads start: they inherit it
             realtime.limit()
@@ -168,7 +179,7 @@ def run_optional_service(
     name: str,
     root: type[C],
     found: Callable[[], Callable[[Node[C]], object]],
-    argv: Sequence[str] | None = None,
+    settings: Sources,
     *,
     extra: str,
 ) -> int:
@@ -183,7 +194,7 @@ def run_optional_service(
         print(error, file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG
     os.nice(NICENESS)
-    return run(name, root, build, argv)
+    return run_with(name, root, build, settings)
 
 
 def serve(node: Node[C]) -> int:

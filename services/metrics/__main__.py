@@ -1,15 +1,39 @@
-"""Entry point of the Prometheus exporter: ``python -m services.metrics``."""
+"""Entry point of the Prometheus exporter: ``python -m services.metrics`` and ``t2 metrics``."""
 
+import argparse
 import sys
 from collections.abc import Callable, Sequence
 
+from common.cli_args import add_setting, add_sources, run_program, sources
 from common.service import Node, run_optional_service
 from services.metrics.config import MetricsConfig
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command line options; each sets a setting."""
+    add_setting(
+        parser, "--host", "metrics.host", "address to listen on; only this machine by default"
+    )
+    add_setting(parser, "--port", "metrics.port", "port to listen on")
+    add_setting(
+        parser,
+        "--robots",
+        "metrics.robots",
+        "robots to export: an id, a site as 'berlin-$*', or '*' for all",
+    )
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
     """Export until SIGINT or SIGTERM; return the exit code."""
-    return run_optional_service("metrics", MetricsConfig, _exporter, argv, extra="metrics")
+    return run_optional_service(
+        "metrics", MetricsConfig, _exporter, sources(options), extra="metrics"
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run with these arguments; return the exit code."""
+    return run_program("metrics", add_arguments, run, argv)
 
 
 def _exporter() -> Callable[[Node[MetricsConfig]], object]:

@@ -1,15 +1,33 @@
 """Entry point of the recorder: ``python -m services.recorder``."""
 
+import argparse
 import sys
 from collections.abc import Callable, Sequence
 
+from common.cli_args import add_setting, add_sources, run_program, sources
 from common.service import Node, run_optional_service
 from services.recorder.config import RecorderConfig
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command line options; each sets a setting."""
+    add_setting(
+        parser, "--folder", "recorder.folder", "folder for the files; recorder.folder by default"
+    )
+    add_setting(parser, "--robot", "robot.id", "which robot, such as 001")
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
     """Record until SIGINT or SIGTERM; return the exit code."""
-    return run_optional_service("recorder", RecorderConfig, _recorder, argv, extra="record")
+    return run_optional_service(
+        "recorder", RecorderConfig, _recorder, sources(options), extra="record"
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run with these arguments; return the exit code."""
+    return run_program("recorder", add_arguments, run, argv)
 
 
 def _recorder() -> Callable[[Node[RecorderConfig]], object]:

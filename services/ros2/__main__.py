@@ -1,15 +1,31 @@
-"""Entry point of the gateway to ROS 2: ``python -m services.ros2``."""
+"""Entry point of the gateway to ROS 2: ``python -m services.ros2`` and ``t2 ros2``."""
 
+import argparse
 import sys
 from collections.abc import Callable, Sequence
 
+from common.cli_args import add_setting, add_sources, run_program, sources
 from common.service import Node, run_optional_service
 from services.ros2.config import Ros2Config
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command line options; each sets a setting."""
+    add_setting(parser, "--domain", "ros2.domain", "ROS_DOMAIN_ID; ros2.domain by default")
+    add_setting(
+        parser, "--namespace", "ros2.namespace", "namespace of node and topics, such as /t2_001"
+    )
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
     """Run until SIGINT or SIGTERM; return the exit code."""
-    return run_optional_service("ros2", Ros2Config, _gateway, argv, extra="ros2")
+    return run_optional_service("ros2", Ros2Config, _gateway, sources(options), extra="ros2")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run with these arguments; return the exit code."""
+    return run_program("ros2", add_arguments, run, argv)
 
 
 def _gateway() -> Callable[[Node[Ros2Config]], object]:

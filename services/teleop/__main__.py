@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_sources(parser)
 
 
-def drive(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> int:
     """Drive until the operator quits; raise ``RobotError`` if teleop cannot start."""
     loaded = load(TeleopConfig, sources(options))
     if not terminal_is_there():
@@ -115,7 +115,7 @@ def terminal_is_there() -> bool:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Drive from this terminal; return the exit code, as for every service."""
-    return run_program("teleop", add_arguments, drive, argv)
+    return run_program("teleop", add_arguments, run, argv)
 
 
 def _on_signal(call: Callable[[], None], *numbers: signal.Signals) -> None:
