@@ -113,8 +113,8 @@ def test_a_stop_ends_a_hold_at_once_and_sends_zeros_in_any_case(
 @pytest.mark.parametrize("key", ["x", "enter", "6", "0", "t", "["])
 def test_an_unknown_key_moves_nothing(operator: Operator, key: str) -> None:
     assert operator.press(key) is Action.NONE
-    assert not operator.controls.is_gamepad_silent
-    assert not operator.controls.is_gamepad_due(operator.now_ns)
+    assert operator.controls.is_gamepad_silent is False
+    assert operator.controls.is_gamepad_due(operator.now_ns) is False
     assert operator.ticks(3) == [None] * 3
 
 

@@ -144,6 +144,7 @@ class Hold(RuleBasedStateMachine):
             self.now_ns += NS_PER_S // 20
 
     def check(self) -> None:
+        assert self.controls.is_muted(self.now_ns) is (self.now_ns < self.counts_ns)
         request = self.controls.tick(self.stick, self.now_ns)
         by_keys = {key for key, until_ns in self.until_ns.items() if self.now_ns < until_ns}
         self.was_up = self.stick is not None and (self.was_up or not self.stick.deadman)

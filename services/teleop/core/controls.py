@@ -19,6 +19,7 @@ speed of full deflection, in ``base_link``: m/s and rad/s, counter-clockwise. Ba
 that the rear goes left, as in a car.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -99,6 +100,7 @@ class Controls:
         """Process a key press or its repeat; unknown keys are ignored."""
         key = press.key
         if key in (ESTOP, STOP):
+            # 1 equivalent mutant: only a pause needs the time.
             self.stop(now_ns)
             return Action.ESTOP if key == ESTOP else Action.NONE
         if press.age_s(now_ns) > MAX_PRESS_AGE_S:
@@ -123,6 +125,7 @@ class Controls:
 
     def stop(self, now_ns: int) -> None:
         """Release everything and send zeros, even if nothing was sent before."""
+        # 1 equivalent mutant: only a pause needs the time.
         self.enforce("stop", now_ns)
         self._requests.stop()
 
@@ -145,6 +148,7 @@ class Controls:
     def tick(self, stick: Stick | None, now_ns: int) -> Drive | None:
         """Return the request to send now, or None; ``stick`` is None without a gamepad."""
         if stick is None:
+            # 1 equivalent mutant: only a pause needs the time.
             self.enforce("gamepad_gone", now_ns)
         else:
             self._deadman.update(stick.deadman, stick.events, now_ns)
@@ -163,6 +167,7 @@ class Controls:
         moves = push != Deflection()
         self.is_gamepad_silent = moves and self._deadman.is_silent(now_ns)
         if self.is_gamepad_silent:
+            # 1 equivalent mutant: only a pause needs the time.
             self.enforce("gamepad_silent", now_ns)
             return None
         self._by_gamepad = moves
@@ -194,8 +199,7 @@ def twist(push: Deflection, gear: int, settings: Teleop) -> Twist:
 
 
 def _shape(raw: float, deadzone: float, expo: float) -> float:
-    if not codec.finite(raw) or abs(raw) <= deadzone:
+    if not codec.finite(raw):
         return 0.0
-    linear = min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone))
-    curved = expo * linear**3 + (1.0 - expo) * linear
-    return curved if raw > 0 else -curved
+    linear = max(0.0, min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone)))
+    return math.copysign(expo * linear**3 + (1.0 - expo) * linear, raw)
