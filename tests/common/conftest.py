@@ -1,13 +1,11 @@
 """One router for all these tests; each test has a robot of its own on it."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from common import log
 from tests.common.bus_fixture import BusFixture
-from tests.common.settings_fixture import SettingsFixture
 from verification.harness.bus import Lines, router_process
 from verification.harness.ports import free_port
 
@@ -33,10 +31,3 @@ def lines() -> Lines:
     said: Lines = []
     log.redirect(lambda *line: said.append(line), "debug")
     return said
-
-
-@pytest.fixture
-def settings_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SettingsFixture:
-    """Give a directory to write settings in, and work in it."""
-    monkeypatch.chdir(tmp_path)
-    return SettingsFixture(tmp_path)

@@ -1,15 +1,47 @@
 """Sources of settings, their precedence, and the error texts."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from cli.settings import Everything
-from common.config import DEFAULT, DEFAULT_FILE, Sources, flatten, load
+from common.config import DEFAULT, DEFAULT_FILE, Loaded, Sources, flatten, load
 from common.errors import ConfigError
 from common.settings import Shared
-from tests.common.settings_fixture import SettingsFixture
+
+
+class SettingsFixture:
+    """A directory to write settings in, which is the working directory too."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def file(self, text: str, name: str = "over.toml") -> Path:
+        path = self.folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def load(
+        self, *texts: str, environ: dict[str, str] | None = None, sets: Sequence[str] = ()
+    ) -> Loaded[Everything]:
+        files = [self.file(text, f"over{number}.toml") for number, text in enumerate(texts)]
+        return load(Everything, Sources((DEFAULT_FILE, *files), environ or {}, sets))
+
+    def refused(
+        self, *texts: str, environ: dict[str, str] | None = None, sets: Sequence[str] = ()
+    ) -> str:
+        with pytest.raises(ConfigError) as caught:
+            self.load(*texts, environ=environ, sets=sets)
+        return str(caught.value)
+
+
+@pytest.fixture
+def settings_dir(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SettingsFixture:
+    monkeypatch.chdir(tmp_path)
+    return SettingsFixture(tmp_path)
+
 
 # --- the file that we ship ----------------------------------------------------------------------
 

@@ -23,12 +23,6 @@ def test_this_process_is_ordinary() -> None:
 
 
 @needs_right
-def test_threads_follow() -> None:
-    thread = "t = threading.Thread(target=lambda: print(r.priority())); t.start(); t.join()"
-    assert output_of(f"r.request(51); print(r.priority()); {thread}") == ["51", "51"]
-
-
-@needs_right
 def test_what_is_started_alone_begins_as_ordinary() -> None:
     child = "import subprocess, sys; subprocess.run([sys.executable, '-c', sys.argv[1]])"
     look = "from common import realtime as r; print(r.priority())"

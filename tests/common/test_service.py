@@ -17,7 +17,7 @@ from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.config import Sources, load
 from common.messages import MAX_TEXT, Event, Health
-from common.service import Node, resident_bytes, run
+from common.service import Node, run
 from common.settings import Shared
 from tests.common.bus_fixture import BusFixture
 from tests.common.program import SPECIMEN, Program, on, program
@@ -42,13 +42,6 @@ def test_a_wrong_setting_ends_it_before_anything_is_built(
     assert run("odom", Shared, built.append, words) == EXIT_CONFIG == 78
     assert built == []
     assert capsys.readouterr().err == f"odom: {text}\n"
-
-
-def test_unknown_options_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        run("odom", Shared, lambda _: None, ["--speed", "9"])
-    assert caught.value.code == 2
-    assert "unrecognized arguments: --speed 9" in capsys.readouterr().err
 
 
 def test_what_cannot_be_opened_ends_it(shared_router: str) -> None:
@@ -224,19 +217,6 @@ def test_on_a_terminal_it_writes_text_and_it_ends_though_it_finds_no_rest() -> N
         assert it.code() == 0
         it.wait_for("stopped")
         assert not any(line.startswith("{") for line in it.lines)
-
-
-# --- small parts --------------------------------------------------------------------------------
-
-
-def test_memory_is_unknown_where_the_system_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert resident_bytes() > 1_000_000
-
-    def absent(*_: object, **__: object) -> str:
-        raise FileNotFoundError
-
-    monkeypatch.setattr("common.service.Path.read_text", absent)
-    assert resident_bytes() == 0
 
 
 def test_its_version_is_that_of_the_package() -> None:

@@ -59,13 +59,6 @@ def test_no_beat_where_nobody_waits_for_ours(manager: Manager, watchdog: dict[st
     assert manager.read() == ["READY=1"]
 
 
-def test_without_systemd_nothing_is_said() -> None:
-    systemd = Systemd({})
-    assert not systemd.enabled
-    systemd.ready(0)
-    systemd.stopping()
-
-
 @pytest.mark.timeout(20)  # a send that waits for space would block indefinitely
 def test_a_full_socket_delays_nobody_and_ready_is_sent_until_it_is_taken(manager: Manager) -> None:
     systemd = Systemd(manager.environ)
