@@ -294,12 +294,6 @@ def travel(*positions: float, heading: float = 0.0) -> Trajectory:
     return trajectory
 
 
-def test_the_first_reading_is_no_travel() -> None:
-    assert travel(50.0) == Trajectory(at=at(50.0, 0.0))
-    assert Trajectory().direction is None
-    assert Trajectory().net == 0
-
-
 @pytest.mark.parametrize(
     ("positions", "runs"),
     [
@@ -350,19 +344,6 @@ def test_a_turn_on_the_spot_forgets_earlier_travel(turned: float, stays: bool) -
     after = begun.follow(Latest(at(0.5, turned), 9))
     assert (after == begun) == stays
     assert (after == Trajectory(at=at(0.5, turned))) != stays
-
-
-def test_the_heading_wraps() -> None:
-    begun = travel(0.0, 0.5, heading=3.1)
-    assert begun.follow(Latest(at(0.5, -3.1), 9)) == begun
-    begun = travel(0.0, 0.5, heading=1.0)
-    assert begun.follow(Latest(at(0.5, 1.1), 9)) == begun
-
-
-def test_a_turn_while_it_travels_is_a_curve() -> None:
-    trajectory = travel(0.0, 0.5).follow(Latest(at(0.51, 2.0), 9))
-    assert trajectory.net == pytest.approx(0.51)
-    assert trajectory.at == at(0.51, 2.0)
 
 
 def test_the_end_is_when_the_counters_moved_last() -> None:

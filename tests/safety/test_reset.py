@@ -331,12 +331,3 @@ def test_what_stays_latched_is_named() -> None:
         "The reset names no cause. Latched: The bumper was hit. One. Two. "
         "Send the `id` of each as `causes`."
     )
-
-
-def test_a_bumper_that_is_pressed_without_a_latch_is_no_remaining_contact() -> None:
-    fixture = hit()
-    latches = {name: one for name, one in fixture.state.latches.items() if name != "contact"}
-    fixture.state = replace(fixture.state, latches=latches)
-    estop, _ = also(fixture, "estop", "One."), also(fixture, "runaway", "Two.")
-    _, reply = called(fixture, Reset(fixture.echo, (estop,)))
-    assert (reply.done, reply.text) == (True, "Reset, but still latched: Two.")

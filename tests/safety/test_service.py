@@ -26,7 +26,7 @@ from common.messages import (
 from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
-from services.safety.service import SafetyService, source_of
+from services.safety.service import SafetyService
 from tests.factories import safety_state
 from verification.harness.bus import at, bus_on, running
 from verification.harness.waiting import wait_until
@@ -196,10 +196,6 @@ def test_an_estop_for_one_a_site_or_all_latches(endpoint: str, who: str) -> None
             "a latched emergency stop",
         )
         states.undeclare()
-
-
-def test_the_source_is_the_last_part_of_the_key() -> None:
-    assert source_of(keys.DRIVE.on("001", source="nav")) == "nav"
 
 
 def test_the_emergency_stop_has_a_session_of_its_own(

@@ -164,20 +164,6 @@ def running() -> PolicyFixture:
     return fixture
 
 
-def test_it_inhibits_until_it_is_heard_for_the_first_time() -> None:
-    fixture = PolicyFixture(KEPT)
-    fixture.drive(0.0, seconds=2.0)
-    fixture.drive(0.5, seconds=0.5)
-    assert fixture.verdict.name == "inhibited"
-    assert "emergency stop keepalive of pendant" in fixture.state.latches["starting"].text
-    assert not fixture.latched()
-    kept(fixture, 0.5, 1.0)
-    assert fixture.verdict.command == "stop"  # not before a neutral request
-    kept(fixture, 0.0, 0.3)
-    kept(fixture, 0.5, 0.3)
-    assert fixture.verdict.command == "run"
-
-
 def test_its_silence_brakes_and_latches_until_it_is_back_and_reset() -> None:
     fixture = running()
     assert fixture.drive(0.5, seconds=0.8).command == "run"
@@ -208,14 +194,6 @@ def test_messages_that_a_proxy_holds_do_not_keep_it_alive() -> None:
         fixture.drive(0.5, seconds=0.1)
     assert fixture.verdict.command == "brake"
     assert fixture.keepalive(echo=echo).refused == "keepalive_late"
-
-
-def test_a_second_program_under_the_name_latches() -> None:
-    fixture = running()
-    fixture.keepalive_boot = 67
-    assert fixture.keepalive().refused == "keepalive_second_publisher"
-    assert fixture.verdict.command == "brake"
-    assert fixture.state.verdict.name == "brake"
 
 
 @settings(max_examples=30)
