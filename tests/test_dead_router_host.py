@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 
 from common.bus.session import RUNTIME_ENV
-from verification.harness.network_hosts import ip, missing
+from verification.harness.network_hosts import End, connect, ip, missing
+from verification.harness.network_hosts import hosts as made
 
 pytestmark = [pytest.mark.timed, pytest.mark.campaign]
 
@@ -64,19 +65,9 @@ WHY = missing(HERE)
 @pytest.fixture
 def hosts() -> Iterator[None]:
     """Two hosts and a cable."""
-    try:
-        for name in (HERE, THERE):
-            ip("netns", "add", name)
-            ip("-n", name, "link", "set", "lo", "up")
-        ends = ("link", "add", "end", "netns", HERE, "type", "veth", "peer", "name", "end")
-        ip(*ends, "netns", THERE)
-        for name, address in ((HERE, "10.98.0.1/24"), (THERE, "10.98.0.2/24")):
-            ip("-n", name, "address", "add", address, "dev", "end")
-            ip("-n", name, "link", "set", "end", "up")
+    with made(HERE, THERE):
+        connect(End(HERE, "end", ("10.98.0.1",)), End(THERE, "end", ("10.98.0.2",)))
         yield
-    finally:
-        for name in (HERE, THERE):
-            ip("netns", "del", name, check=False)
 
 
 @contextlib.contextmanager

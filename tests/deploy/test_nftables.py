@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from verification.harness.network_hosts import ip, missing
-from verification.system.frame import in_network
+from verification.harness.network_hosts import End, connect, hosts, in_network, ip, missing
 
 RULES = Path(__file__).parents[2] / "deploy" / "nftables" / "t2.nft"
 NAME = f"t2nft{os.getpid()}"
@@ -43,27 +42,14 @@ def network() -> Iterator[None]:
     """Connect the PC to the cable with board and stranger, to the Wi-Fi and to two more."""
     if reason := missing(NAME) or ("" if shutil.which("nft") else "nft is not installed"):
         pytest.skip(reason)
-    try:
-        for host in (PC, *ADDRESSES):
-            ip("netns", "add", host)
-            ip("-n", host, "link", "set", "lo", "up")
+    with hosts(PC, *ADDRESSES):
         # The rules must detect spoofing, not the kernel.
         within(PC, "sysctl", "-qw", "net.ipv4.ip_forward=1", "net.ipv4.conf.all.rp_filter=0",
                "net.ipv4.conf.default.rp_filter=0")  # fmt: skip
         for number, (host, (ours, *theirs)) in enumerate(ADDRESSES.items()):
-            device = f"net{number}"
-            ip("link", "add", device, "netns", PC, "type", "veth", "peer", "name", "eth0",
-               "netns", host)  # fmt: skip
-            ip("-n", PC, "address", "add", f"{ours}/24", "dev", device)
-            for address in theirs:
-                ip("-n", host, "address", "add", f"{address}/24", "dev", "eth0")
-            ip("-n", PC, "link", "set", device, "up")
-            ip("-n", host, "link", "set", "eth0", "up")
+            connect(End(PC, f"net{number}", (ours,)), End(host, "eth0", tuple(theirs)))
             ip("-n", host, "route", "add", "default", "via", ours)
         yield
-    finally:
-        for host in (PC, *ADDRESSES):
-            ip("netns", "del", host, check=False)
 
 
 @contextmanager

@@ -16,7 +16,8 @@ from common.freshness import NS_PER_S
 from services import relay
 from services.relay.wire import BRAKE
 from tests.relay.frames import RUN, STOP
-from verification.harness.network_hosts import ip, missing
+from verification.harness.network_hosts import End, connect, ip, missing
+from verification.harness.network_hosts import hosts as made
 from verification.harness.waiting import wait_until
 
 PC, RELAY, BOARD = (f"t2relay{os.getpid()}{end}" for end in ("p", "r", "b"))
@@ -91,20 +92,9 @@ class Hosts:
 
 @pytest.fixture
 def hosts(tmp_path: Path) -> Iterator[Hosts]:
-    with contextlib.ExitStack() as stack:
-        for name in (PC, RELAY, BOARD):
-            ip("netns", "add", name)
-            stack.callback(ip, "netns", "del", name, check=False)
-            ip("-n", name, "link", "set", "lo", "up")
-        for name, end, here, there in (
-            (PC, "pc", "10.7.6.2/24", "10.7.6.1/24"),
-            (BOARD, "board", "10.7.5.224/24", "10.7.5.220/24"),
-        ):
-            cable = ("link", "add", "cable", "netns", name, "type", "veth", "peer", "name", end)
-            ip(*cable, "netns", RELAY)
-            for host, device, address in ((name, "cable", here), (RELAY, end, there)):
-                ip("-n", host, "address", "add", address, "dev", device)
-                ip("-n", host, "link", "set", device, "up")
+    with made(PC, RELAY, BOARD), contextlib.ExitStack() as stack:
+        connect(End(PC, "cable", ("10.7.6.2",)), End(RELAY, "pc", ("10.7.6.1",)))
+        connect(End(BOARD, "cable", ("10.7.5.224",)), End(RELAY, "board", ("10.7.5.220",)))
         yield Hosts(tmp_path, stack)
 
 

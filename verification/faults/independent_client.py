@@ -1,9 +1,15 @@
-"""Plain Zenoh clients, written from ``docs/bus.md`` alone: they import nothing of the project."""
+"""Plain Zenoh clients, written from ``docs/bus.md`` alone: they import nothing of the project.
+
+``python -m verification.faults.independent_client ENDPOINT KEY`` is a source of robot 001 until its
+standard input ends. A source of drive requests reads speeds in m/s from there, one a line; others
+repeat an empty message.
+"""
 
 import contextlib
 import itertools
 import json
 import random
+import sys
 import threading
 import time
 from typing import Any
@@ -12,9 +18,8 @@ import msgpack
 import zenoh
 
 ROOT = "t2/v1/001"
-STATE, LINK, HEALTH = "tel/safety/state", "tel/bridge/link", "tel/safety/health"
-ODOMETRY, BUMPER, MOTION = "tel/odom/odometry", "tel/bridge/bumper", "@cmd/motion"
-VELOCITY = "tel/bridge/velocity"
+STATE, BUMPER, VELOCITY = "tel/safety/state", "tel/bridge/bumper", "tel/bridge/velocity"
+MOTION, DRIVE = "@cmd/motion", "@cmd/drive/teleop"
 PERIOD_S = 0.05
 UP_MS = 60_000  # until the router listens
 Map = dict[str, Any]
@@ -132,3 +137,17 @@ class Source:
             content = self._content
             if content is not None:
                 self.put(**content)
+
+
+def main() -> None:
+    """Run a source."""
+    endpoint, key = sys.argv[1:]
+    with session(endpoint) as bus, contextlib.closing(Source(Client(bus), key)) as source:
+        if "/drive/" not in key:
+            source.repeat()
+        for line in sys.stdin:
+            source.repeat(linear=float(line), angular=0.0)
+
+
+if __name__ == "__main__":
+    main()

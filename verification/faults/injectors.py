@@ -5,6 +5,7 @@ import os
 import select
 import signal
 import subprocess
+import sys
 import time
 import urllib.request
 from collections.abc import Callable
@@ -20,7 +21,7 @@ from sim.requests import Asked, Bumper
 from verification.faults.fault import Injector
 from verification.faults.independent_client import ROOT, VELOCITY, Client, Map, session
 from verification.faults.namespaces import step_clock
-from verification.faults.stack_fixture import PROGRAMS, StackFixture, operators_endpoint
+from verification.faults.stack_fixture import StackFixture, operators_endpoint
 from verification.harness.dashboard import dashboard, flooded
 from verification.harness.network_hosts import ip
 from verification.harness.process_stats import children
@@ -35,6 +36,15 @@ FORGED_S = 0.6
 AHEAD = 1000
 SETTLE_S = 1.0  # until an abuse takes effect
 FULL = b"x" * 4096
+FLOOD = """
+import socket, sys, time
+sock, due_s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), time.monotonic()
+while True:
+    for _ in range(20):
+        sock.sendto(b"GS" + bytes(20), ("127.0.0.1", int(sys.argv[1])))
+    due_s = max(due_s + 0.001, time.monotonic() - 0.1)
+    time.sleep(max(0.0, due_s - time.monotonic()))
+"""
 NOT_ON_THE_PC = ("sim", "relay", "driver")
 
 
@@ -97,9 +107,9 @@ def kill(fixture: StackFixture, name: str, number: signal.Signals = signal.SIGKI
 
 def flood(fixture: StackFixture) -> None:
     """Send 20 000 datagrams a second to the bridge's first port, from a foreign address."""
-    address = f"127.0.0.1:{fixture.running.config.board.listen_ports[0]}"
+    port = str(fixture.running.config.board.listen_ports[0])
     with fixture.running.log.open("ab") as log:
-        process = subprocess.Popen([*PROGRAMS, address, "flood"], stdout=log, stderr=log)
+        process = subprocess.Popen([sys.executable, "-c", FLOOD, port], stdout=log, stderr=log)
     fixture.running.others.append(process)
 
 

@@ -5,7 +5,6 @@ fill a disk without affecting the machine.
 """
 
 import contextlib
-import ctypes
 import os
 import shutil
 import subprocess
@@ -15,9 +14,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from common.freshness import NS_PER_S
-from verification.harness.network_hosts import ip
+from verification.harness.network_hosts import (
+    CLONE_NEWNET,
+    CLONE_NEWNS,
+    End,
+    connect,
+    hosts,
+    ip,
+    keep_mounts,
+    unshare,
+)
 
-CLONE_NEWNS, CLONE_NEWNET = 0x00020000, 0x40000000  # linux/sched.h
 TOOLS = {"ip": "iproute2", "mount": "mount", "cc": "gcc"}  # and their Debian packages
 TUN = Path("/dev/net/tun")
 CLOCK = Path(__file__).with_name("clock.c")
@@ -37,9 +44,8 @@ def enter() -> None:
         raise OSError(f"not installed: apt-get install {' '.join(lacking)}")
     if not os.access(TUN, os.W_OK):
         raise OSError(f"{TUN} cannot be opened; root is required")
-    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNS | CLONE_NEWNET):
-        raise OSError(f"cannot create a network namespace: {os.strerror(ctypes.get_errno())}")
-    subprocess.run(["mount", "--make-rprivate", "/"], check=True)
+    unshare(CLONE_NEWNS | CLONE_NEWNET)
+    keep_mounts()
     ip("link", "set", "lo", "up")
 
 
@@ -81,16 +87,7 @@ def relay_host() -> Iterator[None]:
     PC and board share the campaign's namespace: each has its own address and cable there, and all
     their datagrams cross the relay.
     """
-    ip("netns", "add", RELAY_HOST)
-    try:
-        ip("-n", RELAY_HOST, "link", "set", "lo", "up")
+    with hosts(RELAY_HOST):
         for side, (there, ours) in RELAY_CABLES.items():
-            end = ("peer", "name", side, "netns", RELAY_HOST)
-            ip("link", "add", f"cable-{side}", "type", "veth", *end)
-            ip("address", "add", f"{there}/24", "dev", f"cable-{side}")
-            ip("link", "set", f"cable-{side}", "up")
-            ip("-n", RELAY_HOST, "address", "add", f"{ours}/24", "dev", side)
-            ip("-n", RELAY_HOST, "link", "set", side, "up")
+            connect(End("", f"cable-{side}", (there,)), End(RELAY_HOST, side, (ours,)))
         yield
-    finally:
-        ip("netns", "del", RELAY_HOST)

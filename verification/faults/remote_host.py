@@ -30,11 +30,17 @@ from common.bus.publisher import BOOT_ID
 from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
 from sim.requests import Wire
-from verification.harness.network_hosts import ip
+from verification.harness.network_hosts import (
+    CLONE_NEWNET,
+    CLONE_NEWNS,
+    CLONE_NEWTIME,
+    ip,
+    keep_mounts,
+    unshare,
+)
 
 TUNSETIFF = 0x400454CA  # linux/if_tun.h
 IFF_TUN, IFF_NO_PI = 0x0001, 0x1000
-CLONE_NEWNS, CLONE_NEWTIME, CLONE_NEWNET = 0x00020000, 0x00000080, 0x40000000  # linux/sched.h
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PACKET_MAX = 2048
 IDLE_S = 0.1
@@ -133,12 +139,11 @@ def die_with_parent() -> None:
 def _enter_namespaces() -> None:
     """Enter the namespaces of the remote host; its clock applies to children only."""
     timed = CLONE_NEWTIME if OFFSETS.exists() else 0  # older kernels have one clock for all
-    if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET | CLONE_NEWNS | timed):
-        raise OSError(ctypes.get_errno(), "cannot create the remote host's namespaces")
+    unshare(CLONE_NEWNS | CLONE_NEWNET | timed)
     CONGESTION.write_text("reno\n")
     if timed:
         OFFSETS.write_text(f"monotonic {AHEAD_S} 0\nboottime {AHEAD_S} 0\n")
-    subprocess.run(["mount", "--make-rprivate", "/"], check=True)
+    keep_mounts()
     with tempfile.NamedTemporaryFile() as boot:
         Path(boot.name).write_text(f"{uuid.uuid4()}\n")
         subprocess.run(["mount", "--bind", boot.name, str(BOOT_ID)], check=True)

@@ -15,7 +15,7 @@ import msgspec
 
 from cli.settings import Everything
 from sim.requests import Bumper, Driver, Firmware, Mute, Place, Sonar, Wire
-from verification.faults.independent_client import Client, session
+from verification.faults.independent_client import DRIVE, Client, session
 from verification.faults.namespaces import (
     RELAY_CABLES,
     RELAY_HOST,
@@ -48,7 +48,11 @@ NORMAL = (
     Driver(side="right", bits=0), Sonar(name="front"), Sonar(name="rear"),
 )  # fmt: skip
 MODULE = [sys.executable, "-m"]
-PROGRAMS = [*MODULE, "verification.faults.programs"]
+SOURCE = "verification.faults.independent_client"
+THIRD_PARTIES = {
+    "limiter": "@cmd/limit/lidar",  # no restriction
+    "pendant": "@cmd/estop_keepalive/pendant",
+}
 REMOTE_HOST = "verification.faults.remote_host"
 INDEPENDENT_BOARD = "verification.faults.independent_board"
 (PC, RELAY_TO_PC), (BOARD, RELAY_TO_BOARD) = RELAY_CABLES.values()
@@ -196,15 +200,15 @@ def _settings(need: Requirement) -> list[str]:
 def _beside(need: Requirement, folder: Path, config: Everything) -> dict[str, list[str]]:
     """Return the commands of the driver, and of the processes that a requirement adds."""
     endpoint = operators_endpoint(config)
-    driver = [*PROGRAMS, endpoint, "driver"]
+    driver = [*MODULE, SOURCE, endpoint, DRIVE]
     if need == "remote driver":
-        driver = [*MODULE, REMOTE_HOST, endpoint, PROGRAMS[-1], "driver"]
+        driver = [*MODULE, REMOTE_HOST, endpoint, SOURCE, DRIVE]
     if need == "separate clocks":
         own = [f"{name}={value}" for name, value in clock(folder / CLOCKS[1]).items()]
         driver = ["env", *own, *driver]
     made = {"driver": driver}
     if need == "third parties":
-        made |= {name: [*PROGRAMS, endpoint, name] for name in ("limiter", "pendant")}
+        made |= {name: [*MODULE, SOURCE, endpoint, key] for name, key in THIRD_PARTIES.items()}
     if need == "relay":
         words = ["--board-port", str(config.board.port), "--ports"]
         words += map(str, config.board.listen_ports)

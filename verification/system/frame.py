@@ -1,6 +1,5 @@
 """The frame of the system tests: commands, a computer with systemd, and a vehicle that drives."""
 
-import ctypes
 import json
 import os
 import shutil
@@ -9,14 +8,14 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import t2
 from sim.sockets import Control
 from sim.trace import Truth
+from verification.harness.network_hosts import in_network
 from verification.harness.waiting import becomes_true, wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +23,6 @@ SUITE = os.environ.get("SUITE", "bookworm")  # of Debian, as in deploy/image/bas
 PACKAGES = "systemd-sysv,dbus,udev,kmod,iproute2,python3"
 PATIENCE_S, BUILD_S = 60.0, 3600.0
 SPEED, MOVING = 0.3, 0.1  # m/s
-SETNS = ctypes.CDLL(None, use_errno=True).setns  # os.setns is Python 3.12
 # Like --privileged, without SYS_RESOURCE, which not every host grants: systemd then skips
 # OOMScoreAdjust.
 BOOT_OPTIONS = (
@@ -41,7 +39,6 @@ if [ "$(stat -fc %T /sys/fs/cgroup)" != cgroup2fs ]; then
 fi
 exec /sbin/init
 """
-T = TypeVar("T")
 
 
 def lacking() -> str:
@@ -148,18 +145,6 @@ def issue_keys(folder: Path, *members: str) -> None:
     """Issue the certificates of a site."""
     for words in ("init", *(f"issue {member}" for member in members)):
         run(sys.executable, "-m", "cli", "keys", *words.split(), "--folder", str(folder))
-
-
-def in_network(namespace: str, call: Callable[[], T]) -> T:
-    """Return the result of a call in a network namespace; its sockets stay there."""
-
-    def enter() -> T:
-        with Path(namespace).open("rb") as file:
-            assert SETNS(file.fileno(), 0) == 0, os.strerror(ctypes.get_errno())
-        return call()
-
-    with ThreadPoolExecutor(1) as thread:  # the namespace changes for this thread only
-        return thread.submit(enter).result()
 
 
 class Vehicle:

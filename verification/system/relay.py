@@ -11,9 +11,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 from services.relay.wire import BRAKE, BUMPER, MOTION, frame
-from verification.harness.network_hosts import ip
+from verification.harness.network_hosts import End, connect, hosts, in_network, ip
 from verification.harness.waiting import wait_until
-from verification.system.frame import ROOT, Container, attempt, booted, debian, in_network, run
+from verification.system.frame import ROOT, Container, attempt, booted, debian, run
 
 PC, BOARD = (f"t2image{os.getpid()}{end}" for end in "pb")
 CABLES = (("eth0", BOARD, "10.7.5.224"), ("eth1", PC, "10.7.6.2"))  # the relay's end, host, address
@@ -45,27 +45,13 @@ def started() -> Iterator[Relay]:
     try:
         run("docker", "run", "--name", name, f"--volume={ROOT}:/src:ro", debian(), *recipe)
         run("docker", "commit", name, name)
-        with booted(name, "--read-only") as machine, cables(machine.pid()):
+        with hosts(PC, BOARD), booted(name, "--read-only") as machine:
+            for device, host, address in CABLES:
+                connect(End(host, "cable", (address,)), End(machine.pid(), device))
             yield Relay(machine, *(udp(host, address) for _, host, address in CABLES))
     finally:
         attempt("docker", "rm", name)
         attempt("docker", "image", "rm", name)
-
-
-@contextmanager
-def cables(pid: str) -> Iterator[None]:
-    """Connect PC and board to the computer of a process."""
-    try:
-        for device, host, address in CABLES:
-            ip("netns", "add", host)
-            peer = ("type", "veth", "peer", "name", device, "netns", pid)
-            ip("link", "add", "cable", "netns", host, *peer)
-            ip("-n", host, "address", "add", f"{address}/24", "dev", "cable")
-            ip("-n", host, "link", "set", "cable", "up")
-        yield
-    finally:
-        for _, host, _ in CABLES:
-            ip("netns", "del", host, check=False)
 
 
 def udp(host: str, address: str) -> socket.socket:

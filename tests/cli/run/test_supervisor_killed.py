@@ -15,6 +15,7 @@ import pytest
 from cli.demo import host_stalls
 from common import clock
 from tests.cli.processes import children, sets, t2
+from verification.faults.independent_client import DRIVE
 from verification.harness.ports import free_port
 from verification.harness.trace import TraceFollower, last_move_s, moves
 
@@ -49,7 +50,7 @@ def driven(folder: Path) -> Iterator[tuple[int, TraceFollower]]:
         start([sys.executable, "-m", "sim", "--world", "empty", "--trace", str(trace), *words])
         up = start(t2("up", "--no-sim", *words))
         driver = start(
-            [sys.executable, "-m", "verification.faults.programs", endpoint, "driver"],
+            [sys.executable, "-m", "verification.faults.independent_client", endpoint, DRIVE],
             stdin=subprocess.PIPE,
         )
         frames = TraceFollower(trace)
