@@ -11,10 +11,10 @@ about 1           about 1              correct
 negative          about 1              the motion is inverted
 about 1           negative             the measured velocity is inverted
 0                 -                    the wheels do not turn, or the counter does not count
-ratio of a unit   -                    the firmware's unit differs from the setting
+ratio of units    -                    the firmware's unit differs from the setting
                                        ``wire.command_angular_unit``
--                 inverse of a unit's  the firmware's unit differs from the setting
-                  ratio                ``wire.feedback_angular_unit``
+-                 inverse of the ratio the firmware's unit differs from the setting
+                                       ``wire.feedback_angular_unit``
 ================= ==================== =====================================================
 """
 
@@ -33,18 +33,10 @@ SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; a margin for unknown ve
 WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
 FULL = 0.95  # of the requested speed counts as granted
 NOTHING = 0.15  # of the commanded speed
-RATIO = 0.25  # allowed deviation from 1; that of the nearest other unit is 0.43
-UNIT_MATCH = 0.15  # allowed deviation from a known unit's ratio
+RATIO = 0.25  # allowed deviation from 1; that of the other unit is 0.43 or more
+UNIT_MATCH = 0.15  # allowed deviation from the other unit's ratio
 STOP_S = 2.0  # limit for standstill after the release
-# rad/s per unit of the wire; the first two are values of the setting
-UNITS = {
-    "decidegree": math.radians(0.1),
-    "milliradian": 0.001,
-    "0.01 rad/s": 0.01,
-    "0.01 deg/s": math.radians(0.01),
-    "1 deg/s": math.radians(1),
-}
-SETTINGS = ("decidegree", "milliradian")
+UNITS = {"decidegree": math.radians(0.1), "milliradian": 0.001}  # rad/s per unit of the wire
 TOO_FAST = 3.0  # multiple of the requested speed that ends the motion at once
 
 
@@ -151,15 +143,6 @@ def stood_after_s(run: Run) -> float | None:
     return None if stood_ns is None else (stood_ns - run.released_ns) / NS_PER_S
 
 
-def unit_of(ratio: float, setting: str) -> str | None:
-    """Return the unit that explains a ratio of rates; ``setting`` is the configured unit."""
-    for name, size in UNITS.items():
-        expected = size / UNITS[setting]
-        if name != setting and abs(ratio / expected - 1) <= UNIT_MATCH:
-            return name
-    return None
-
-
 def _problems(run: Run, it: Measured) -> Iterator[str]:
     ratio = it.counted / it.commanded
     if abs(ratio) < NOTHING:
@@ -183,22 +166,17 @@ def _problems(run: Run, it: Measured) -> Iterator[str]:
 def _nothing_counted(run: Run, it: Measured) -> str:
     counter = "heading" if run.turns else "distance"
     if abs(it.velocity / it.commanded) < NOTHING:
-        other = ""
-        if abs(it.across) >= NOTHING * (0.1 if run.turns else 0.2):
-            other = " It drives instead of turning." if run.turns else " It turns instead."
-        return f"No motion: neither the velocity nor the {counter} changes.{other}"
+        return f"No motion: neither the velocity nor the {counter} changes."
     hint = " A heading from a gyroscope counts only on the ground." if run.turns else ""
     return f"The velocity changes, but the {counter} does not.{hint}"
 
 
 def _unit_hint(run: Run, ratio: float, direction: str, setting: str) -> str:
     """Name the firmware's unit if it explains a ratio of turning rates."""
-    unit = unit_of(ratio, setting) if run.turns else None
-    if unit is None:
+    (other,) = UNITS.keys() - {setting}
+    if not run.turns or abs(ratio * UNITS[setting] / UNITS[other] - 1) > UNIT_MATCH:
         return ""
-    if unit in SETTINGS:
-        return f'The firmware has another unit: set wire.{direction}_angular_unit = "{unit}".'
-    return f"The firmware's unit seems to be {unit}, which no setting supports."
+    return f'The firmware has another unit: set wire.{direction}_angular_unit = "{other}".'
 
 
 def _not_granted(run: Run) -> str:

@@ -5,23 +5,21 @@ import termios
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Generic, TypeVar
 
 from cli.commission.report import Checked, Verdict
+from cli.commission.session import CheckoutSession
 from common.errors import RobotError
 from common.text import printable
 
-S = TypeVar("S")
-
 
 @dataclass(frozen=True)
-class Step(Generic[S]):
+class Step:
     """One step of a checkout; ``what`` is the instruction to the operator."""
 
     name: str
     title: str
     what: str
-    run: Callable[[S], Verdict]
+    run: Callable[[CheckoutSession], Verdict]
 
 
 def show(text: str) -> None:
@@ -49,11 +47,11 @@ def confirm(fact: str, phrase: str) -> bool:
     return prompt(f'{fact}\nType "{phrase}" to confirm:').lower() == phrase
 
 
-def walk(steps: Sequence[Step[S]], subject: S, checked: list[Checked]) -> None:
+def walk(steps: Sequence[Step], session: CheckoutSession, checked: list[Checked]) -> None:
     """Run the steps with the operator; results are appended to ``checked``, even on an abort."""
     for number, step in enumerate(steps, 1):
         show(f"\n[{number}/{len(steps)}] {step.title}\n{step.what}")
-        checked.append(Checked(step.title, _verdict(step, subject)))
+        checked.append(Checked(step.title, _verdict(step, session)))
 
 
 def sign(name: str, checked: Sequence[Checked]) -> str:
@@ -65,12 +63,12 @@ def sign(name: str, checked: Sequence[Checked]) -> str:
     return name if name and typed.casefold() == name.casefold() else ""
 
 
-def _verdict(step: Step[S], subject: S) -> Verdict:
+def _verdict(step: Step, session: CheckoutSession) -> Verdict:
     reason = prompt("Press Enter to begin, or type a reason to skip:")
     if reason:
         return Verdict("skipped", reason)
     while True:
-        verdict = step.run(subject)
+        verdict = step.run(session)
         show(f"{verdict.outcome}: {verdict.text}")
         if verdict.outcome == "passed" or prompt(
             "Press Enter to try again, or type any word to continue:"

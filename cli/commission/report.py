@@ -23,6 +23,11 @@ def judged(problems: Iterable[str], passed: str, data: Iterable[Row] = ()) -> Ve
     return Verdict("failed" if found else "passed", " ".join(found) or passed, tuple(data))
 
 
+def failed(problem: str) -> Verdict:
+    """Return the verdict of a step that ended early."""
+    return Verdict("failed", problem)
+
+
 def seconds(value: float | None, digits: int = 2) -> str:
     """Return a time as text; None means that the event did not occur."""
     return "never" if value is None else f"{value:.{digits}f} s"

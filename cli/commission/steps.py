@@ -2,8 +2,7 @@
 
 from functools import partial
 
-from cli.commission.bus_session import CheckoutSession
-from cli.commission.latches import LatchTest, judge_bumper, judge_estop
+from cli.commission.latches import LatchTest, judge_latch
 from cli.commission.link import (
     CRC_FRAMES,
     NONZERO_FRAMES,
@@ -14,18 +13,18 @@ from cli.commission.link import (
 )
 from cli.commission.motion import Run, judge_motion
 from cli.commission.operator import Step, confirm, show
-from cli.commission.report import Verdict, judged
+from cli.commission.report import Verdict, failed
+from cli.commission.session import CheckoutSession
 from cli.commission.sonar import (
     Finding,
     HandDetector,
     Rest,
     judge_sonars,
-    nearest,
     obstructions,
     resting_ranges,
     words,
 )
-from common import clock
+from common import clock, keys
 from common.messages import SONAR_NAMES
 from common.motion import Command, Twist
 
@@ -36,51 +35,49 @@ HAND_S = 60.0  # to walk around the vehicle and hold a hand there
 AWAY_S = 20.0
 LATCH_S = 2.0
 CLEAR_S = 0.3  # the bridge needs three clear samples, and safety three samples of these
-ESTOP_S = 0.25  # between two emergency stops until the latch; the bus may lose one
 DRIVE_S = 2.0
 FORWARD, TURN = Twist(linear=0.1), Twist(angular=0.2)
-PHRASE = "wheels off the ground"
+RESET_PHRASE, PHRASE = "reset", "wheels off the ground"
 NO_LINK = "No link message from the bridge."
-NOT_PRESSED = LatchTest("contact", None, False, (), (), None)
 
 
 def link(session: CheckoutSession) -> Verdict:
     """Check the link for some seconds."""
     settings = {path: setting.value for path, setting in session.settings("bridge").items()}
-    log = session.log
-    log.mark()
+    session.mark()
     session.listen(LINK_S)
-    if not log.links:
-        return judged([NO_LINK], "")
-    bridge = (one.value for one in log.health if one.value.service == "bridge")
+    if not (links := session.of(keys.LINK)):
+        return failed(NO_LINK)
+    bridge = (one.value for one in session.of(keys.HEALTH) if one.value.service == "bridge")
     standby = [health.counters.get("other_port", 0) for health in bridge]
     ports = Ports(
         tuple(settings["board.listen_ports"]),
         standby[-1] - standby[0] if len(standby) > 1 else None,
     )
-    switches = log.switches[-1].value if log.switches else None
-    return judge_link([one.value for one in log.links], switches, expected_rates(settings), ports)
+    switches = session.of(keys.SWITCHES)
+    newest = switches[-1].value if switches else None
+    return judge_link([one.value for one in links], newest, expected_rates(settings), ports)
 
 
 def crc(session: CheckoutSession) -> Verdict:
     """Count frames until there are enough, or until the time limit."""
-    log = session.log
-    log.mark()
-    session.until(lambda: log.frames >= CRC_FRAMES and log.nonzero >= NONZERO_FRAMES, CRC_S)
-    if not log.links:
-        return judged([NO_LINK], "")
-    return judge_crc([one.value for one in log.links], log.frames, log.nonzero)
+    session.mark()
+    session.until(lambda: session.frames >= CRC_FRAMES and session.nonzero >= NONZERO_FRAMES, CRC_S)
+    if not (links := session.of(keys.LINK)):
+        return failed(NO_LINK)
+    return judge_crc([one.value for one in links], session.frames, session.nonzero)
 
 
 def sonars(session: CheckoutSession) -> Verdict:
     """Check the eight sonars, one hand position each."""
-    session.log.mark()
+    session.mark()
     session.listen(REST_S)
-    if not session.log.ultrasonics:
-        return judged(["No ranges are received: see the link."], "")
-    rest = resting_ranges([one.value for one in session.log.ultrasonics])
+    samples = [one.value for one in session.of(keys.ULTRASONIC)]
+    if not samples:
+        return failed("No ranges are received: see the link.")
+    rest = resting_ranges(samples)
     if problem := obstructions(rest):
-        return judged([problem], "")
+        return failed(problem)
     return judge_sonars(rest, [_find(session, rest, name) for name in SONAR_NAMES])
 
 
@@ -89,105 +86,111 @@ def _find(session: CheckoutSession, rest: Rest, name: str) -> Finding:
         show(f"The {words(name)} sonar is faulty.")
         return Finding(name, ())
     show(f"NOW the {words(name)} sonar: hold a hand in front of it, within {HAND_S:g} s.")
-    seen, closest = _wait(session, rest, True, HAND_S)
+    seen = _wait(session, rest, True, HAND_S)
     if seen:
         show(f"  detected by: {', '.join(map(words, seen))}. Take the hand away.")
         _wait(session, rest, False, AWAY_S)
     else:
         show("  no sonar has detected it.")
-    return Finding(name, seen, closest)
+    return Finding(name, seen)
 
 
-def _wait(
-    session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float
-) -> tuple[tuple[str, ...], float | None]:
-    """Wait for a hand, or for none; return the detecting sonars, and the nearest reading."""
-    log = session.log
-    detector = HandDetector(rest, since_ns=log.mark())
-    readings: list[float] = []
+def _wait(session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float) -> tuple[str, ...]:
+    """Wait for a hand, or for none; return the detecting sonars."""
+    detector = HandDetector(rest, since_ns=session.mark())
 
     def is_so() -> bool:
         nonlocal detector
-        for one in log.ultrasonics:
+        samples = session.of(keys.ULTRASONIC)
+        for one in samples:
             detector = detector.take(one.value, one.received_ns)
-            distance = nearest(one.value)
-            readings.extend([] if distance is None else [distance])
-        log.ultrasonics.clear()
+        samples.clear()
         return bool(detector.seen) == hand and detector.settled(clock.now_ns())
 
     found = session.until(is_so, timeout_s)
-    seen = tuple(sorted(detector.seen, key=SONAR_NAMES.index)) if found else ()
-    return seen, min(readings, default=None)
+    return tuple(sorted(detector.seen, key=SONAR_NAMES.index)) if found else ()
 
 
 def bumper(session: CheckoutSession) -> Verdict:
     """Check a press and a release of the strip, and the reset."""
-    if problem := session.unlatch():
-        return judged([problem], "")
-    log = session.log
-    log.mark()
-    session.until(lambda: log.bumpers, LATCH_S)
-    if not log.bumpers:
-        return judged(["No bumper messages are received: see the link."], "")
-    if log.bumpers[-1].value.pressed:
-        return judge_bumper(NOT_PRESSED, True)
+    if problem := _unlatch(session):
+        return failed(problem)
+    session.mark()
+    samples = session.of(keys.BUMPER)
+    session.until(lambda: samples, LATCH_S)
+    if not samples:
+        return failed("No bumper messages are received: see the link.")
+    if samples[-1].value.pressed:
+        return failed("The bumper is pressed before the test: stuck or inverted.")
     show(f"NOW press the bumper, within {HAND_S:g} s.")
-    session.until(lambda: log.bumpers[-1].value.pressed, HAND_S)
-    hits = [one.received_ns for one in log.bumpers if one.value.pressed]
-    if not hits:
-        return judge_bumper(NOT_PRESSED, False)
+    if not session.until(lambda: samples[-1].value.pressed, HAND_S):
+        return failed("No press was received: is the strip connected?")
+    at_ns = next(one.received_ns for one in samples if one.value.pressed)
     session.until(lambda: "contact" in session.latched(), LATCH_S)
     show("Pressed. NOW release it.")
-    gone = session.until(lambda: not log.bumpers[-1].value.pressed, HAND_S)
+    is_gone = session.until(lambda: not samples[-1].value.pressed, HAND_S)
     session.listen(CLEAR_S)
-    return judge_bumper(_latch_test(session, "contact", hits[0], gone), False)
+    problem = "" if is_gone else "The bumper stays pressed after its release."
+    return judge_latch(_latch_test(session, "contact", at_ns), problem)
 
 
 def estop(session: CheckoutSession) -> Verdict:
     """Publish an emergency stop, and reset it."""
-    if problem := session.unlatch():
-        return judged([problem], "")
-    log = session.log
-    at_ns = log.mark()
-    for _ in range(round(LATCH_S / ESTOP_S)):
-        session.bus.estop()
-        if session.until(lambda: "estop" in session.latched(), ESTOP_S):
-            break
-    session.until(lambda: any(m.value.command is Command.BRAKE for m in log.motions), ESTOP_S)
-    return judge_estop(_latch_test(session, "estop", at_ns, True))
+    if problem := _unlatch(session):
+        return failed(problem)
+    at_ns = session.mark()
+    session.order_stop(session.robot)
+    session.stop([session.robot])
+    session.until(
+        lambda: any(one.value.command is Command.BRAKE for one in session.of(keys.MOTION)), LATCH_S
+    )
+    return judge_latch(_latch_test(session, "estop", at_ns))
 
 
-def _latch_test(session: CheckoutSession, cause: str, at_ns: int, gone: bool) -> LatchTest:
+def _unlatch(session: CheckoutSession) -> str:
+    """Reset earlier latches after confirmation; return the problem, or an empty string."""
+    latched = session.fresh_state().latched
+    if not latched:
+        return ""
+    fact = f"Safety has latched before: {', '.join(latched)}. Reset it first."
+    if not confirm(fact, RESET_PHRASE):
+        return "The earlier latch of safety was not reset."
+    done = session.reset()
+    return "" if done.granted and not done.latched else f"The reset was refused: {done.text}"
+
+
+def _latch_test(session: CheckoutSession, cause: str, at_ns: int) -> LatchTest:
     """Reset the latch; the messages are copied before, because the reset discards them."""
-    states, motions = list(session.log.safety), list(session.log.motions)
-    return LatchTest(cause, at_ns, gone, states, motions, session.reset())
+    states, motions = list(session.of(keys.SAFETY)), list(session.of(keys.MOTION))
+    return LatchTest(cause, at_ns, states, motions, session.reset())
 
 
 def move(requested: Twist, session: CheckoutSession) -> Verdict:
     """Drive a motion after the operator's confirmation."""
-    if problem := session.unlatch():
-        return judged([problem], "")
+    if problem := _unlatch(session):
+        return failed(problem)
     if not confirm("The wheels will turn. All of them must be off the ground.", PHRASE):
-        return judged(["Not confirmed: no motion was requested."], "")
+        return failed("Not confirmed: no motion was requested.")
     settings = session.settings("bridge")
-    command = str(settings["wire.command_angular_unit"].value)
-    feedback = str(settings["wire.feedback_angular_unit"].value)
-    log = session.log
-    log.mark()
+    session.mark()
     show("The wheels turn. Ctrl-C stops them.")
     released_ns = session.drive(requested, DRIVE_S)
     if released_ns is None:
-        return judged([_not_granted(session)], "")
-    messages = log.motions, log.velocities, log.mileages, log.safety
-    return judge_motion(Run(requested, command, feedback, released_ns, *messages))
-
-
-def _not_granted(session: CheckoutSession) -> str:
-    log = session.log
-    text = log.safety[-1].value.text if log.safety else "no state"
-    waiting = log.links[-1].value.waiting if log.links else ""
-    bridge = f" The bridge waits for: {waiting}." if waiting else ""
-    return f"Safety does not grant motion to the checkout. It reports: {text}{bridge}"
+        text = session.state.text if session.state else "no state"
+        links = session.of(keys.LINK)
+        waiting = f" The bridge waits for: {links[-1].value.waiting}." if links else ""
+        return failed(f"Safety does not grant motion to the checkout. It reports: {text}{waiting}")
+    run = Run(
+        requested=requested,
+        unit=str(settings["wire.command_angular_unit"].value),
+        feedback=str(settings["wire.feedback_angular_unit"].value),
+        released_ns=released_ns,
+        motions=session.of(keys.MOTION),
+        velocities=session.of(keys.VELOCITY),
+        mileages=session.of(keys.MILEAGE),
+        states=session.of(keys.SAFETY),
+    )
+    return judge_motion(run)
 
 
 STEPS = (

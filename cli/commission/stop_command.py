@@ -1,68 +1,107 @@
-"""``t2 checkout stop``: measured stops of recordings, and the settings of safety for them."""
+"""``t2 checkout stop``: table of the stops in recordings, beside what safety reckons with."""
 
 import argparse
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
-from msgspec.structs import replace
-
-from cli.commission.stop_fit import Settings
-from cli.commission.stop_report import Measured, as_json, as_text, evaluate
-from cli.commission.stops import Stop, Streams, find_stops
+from cli.commission.stops import DIRECTIONS, Stop, Streams, find_stops
 from cli.inspect import output
 from cli.inspect.session import wants_json
 from cli.recordings.info import open_recording
 from cli.settings import Everything
 from common.errors import ConfigError, RobotError
 from common.keys import ROOT
-from services.safety.config import SafetyConfig
+from services.safety.config import Safety
+from services.safety.core.release import stopping_distance
 
 # A reading is up to one period of the sonars old, and up to one period of the bridge's queries.
 READING_PERIODS = 2
 KINDS = {"Motion", "Velocity", "Mileage", "Bumper"}  # the messages that ``Streams`` takes
+HEAD = ("stop", "command", "speed m/s", "reaction s", "deceleration m/s2", "distance m",
+        "needed m", "reckoned m", "recording")  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """Stops beside safety's settings.
+
+    Safety reckons from the reading of a sonar on, a stop begins with its command: ``sensing_s``
+    lies between them.
+    """
+
+    stops: Sequence[Stop]
+    left_out: Counter[str]
+    safety: Safety
+    sensing_s: float
+
+    def reckoned(self, stop: Stop) -> float:
+        """Return the stopping distance (m) that safety reckons with from this speed."""
+        return stopping_distance(stop.speed, self.safety.reaction, self.safety.deceleration)
+
+    def needed(self, stop: Stop) -> float:
+        """Return the distance (m) from the reading to standstill."""
+        return stop.distance + stop.speed * self.sensing_s
+
+    def spare(self, stop: Stop) -> float:
+        """Return by how much (m) the stop was shorter than reckoned."""
+        return self.reckoned(stop) - self.needed(stop)
+
+    @property
+    def worst(self) -> int:
+        """The index of the stop with the least to spare."""
+        return min(range(len(self.stops)), key=lambda n: self.spare(self.stops[n]))
+
+    @property
+    def missing(self) -> list[str]:
+        """The directions without a STOP, which is what an obstacle causes."""
+        found = {stop.direction for stop in self.stops if stop.kind == "stop"}
+        return [each for each in DIRECTIONS.values() if each not in found]
+
+    @property
+    def passed(self) -> bool:
+        """Whether both directions have a STOP, and no stop was longer than reckoned."""
+        return not self.missing and self.spare(self.stops[self.worst]) >= 0
 
 
 def run(options: argparse.Namespace, config: Everything) -> int:
-    """Show the stops of the recordings; return 0 if the present settings are safe for them."""
+    """Show the stops of the recordings; return 0 if none was longer than reckoned."""
     if not options.files:
         raise ConfigError(
             "stop: name at least one recording: start `t2 record` on the robot, drive and stop"
         )
-    measured = read(options.files)
     sensing_s = READING_PERIODS / config.bridge.ultrasonic_rate
-    result = evaluate(measured, config.safety, sensing_s)
+    result = Result(*read(options.files), config.safety, sensing_s)
     if wants_json(options):
         output.line(as_json(result))
     else:
-        print(as_text(result), flush=True)
-    if result.proposal is not None and (refusal := refused(config, result.proposal)):
-        output.warn(f"the proposed settings are refused with these files: {refusal}")
+        rows = [as_cells(result, n) for n in range(len(result.stops))]
+        print(output.table(HEAD, rows), "", *verdict(result), sep="\n", flush=True)
     return 0 if result.passed else 1
 
 
-def read(files: Sequence[Path]) -> Measured:
-    """Return the stops of all recordings; raise ``RobotError`` without any."""
-    stops: list[Stop] = []
+def read(files: Sequence[Path]) -> tuple[list[Stop], Counter[str]]:
+    """Return the stops of all recordings, and why others are left out.
+
+    Raise ``RobotError`` without any.
+    """
+    stops: dict[tuple[int, int], Stop] = {}
     left_out: Counter[str] = Counter()
-    period_s = 0.0
     for file in files:
-        streams = read_streams(file)
-        found, reasons = find_stops(streams, file.name)
-        known = {stop.command for stop in stops}
-        new = [stop for stop in found if stop.command not in known]
-        stops += new
-        left_out["in two recordings"] += len(found) - len(new)
+        found, reasons = find_stops(read_streams(file), file.name)
         left_out += reasons
-        period_s = max(period_s, streams.period_s)
+        for stop in found:
+            left_out["in two recordings"] += stop.command in stops
+            stops.setdefault(stop.command, stop)
     if not stops:
         reasons_text = ", ".join(f"{count} {reason}" for reason, count in left_out.most_common())
         raise RobotError(
             f"no stop to measure: a STOP or BRAKE from a steady speed, until standstill "
             f"({reasons_text or 'no RUN with speed ends'})"
         )
-    return Measured(stops, +left_out, period_s)
+    return list(stops.values()), +left_out
 
 
 def read_streams(file: Path) -> Streams:
@@ -80,11 +119,60 @@ def read_streams(file: Path) -> Streams:
     return streams
 
 
-def refused(config: Everything, proposal: Settings) -> str:
-    """Return why safety refuses the proposed settings, or an empty string."""
-    try:
-        safety = replace(config.safety, **asdict(proposal))
-        SafetyConfig(vehicle=config.vehicle, safety=safety)
-    except ValueError as error:
-        return str(error)
-    return ""
+def as_cells(result: Result, index: int) -> Sequence[str]:
+    """Return one stop as table cells."""
+    stop = result.stops[index]
+    return (
+        str(index + 1),
+        f"{stop.kind.upper()} {stop.direction}" + ", then BRAKE" * stop.braked,
+        f"{stop.speed:.3f}",
+        f"{stop.reaction:.3f}",
+        f"{stop.deceleration:.2f}",
+        f"{stop.distance:.3f}",
+        f"{result.needed(stop):.3f}",
+        f"{result.reckoned(stop):.3f}",
+        stop.file,
+    )
+
+
+def as_json(result: Result) -> dict[str, Any]:
+    """Return the result as JSON fields; SI units."""
+    return {
+        "stops": [
+            asdict(stop) | {"needed": result.needed(stop), "reckoned": result.reckoned(stop)}
+            for stop in result.stops
+        ],
+        "worst": result.worst,
+        "left_out": dict(result.left_out),
+        "missing": result.missing,
+        "passed": result.passed,
+    }
+
+
+def verdict(result: Result) -> Iterator[str]:
+    """Yield the lines below the table."""
+    safety, stops = result.safety, result.stops
+    if result.left_out:
+        left = ", ".join(f"{count} {reason}" for reason, count in result.left_out.most_common())
+        yield f"Left out: {left}."
+    worst = stops[result.worst]
+    spare = result.spare(worst)
+    yield (
+        f"The worst is stop {result.worst + 1}: from the reading to standstill it needs "
+        f"{result.needed(worst):.2f} m, reckoned are {result.reckoned(worst):.2f} m."
+    )
+    reaction = max(stop.reaction for stop in stops) + result.sensing_s
+    yield (
+        f"The slowest reaction is {reaction:.2f} s from the reading (safety.react is "
+        f"{safety.reaction:g} s), the weakest deceleration "
+        f"{min(stop.deceleration for stop in stops):.2f} m/s2 (safety.deceleration is "
+        f"{safety.deceleration:g} m/s2)."
+    )
+    fastest = max(stop.speed for stop in stops)
+    yield f"The fastest stop is from {fastest:.2f} m/s; safety allows {safety.max_linear:g} m/s."
+    for direction in result.missing:
+        yield f"NOT MEASURED: a STOP {direction}."
+    if spare < 0:
+        yield "NOT SAFE: this vehicle needs more than safety reckons with."
+    elif result.passed:
+        yield "No stop was longer than safety reckons with."

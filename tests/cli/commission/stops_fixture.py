@@ -1,12 +1,12 @@
 """Stops of the simulated vehicle in simulated time, as recorded messages; and exact stops."""
 
 import random
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import msgspec
 
-from cli.commission.stops import Stop, Streams, find_stops
+from cli.commission.stops import Streams, find_stops
 from common.freshness import NS_PER_S
 from common.messages import Message, Mileage, Motion, Velocity
 from common.motion import Command
@@ -19,7 +19,6 @@ from tests.sim.sim_fixture import SimFixture, model
 KINDS = {Command.STOP: MotionKind.STOP, Command.BRAKE: MotionKind.BREAK}
 TICK_NS = NS_PER_S // 100
 DRIVE_S, STAND_S = 0.3, 0.3  # before the command, and after standstill
-SPEEDS = (0.3, 0.5, 0.7, 0.9, 1.0)  # m/s
 PAUSE_NS = 10 * NS_PER_S  # between two stops
 
 
@@ -31,22 +30,15 @@ class StopMaker:
     delay: float = 0.1  # s, of the command
     jitter: float = 0.04  # s, at most, on top; uniform
     coast: float = 0.8  # m/s^2
-    scatter: float = 0.0  # standard deviation of 1 / coast, relative
     streams: Streams = field(default_factory=Streams)
     _offset_ns: int = 0
 
     def __post_init__(self) -> None:
         self._random = random.Random(self.seed)
 
-    @property
-    def reaction(self) -> float:
-        """Mean reaction time (s): the board acts each 10 ms."""
-        return self.delay + self.jitter / 2 + TICK_NS / NS_PER_S / 2
-
     def stop(self, speed: float, command: Command = Command.STOP) -> "StopMaker":
         """Drive at this speed (m/s) and stop, after a random part of a tick."""
-        slowness = (1 + self.scatter * self._random.gauss(0, 1)) / self.coast
-        drive = {"coast": 1 / slowness, "acceleration": 100.0}
+        drive = {"coast": self.coast, "acceleration": 100.0}
         seed = self._random.randrange(10**6)
         it = SimFixture(vehicle=model(drive=drive), seed=seed, ports=(4002,))
         self._add(it, Motion(command=Command.RUN, linear=speed))
@@ -57,7 +49,7 @@ class StopMaker:
         self._add(it, Motion(command=command))
         it.say(MotionCommand(KINDS[command]))
         it.now_ns = it.simulation.now_ns
-        lasting_s = self.delay + self.jitter + abs(speed) * slowness + STAND_S
+        lasting_s = self.delay + self.jitter + abs(speed) / self.coast + STAND_S
         self._drive(it, lasting_s)
         self._offset_ns += PAUSE_NS
         return self
@@ -78,22 +70,6 @@ class StopMaker:
         at_ns = it.now_ns + self._offset_ns
         fields = {name: getattr(message, name) for name in message.__struct_fields__}
         self.streams.add(type(message)(**fields | {"mono_ns": at_ns, "boot": self.seed}))
-
-
-def stop(speed: float, reaction: float = 0.1, deceleration: float = 0.8, **given: object) -> Stop:
-    """Return a stop with the distance of the model."""
-    distance = speed * reaction + speed * speed / (2 * deceleration)
-    exact = Stop("stop", "forward", speed, reaction, deceleration, distance)
-    return replace(exact, **given)  # type: ignore[arg-type]
-
-
-def stops(speeds: Sequence[float] = SPEEDS, **given: object) -> list[Stop]:
-    """Return stops forward and backward whose values scatter a little."""
-    return [
-        stop(speed, 0.1 + 0.002 * (n % 3), 0.8 + 0.01 * (n % 2), direction=direction, **given)
-        for direction in ("forward", "backward")
-        for n, speed in enumerate(speeds)
-    ]
 
 
 RUN = Motion(command=Command.RUN, linear=0.8)

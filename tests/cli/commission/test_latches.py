@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from cli.commission.latches import LIMIT_S, LatchTest, Reset, judge_bumper, judge_estop
+from cli.commission.latches import LIMIT_S, LatchTest, Reset, judge_latch
 from common.freshness import NS_PER_S, Latest
 from common.messages import Motion, SafetyState
 from common.motion import Command
@@ -26,7 +26,6 @@ def latch_test(cause: str = "estop") -> LatchTest:
     return LatchTest(
         cause=cause,
         at_ns=T,
-        gone=True,
         states=[state(-0.1), state(0.02, cause), state(0.07, cause)],
         motions=[
             motion(-0.1, Command.STOP),
@@ -38,19 +37,19 @@ def latch_test(cause: str = "estop") -> LatchTest:
 
 
 def test_a_complete_test_passes_with_its_times() -> None:
-    verdict = judge_estop(latch_test())
-    assert (verdict.outcome, verdict.text) == ("passed", "Stopped, latched, reset.")
+    verdict = judge_latch(latch_test())
+    assert (verdict.outcome, verdict.text) == ("passed", "Latched, braked, reset.")
     assert dict(verdict.data) == {
-        "latched after": "0.020 s",
-        "BRAKE commanded after": "0.010 s",
+        "latch estop after": "0.020 s",
+        "command BRAKE after": "0.010 s",
         "BRAKE commands received": "2",
         "reset": "Reset.",
     }
 
 
 def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
-    verdict = judge_estop(replace(latch_test(), states=[state(-0.01, "estop")]))
-    assert dict(verdict.data)["latched after"] == "0.000 s"
+    verdict = judge_latch(replace(latch_test(), states=[state(-0.01, "estop")]))
+    assert dict(verdict.data)["latch estop after"] == "0.000 s"
 
 
 @pytest.mark.parametrize(
@@ -72,13 +71,12 @@ def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
             },
             "safety sent RUN, STOP instead of BRAKE",
         ),
-        ({"reset": None}, "No reset was requested."),
         ({"reset": replace(RESET, granted=False, text="It moves.")}, "was refused: It moves."),
         ({"reset": replace(RESET, latched=("estop",))}, "Still latched after the reset: estop."),
     ],
 )
 def test_missing_parts_are_named(change: dict[str, object], phrase: str) -> None:
-    verdict = judge_estop(replace(latch_test(), **change))  # type: ignore[arg-type]
+    verdict = judge_latch(replace(latch_test(), **change))  # type: ignore[arg-type]
     assert verdict.outcome == "failed"
     assert phrase in verdict.text
 
@@ -87,31 +85,15 @@ def test_the_limit_itself_passes() -> None:
     late = replace(
         latch_test(), states=[state(LIMIT_S, "estop")], motions=[motion(LIMIT_S, Command.BRAKE)]
     )
-    assert judge_estop(late).outcome == "passed"
+    assert judge_latch(late).outcome == "passed"
 
 
 def test_commands_after_the_reset_are_ignored() -> None:
     more = [*latch_test().motions, motion(2.01, Command.STOP)]
-    assert judge_estop(replace(latch_test(), motions=more)).outcome == "passed"
+    assert judge_latch(replace(latch_test(), motions=more)).outcome == "passed"
 
 
-# --- bumper ---------------------------------------------------------------------------------------
-
-
-def test_a_press_and_a_release_pass() -> None:
-    assert judge_bumper(latch_test("contact"), False).outcome == "passed"
-
-
-@pytest.mark.parametrize(
-    ("change", "before", "phrase"),
-    [
-        ({}, True, "pressed before the test"),
-        ({"at_ns": None}, False, "No press was received"),
-        ({"gone": False}, False, "stays pressed"),
-        ({"states": []}, False, "Safety did not latch contact."),
-    ],
-)
-def test_bumper_faults_are_named(change: dict[str, object], before: bool, phrase: str) -> None:
-    verdict = judge_bumper(replace(latch_test("contact"), **change), before)  # type: ignore[arg-type]
+def test_a_problem_that_was_found_before_comes_first() -> None:
+    verdict = judge_latch(replace(latch_test("contact"), states=[]), "It stays pressed.")
     assert verdict.outcome == "failed"
-    assert phrase in verdict.text
+    assert verdict.text == "It stays pressed. Safety did not latch contact."

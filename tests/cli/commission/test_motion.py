@@ -14,7 +14,6 @@ from cli.commission.motion import (
     measure,
     stood_after_s,
     too_fast,
-    unit_of,
 )
 from cli.commission.report import Verdict
 from common.freshness import NS_PER_S, Latest
@@ -116,8 +115,6 @@ def test_the_allowed_deviation(off: float) -> None:
     ("requested", "vehicle", "phrase"),
     [
         (FORWARD, Vehicle(counted=0.0, measured=0.0), "No motion: neither the velocity nor the di"),
-        (FORWARD, Vehicle(0.0, 0.0, across=0.1), "It turns instead."),
-        (LEFT, Vehicle(0.0, 0.0, across=0.1), "It drives instead of turning."),
         (FORWARD, Vehicle(counted=0.0), "but the distance does not."),
         (LEFT, Vehicle(counted=0.0), "a gyroscope counts only on the ground."),
         (
@@ -151,9 +148,7 @@ def test_problems_are_named(requested: Twist, vehicle: Vehicle, phrase: str) -> 
     [
         ("decidegree", MRAD, 'set wire.command_angular_unit = "milliradian"'),
         ("milliradian", 1 / MRAD, 'set wire.command_angular_unit = "decidegree"'),
-        ("decidegree", 5.73, "seems to be 0.01 rad/s, which no setting supports"),
         ("decidegree", 0.1, None),
-        ("decidegree", 10.0, "seems to be 1 deg/s"),
         ("decidegree", 3.0, "It goes 3.00 times as fast as commanded."),
     ],
 )
@@ -169,7 +164,6 @@ def test_a_unit_is_recognized_by_its_ratio(unit: str, counted: float, phrase: st
     [
         ("decidegree", 1 / MRAD, 'set wire.feedback_angular_unit = "milliradian"'),
         ("milliradian", MRAD, 'set wire.feedback_angular_unit = "decidegree"'),
-        ("decidegree", 10.0, "seems to be 0.01 deg/s, which no setting supports"),
         ("decidegree", 3.0, "The measured velocity is 3.00 times the velocity of the counter."),
         ("decidegree", 0.0, "The measured velocity is 0.00 times the velocity of the counter."),
     ],
@@ -187,11 +181,9 @@ def test_unit_hints_only_for_turns() -> None:
     assert "angular_unit" not in judge(Vehicle(counted=MRAD, measured=MRAD)).text
 
 
-@pytest.mark.parametrize(
-    ("ratio", "unit"), [(0.573, "milliradian"), (0.5, "milliradian"), (0.48, None), (1.0, None)]
-)
-def test_a_unit_must_match(ratio: float, unit: str | None) -> None:
-    assert unit_of(ratio, "decidegree") == unit
+@pytest.mark.parametrize(("ratio", "matches"), [(0.573, True), (0.5, True), (0.48, False)])
+def test_a_unit_must_match(ratio: float, matches: bool) -> None:
+    assert ("angular_unit" in judge(Vehicle(counted=ratio, measured=ratio), LEFT).text) is matches
 
 
 def test_the_window_must_be_long_enough() -> None:

@@ -12,6 +12,7 @@ from common import codec
 from common.cli_args import EXIT_CONFIG
 from common.freshness import NS_PER_S
 from common.messages import Message
+from common.motion import Command
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
@@ -20,7 +21,7 @@ from tests.recorder.samples import bare
 
 PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
          "mileages": "tel/bridge/mileage"}  # fmt: skip
-SAFE = ("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5")
+CAREFUL = ("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5")
 
 
 def record(path: Path, streams: Streams, other: str = "001") -> Path:
@@ -51,43 +52,60 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(folder / "a.mcap", driven(0.3, 0.5, 0.7, 0.9, 1.0))
 
 
-def test_safe_settings(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["checkout", "stop", str(path), *SAFE]) == 0
+def test_stops_within_what_safety_reckons_with(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["checkout", "stop", str(path), *CAREFUL]) == 0
     printed, errors = capsys.readouterr()
     assert printed.count("a.mcap") == 10
-    assert "\n[safety]\nreact = 0." in printed
-    assert "\nThey are safe" in printed
+    assert "STOP backward" in printed
+    assert "The worst is stop " in printed
+    assert "m/s2 (safety.deceleration is 0.5 m/s2)." in printed
+    assert "The fastest stop is from 1.00 m/s; safety allows 1 m/s.\n" in printed
+    assert printed.endswith("No stop was longer than safety reckons with.\n")
     assert not errors
 
 
-def test_json_of_two_recordings(
+def test_a_stop_that_was_too_long(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     other = record(tmp_path / "b.mcap", driven(0.6, coast=0.3, seed=6))
-    assert main(["checkout", "stop", str(path), str(other), "--json"]) == 1
+    words = ["checkout", "stop", str(path), str(other)]
+    assert main([*words, "--json"]) == 1
     printed = json.loads(capsys.readouterr().out)
-    assert [stop["file"] for stop in printed["stops"]] == ["a.mcap"] * 10 + ["b.mcap"] * 2
-    assert printed["stops"][10]["deceleration"] == pytest.approx(0.3, rel=0.02)
-    assert printed["stops"][10]["long"]
-    assert printed["present"]["verdict"] == "not safe"
+    stops = printed["stops"]
+    assert [stop["file"] for stop in stops] == ["a.mcap"] * 10 + ["b.mcap"] * 2
+    worst = stops[printed["worst"]]
+    assert printed["worst"] in (10, 11)
+    assert worst["deceleration"] == pytest.approx(0.3, rel=0.02)
+    # 0.1 s, two periods of the sonars, from a reading to the command
+    assert worst["needed"] == pytest.approx(worst["distance"] + 0.1 * worst["speed"])
+    assert worst["reckoned"] == pytest.approx(0.25 * worst["speed"] + worst["speed"] ** 2 / 1.2)
+    assert worst["needed"] > worst["reckoned"]
+    assert not printed["passed"]
+    assert main(words) == 1
+    assert "NOT SAFE: this vehicle needs more" in capsys.readouterr().out
+
+
+def test_each_direction_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    maker = StopMaker(5, delay=0.05, jitter=0.02).stop(0.5).stop(-0.5, Command.BRAKE)
+    assert (
+        main(["checkout", "stop", str(record(tmp_path / "c.mcap", maker.streams)), *CAREFUL]) == 1
+    )
+    printed = capsys.readouterr().out
+    assert "BRAKE backward" in printed
+    assert "NOT MEASURED: a STOP backward.\n" in printed
+    assert "NOT SAFE" not in printed
 
 
 def test_a_stop_in_two_recordings_counts_once(
     path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The black box records what a continuous recording also has."""
-    assert main(["checkout", "stop", str(path), str(path), "--json", *SAFE]) == 0
+    assert main(["checkout", "stop", str(path), str(path), "--json", *CAREFUL]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert len(printed["stops"]) == 10
     assert printed["left_out"] == {"in two recordings": 10}
-
-
-def test_proposed_settings_that_safety_refuses(
-    path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    near = ("--set", "vehicle.sonar_max=1.0")
-    assert main(["checkout", "stop", str(path), *SAFE, *near]) in (0, 1)
-    assert "are refused with these files: sonar_max 1 m is too near" in capsys.readouterr().err
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: object, code: int = 1) -> str:
@@ -129,11 +147,8 @@ def test_unsuitable_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
 def test_options_of_another_part(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     error = refused(capsys, "stop", code=EXIT_CONFIG)
     assert "name at least one recording: start `t2 record` on the robot" in error
-    error = refused(capsys, "stop", path, "--only", "link", code=EXIT_CONFIG)
-    assert "--only: the stop test has no steps" in error
-    error = refused(capsys, "stop", path, "--report", "x.md", code=EXIT_CONFIG)
-    assert "--report: the stop test writes no report" in error
-    error = refused(capsys, "watchdog", path, code=EXIT_CONFIG)
-    assert "only `t2 checkout stop` reads recordings" in error
-    error = refused(capsys, "watchdog", "--json", code=EXIT_CONFIG)
+    for words in (("--only", "link"), ("--report", "x.md")):
+        error = refused(capsys, "stop", path, *words, code=EXIT_CONFIG)
+        assert "has no steps and no report" in error
+    error = refused(capsys, "--json", code=EXIT_CONFIG)
     assert "-o: only `t2 checkout stop`" in error
