@@ -39,14 +39,6 @@ def test_the_oldest_samples_are_dropped_above_the_size_limit() -> None:
     assert [each.raw for _, each in buffer.since(0)] == [b"00006", b"00007", b"00008"]
 
 
-def test_a_sample_larger_than_the_buffer_is_dropped() -> None:
-    buffer = RingBuffer(100 * NS_PER_S, OVERHEAD + 10)
-    buffer.add(bare("tel/x", bytes(11)))
-    assert (kept(buffer), buffer.size) == ([], 0)
-    buffer.add(bare("tel/x", bytes(10)))
-    assert kept(buffer) == [bytes(10)]
-
-
 @pytest.mark.parametrize("count", [1, 100])
 def test_a_flood_on_one_key_removes_no_sample_of_the_others(files: Files, count: int) -> None:
     """It also stays within the size limit while a dump waits to be written."""
@@ -161,12 +153,3 @@ def test_finish_discards_pending_samples(files: Files) -> None:
     assert [len(each) for each in files.read()] == [SLICE]
     box.write(ns(9))
     assert len(files.closed) == 1
-
-
-def test_a_dump_without_samples_writes_no_file(files: Files) -> None:
-    box = box_of(files)
-    box.trigger(["contact"], ns(0))
-    box.flush()
-    for second in (1, 5):
-        box.write(ns(second))
-    assert files.closed == []

@@ -14,13 +14,6 @@ from tests.recorder.files_fixture import CONTINUOUS, INCIDENTS, names
 from tests.recorder.samples import BEGIN_NS
 
 
-def test_a_missing_folder_is_created(tmp_path: Path) -> None:
-    storage = Storage(tmp_path / "a" / "b", 0)
-    storage.check(0)
-    assert storage.has_room
-    assert (tmp_path / "a" / "b").is_dir()
-
-
 def test_file_names_hold_robot_time_and_reason(tmp_path: Path) -> None:
     storage = Storage(tmp_path, 0)
     first = storage.new_path("007", BEGIN_NS)
@@ -43,21 +36,17 @@ def test_free_space_limit_has_a_hysteresis(tmp_path: Path) -> None:
 
 
 def test_retry_after_a_disk_error(tmp_path: Path) -> None:
-    storage = Storage(tmp_path, 0)
-    storage.on_error(OSError(28, "No space left on device"), 0)
-    storage.check(RETRY_NS - 1)
-    assert not storage.has_room
-    assert storage.problem.endswith(": No space left on device")
-    storage.check(RETRY_NS)
-    assert storage.has_room
-
-
-def test_no_room_if_the_folder_cannot_be_created(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     storage = Storage(tmp_path / "file" / "folder", 0)
     storage.check(0)
-    assert not storage.has_room
-    assert "file/folder" in storage.problem
+    assert storage.problem.endswith("file/folder: Not a directory")
+    (tmp_path / "file").unlink()
+    found = []
+    for at_ns in (RETRY_NS - 1, RETRY_NS):
+        storage.check(at_ns)
+        found.append(storage.has_room)
+    assert found == [False, True]
+    assert storage.folder.is_dir()
 
 
 class Disk:
@@ -121,28 +110,6 @@ def test_the_latest_file_of_this_process_stays_whatever_its_clock(tmp_path: Path
     storage.check(0)
     assert began.exists()
     assert disk.names() == sorted([began.name, INCIDENTS[2]])
-
-
-def test_without_a_robot_nothing_is_removed(tmp_path: Path) -> None:
-    disk = Disk(tmp_path, 15 * MB, *CONTINUOUS, *INCIDENTS)
-    storage = Storage(tmp_path, 10 * MB, disk.free)
-    assert storage.check(0) == []
-    assert not storage.has_room
-
-
-def test_no_room_if_files_cannot_be_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS)
-
-    def refuse(_: Path, *, missing_ok: bool) -> None:
-        raise PermissionError(1, "Operation not permitted")
-
-    monkeypatch.setattr(Path, "unlink", refuse)
-    storage = Storage(tmp_path, 10 * MB, disk.free, robot="001")
-    assert storage.check(0) == []
-    assert not storage.has_room
-    assert disk.names() == CONTINUOUS
 
 
 def test_a_file_that_vanishes_is_skipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

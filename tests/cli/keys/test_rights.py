@@ -15,6 +15,7 @@ import zenoh
 import zenoh.ext
 
 from cli.keys.access import Verb
+from cli.keys.machine_settings import ros_override
 from common import keys
 from common.bus.session import client_config
 from tools.rights_table import CLASSES, MINE, ROLES, may
@@ -49,9 +50,20 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mapping[str, 
         made = {"on board": zenoh.open(client_config(at(onboard)))}
         for role, member in certified.items():
             made[role] = zenoh.open(client_config(connecting(member, secured)))
+        made["ros of 001"].close()
+        made["ros of 001"] = zenoh.open(ros_config(site, secured))
         for session in made.values():
             closing.enter_context(session)
         yield made
+
+
+def ros_config(site: Site, endpoint: str) -> zenoh.Config:
+    """Return the configuration of a computer with ROS 2, from the printed override."""
+    config = zenoh.Config()
+    # As rmw_zenoh reads it: entries between semicolons, each a path and a JSON5 value.
+    for entry in ros_override(str(site.folder / "ros.laptop"), endpoint).split(";"):
+        config.insert_json5(*entry.split("=", 1))
+    return config
 
 
 def granted(role: str, verb: Verb, tried: tuple[str, ...] = KEYS) -> set[str]:

@@ -25,7 +25,6 @@ from common.settings import BusSettings, Shared
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
-KEY = "t2/v1/001/tel/bridge/velocity"
 ROBOT = profile("robot", "001")
 DRIVER = profile("driver", "anna", ("001",))
 
@@ -82,19 +81,6 @@ def connect(bus: BusSettings, endpoint: str, **tls: Any) -> zenoh.Session:
         whole = json.loads(config.get_json("transport/link/tls")) | tls
         config.insert_json5("transport/link/tls", json.dumps(whole))
     return zenoh.open(config)
-
-
-def test_a_member_can_connect_and_publish(site: Site, endpoint: str) -> None:
-    with connect(site.bus(DRIVER), endpoint) as one, connect(site.bus(ROBOT), endpoint) as other:
-        subscriber = other.declare_subscriber(KEY, zenoh.handlers.RingChannel(1))
-
-        def received() -> zenoh.Sample | None:
-            one.put(KEY, b"hello")
-            return subscriber.try_recv()
-
-        sample = wait_until(received, "a sample through the router")
-        assert sample is not None
-        assert sample.payload.to_bytes() == b"hello"
 
 
 @pytest.mark.parametrize("where", ["127.0.0.1", "localhost"])

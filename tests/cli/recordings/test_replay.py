@@ -1,5 +1,6 @@
 """``t2 replay`` on a real bus."""
 
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,11 @@ from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.conftest import buses, shared_router, tool
 from tests.cli.inspect.tool import Tool, pretend
+from tests.cli.processes import sets
 from tests.common.bus_fixture import BusFixture
 from tests.recorder import samples
 from tests.recorder.samples import bare, sample
+from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 __all__ = ["buses", "shared_router", "tool"]
@@ -128,8 +131,18 @@ def test_a_service_that_starts_ends_the_replay(
     assert f"safety of robot {buses.robot} is running" in result.err
 
 
-def test_frames_are_refused_for_a_real_board(path: Path, tool: Tool) -> None:
-    result = tool("replay", str(path), "--frames", "--set", "board.address=10.7.5.224")
+def test_a_bridge_receives_the_raw_frames(path: Path, tool: Tool) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bridge:
+        bridge.bind(("127.0.0.1", 0))
+        board, listen = free_port(socket.SOCK_DGRAM), bridge.getsockname()[1]
+        words = sets(f"board.port={board}", f"board.listen_ports=[{listen}, 9]")
+        result = tool("replay", str(path), "--frames", *FAST, *words)
+        assert (result.code, result.err) == (0, "played 5 messages\n")
+        received = [bridge.recvfrom(99) for _ in range(5)]
+        assert received == [(b"%d" % second, ("127.0.0.1", board)) for second in range(5)]
+        taken = sets(f"board.port={listen}")
+        assert "is a simulated one running?" in tool("replay", str(path), "--frames", *taken).err
+    result = tool("replay", str(path), "--frames", *sets("board.address=10.7.5.224"))
     assert result.code == 1
     assert "--frames: the board at 10.7.5.224 is a real one" in result.err
 

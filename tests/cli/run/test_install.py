@@ -14,6 +14,7 @@ from common.config import DEFAULT_FILE, Sources, load
 
 PREFIX = "/opt/t2/current"
 UNITS = "usr/local/lib/systemd/system"
+OPT_IN = "t2-ros2.service"  # lets ROS nodes drive
 
 
 def t2_install(root: Path, *words: str) -> int:
@@ -45,6 +46,9 @@ def test_all_units_except_the_simulator(tmp_path: Path, capsys: pytest.CaptureFi
         f"ExecStart={PREFIX}/bin/python -P -m services.safety --config /etc/t2/t2.toml"
         in (written[f"{UNITS}/t2-safety.service"])
     )
+    wants = " ".join(x for x in written[f"{UNITS}/t2.target"].splitlines() if "Wants=" in x)
+    assert {name for name in services if name not in wants} == {OPT_IN}
+    assert unit(written[f"{UNITS}/{OPT_IN}"])["Install"]["WantedBy"] == "t2.target"
     assert "AllowSuspend=no" in written["etc/systemd/sleep.conf.d/t2.conf"]
     assert written["etc/sysusers.d/t2.conf"].splitlines()[-1].startswith("u t2 ")
     message = capsys.readouterr().out
@@ -52,22 +56,18 @@ def test_all_units_except_the_simulator(tmp_path: Path, capsys: pytest.CaptureFi
     assert message.endswith("systemctl enable --now t2.target\n")
 
 
-def test_initial_settings_are_valid(tmp_path: Path) -> None:
-    t2_install(tmp_path)
-    sources = Sources(files=(DEFAULT_FILE, tmp_path / "etc/t2/t2.toml"), environ={})
-    config = load(Everything, sources).config
-    assert config.board.address == "10.7.5.224"
-    assert config.bus.endpoints == ("unixsock-stream//run/t2/bus.sock",)
-    assert config.recorder.folder == "/var/lib/t2/recordings"
-
-
-def test_existing_keys_are_used(tmp_path: Path) -> None:
+def test_initial_settings_are_valid_and_existing_keys_are_used(tmp_path: Path) -> None:
     keys = tmp_path / "etc/t2/keys/bus.toml"
     keys.parent.mkdir(parents=True)
     keys.write_text('[bus]\nlisten = ["unixsock-stream//run/t2/bus.sock", "tcp/127.0.0.1:7447"]\n')
     t2_install(tmp_path)
     command = unit(files(tmp_path)[f"{UNITS}/t2-router.service"])["Service"]["ExecStart"]
     assert command.endswith(" --config /etc/t2/t2.toml --config /etc/t2/keys/bus.toml")
+    sources = Sources(files=(DEFAULT_FILE, tmp_path / "etc/t2/t2.toml"), environ={})
+    config = load(Everything, sources).config
+    assert config.board.address == "10.7.5.224"
+    assert config.bus.endpoints == ("unixsock-stream//run/t2/bus.sock",)
+    assert config.recorder.folder == "/var/lib/t2/recordings"
 
 
 def test_the_link_to_this_environment_is_used(
@@ -221,28 +221,6 @@ def test_the_backoff_needs_a_recent_systemd(
 
 SERVICES = sorted(path.name for path in install.TEMPLATES.glob("t2-*.service"))
 REAL = [name for name in SERVICES if name != install.SIM]
-
-
-OPT_IN = "t2-ros2.service"  # lets ROS nodes drive
-
-
-@pytest.mark.parametrize("name", SERVICES)
-def test_the_target_wants_every_service_except_the_opt_in(name: str) -> None:
-    wanted = [line for line in install.template("t2.target").splitlines() if "Wants=" in line]
-    assert (name in " ".join(wanted)) == (name != OPT_IN)
-
-
-def test_the_gateway_starts_with_the_target_once_it_is_enabled() -> None:
-    assert unit(install.template(OPT_IN))["Install"]["WantedBy"] == "t2.target"
-
-
-def test_no_gateway_without_its_library(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(install, "find_spec", lambda name: None if name == "xxhash" else True)
-    t2_install(tmp_path)
-    assert "without t2-ros2.service: xxhash is not installed" in capsys.readouterr().out
-    assert f"{UNITS}/{OPT_IN}" not in files(tmp_path)
 
 
 @pytest.mark.parametrize("name", REAL)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from msgspec.structs import replace
 
 from cli.run import ports
 from cli.run.ports import Port, check_free, routers, wanted
@@ -97,11 +96,6 @@ def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
     check_free([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0)
 
 
-def test_an_address_of_another_host_is_an_error() -> None:
-    with pytest.raises(LinkError, match=r"192\.0\.2\.1:4002 .*cannot be bound: .*assign"):
-        check_free([Port("udp", "192.0.2.1", 4002, "bridge", "board.listen_ports")], 0.0)
-
-
 def test_ports_of_a_killed_stack_are_awaited() -> None:
     with contextlib.ExitStack() as leaving:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
@@ -126,13 +120,3 @@ def test_a_second_stack_starts_nothing(tmp_path: Path) -> None:
             assert "started" not in second.stderr
             assert "Traceback" not in second.stderr
         assert starts(log, "safety") == 1
-
-
-def test_default_ports() -> None:
-    config = replace(Everything(), bus=settings.BusSettings())
-    assert [str(port) for port in wanted(config, ALL)] == [
-        "TCP 127.0.0.1:7447 (bus.listen)",
-        "UDP 127.0.0.1:4002 (board.listen_ports)",
-        "UDP 127.0.0.1:4001 (board.listen_ports)",
-        "UDP 127.0.0.1:4003 (board.port)",
-    ]

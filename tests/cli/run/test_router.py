@@ -42,13 +42,6 @@ def test_the_router_has_threads_for_dead_links() -> None:
         wait_until(lambda: readers() >= 32, "threads that read")
 
 
-def test_an_address_of_another_host_is_an_error() -> None:
-    result = ran("router", "--insecure", *sets("bus.listen=tcp/192.0.2.1:7447"))
-    assert result.returncode == EXIT_LINK
-    assert result.stderr.startswith("t2 router: the router cannot listen on tcp/192.0.2.1:7447: ")
-    assert len(result.stderr.splitlines()) == 1
-
-
 def test_an_open_network_endpoint_needs_insecure(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -73,13 +66,6 @@ def test_write_the_configuration_to_a_file(
     assert capsys.readouterr().out == ""
     assert main(["router", "--print", str(tmp_path / "none" / "x")]) == EXIT_CONFIG
     assert "/none/x: cannot be written: No such file" in capsys.readouterr().err
-
-
-def test_defaults(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["router", "--print"]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed["listen"] == {"endpoints": ["tcp/127.0.0.1:7447"]}
-    assert "access_control" not in printed
 
 
 @pytest.mark.parametrize(

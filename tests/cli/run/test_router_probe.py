@@ -4,7 +4,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,12 +12,12 @@ import pytest
 import zenoh
 from msgspec.structs import replace
 
-from cli.run.router_probe import Attempts, RouterProbe
-from common.bus.session import answers, client_config, router, router_at
-from common.settings import BusSettings, Log
+from cli.run.router_probe import Attempts
+from common.bus.session import client_config, router_at
+from common.settings import BusSettings
 from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
-from verification.harness.bus import at, listening, router_process
+from verification.harness.bus import at, router_process
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
@@ -113,12 +112,6 @@ def _command(pid: int) -> bytes:
     return Path(f"/proc/{pid}/cmdline").read_bytes()
 
 
-def test_a_router_with_an_uplink_answers(endpoint: str) -> None:
-    where = listening(endpoint, "tcp/127.0.0.1:1")  # without a router there
-    with router(where):
-        assert answers(router_at(where))
-
-
 # --- a router that hangs ------------------------------------------------------------------------
 
 
@@ -162,10 +155,6 @@ def test_two_missed_attempts_in_a_row_are_a_hang(
     assert last is hung
 
 
-def test_no_router_no_answer(endpoint: str) -> None:
-    assert not answers(at(endpoint))
-
-
 def test_the_probe_connects_to_the_routers_own_endpoint() -> None:
     bus = BusSettings(listen=("tcp/0.0.0.0:1", "tcp/127.0.0.1:2"), connect=("tcp/127.0.0.1:3",),
               insecure=True)  # fmt: skip
@@ -173,22 +162,3 @@ def test_the_probe_connects_to_the_routers_own_endpoint() -> None:
     tls = replace(bus, listen=("tls/0.0.0.0:1", "unixsock-stream//x"), ca="a", certificate="b",
                   private_key="c", members="d")  # fmt: skip
     assert router_at(tls).endpoints == ("unixsock-stream//x",)
-
-
-def test_the_router_continues_without_a_probe(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    probe = RouterProbe(BusSettings(), Log())
-    tried = threading.Event()
-
-    def refused(*_: object, **__: object) -> None:
-        tried.set()
-        raise OSError(12, "Cannot allocate memory")
-
-    monkeypatch.setattr(subprocess, "Popen", refused)
-    thread = threading.Thread(target=probe.run, args=(lambda: None,))
-    thread.start()
-    assert tried.wait(PATIENCE_S)
-    probe.stop()
-    thread.join(PATIENCE_S)
-    assert not thread.is_alive()

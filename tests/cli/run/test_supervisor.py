@@ -79,18 +79,6 @@ def test_a_hopeless_process_stops_all_with_its_code(
     assert hopeless.returncode == code
 
 
-def test_a_killed_process_is_restarted(supervised: list[Supervisor]) -> None:
-    supervisor, child = one(supervised, *SLEEP)
-    supervisor.look(0.0)
-    assert child.process is not None
-    first = child.process.pid
-    kill(child)
-    assert supervisor.look(1.0) == 0
-    assert supervisor.look(1.0) == 0
-    assert child.process is not None
-    assert child.process.pid != first
-
-
 def test_a_safety_that_hangs_is_killed_and_restarted(
     supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -119,13 +107,6 @@ def test_a_safety_that_hangs_is_killed_and_restarted(
     assert (safety.process.pid != pids[0], safety.beat_s) == (True, None)
     assert odom.process is not None
     assert odom.process.pid == pids[1]
-
-
-def test_a_stopped_supervisor_starts_nothing(supervised: list[Supervisor]) -> None:
-    supervisor, child = one(supervised, *SLEEP)
-    supervisor.stop()
-    assert supervisor.run() == 0
-    assert child.process is None
 
 
 # --- stop ----------------------------------------------------------------------------------
@@ -175,18 +156,6 @@ def test_a_child_has_its_own_process_group(supervised: list[Supervisor]) -> None
 def test_a_child_of_a_dead_parent_does_not_run() -> None:
     made = subprocess.Popen(SLEEP, preexec_fn=partial(module._die_with_parent, 1))
     assert made.wait(5.0) == 1
-
-
-def test_output_is_written_to_the_file(tmp_path: Path, supervised: list[Supervisor]) -> None:
-    file = tmp_path / "log"
-    with file.open("wb") as output:
-        supervisor = Supervisor(
-            [("it", ["sh", "-c", "echo out; echo err >&2; sleep 1000"])], output
-        )
-        supervised.append(supervisor)
-        supervisor.look(0.0)
-        wait_until(lambda: len(file.read_text().split()) == 2, "both lines")
-    assert sorted(file.read_text().split()) == ["err", "out"]
 
 
 PARENT = """

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 from argparse import Namespace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from cli.__main__ import main
 from cli.run import up
 from cli.run.up import commands, driving, run, selected
-from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.cli_args import EXIT_CONFIG
 from common.errors import ConfigError
 from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
 from tests.cli.stack import STACK, ports, starts
@@ -62,21 +61,6 @@ def test_the_hint_reaches_the_same_bus(
     assert driving(Namespace(config=config, sets=sets)) == command
 
 
-def test_a_taken_port_starts_nothing(tmp_path: Path) -> None:
-    log = tmp_path / "log"
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
-        taken.bind(("127.0.0.1", 0))
-        port = taken.getsockname()[1]
-        words = sets(*ports(), f"board.listen_ports={port}", f"recorder.folder={tmp_path}")
-        with running(t2("up", "--no-sim", *words), log) as up:
-            assert up.wait(PATIENCE_S) == EXIT_LINK
-    message = log.read_text()
-    assert f"127.0.0.1:{port}" in message
-    assert "used by another program" in message
-    assert "Traceback" not in message
-    assert '"started"' not in message, "nothing may start before all ports are free"
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -105,19 +89,16 @@ def options(**given: object) -> Namespace:
     return Namespace(**({"no_sim": False, "world": None, "config": None, "sets": []} | given))
 
 
-def test_processes_in_order_of_dependency() -> None:
-    names = [name for name, _ in commands(options())]
-    assert names == ["router", "sim", "bridge", "safety", "odom"]
-
-
-def test_without_the_simulated_vehicle() -> None:
-    names = [name for name, _ in commands(options(no_sim=True, world="office"))]
-    assert names == ["router", "bridge", "safety", "odom"]
-
-
-def test_with_a_running_router() -> None:
-    names = [name for name, _ in commands(options(no_router=True))]
-    assert names == ["sim", "bridge", "safety", "odom"]
+@pytest.mark.parametrize(
+    ("given", "names"),
+    [
+        ({}, ["router", "sim", "bridge", "safety", "odom"]),
+        ({"no_sim": True, "world": "office"}, ["router", "bridge", "safety", "odom"]),
+        ({"no_router": True}, ["sim", "bridge", "safety", "odom"]),
+    ],
+)
+def test_processes_in_order_of_dependency(given: dict[str, object], names: list[str]) -> None:
+    assert [name for name, _ in commands(options(**given))] == names
 
 
 def test_settings_sources_are_passed_to_all_processes() -> None:
