@@ -8,10 +8,9 @@ first interface.
 import io
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from common.errors import RobotError
 
@@ -19,7 +18,6 @@ PCAP_MAGICS = tuple(
     bytes.fromhex(magic)
     for magic in ("a1b2c3d4", "d4c3b2a1", "a1b23c4d", "4d3cb2a1", "0a0d0d0a")  # the last: pcapng
 )
-RAW_IP = (12, 14, 101, 228, 229)  # link types without a link header, from tcpdump.org
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +80,26 @@ def _hex(text: str) -> bytes | None:
 
 def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
     try:
-        from dpkt import dpkt, ip, ip6, pcap, udp, utils  # type: ignore[import-untyped]
+        from dpkt import dpkt, ethernet, ip, pcap, sll, sll2, udp, utils  # type: ignore[import-untyped]
     except ImportError:
         raise RobotError(
             "reading a capture needs dpkt; `make` installs it, or pip install -e '.[inspect]'"
         ) from None
+    links = {
+        pcap.DLT_EN10MB: ethernet.Ethernet,
+        pcap.DLT_LINUX_SLL: sll.SLL,  # of `tcpdump -i any`
+        pcap.DLT_LINUX_SLL2: sll2.SLL2,
+    }
     number = 0
     try:
         reader = pcap.UniversalReader(io.BytesIO(content))
-        open_link = _link(name, reader.datalink())
+        if reader.datalink() not in links:
+            raise RobotError(
+                f"{name}: unsupported link type {reader.datalink()}; capture on Ethernet"
+            )
         for number, (_, packet) in enumerate(reader, 1):
-            network = open_link(packet)
-            while not isinstance(network, (ip.IP, ip6.IP6, bytes)):
+            network = links[reader.datalink()](packet)
+            while not isinstance(network, (ip.IP, bytes)):
                 network = network.data
             if not isinstance(network, bytes) and isinstance(network.data, udp.UDP):
                 segment = network.data
@@ -102,22 +108,3 @@ def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
                 yield Datagram(f"packet {number} {source} > {target}", bytes(segment.data))
     except (dpkt.Error, ValueError, KeyError) as error:
         raise RobotError(f"{name}: invalid after packet {number}: {error}") from None
-
-
-def _link(name: str, kind: int) -> Callable[[bytes], Any]:
-    """Return the parser of a packet's link header."""
-    from dpkt import ethernet, ip, ip6, loopback, pcap, sll, sll2
-
-    def raw(packet: bytes) -> Any:
-        return (ip6.IP6 if packet[:1] >= b"\x60" else ip.IP)(packet)
-
-    links: dict[int, Callable[[bytes], Any]] = {
-        pcap.DLT_EN10MB: ethernet.Ethernet,
-        pcap.DLT_LINUX_SLL: sll.SLL,
-        pcap.DLT_LINUX_SLL2: sll2.SLL2,
-        pcap.DLT_NULL: loopback.Loopback,
-        **dict.fromkeys(RAW_IP, raw),
-    }
-    if kind not in links:
-        raise RobotError(f"{name}: unsupported link type {kind}; capture on Ethernet")
-    return links[kind]

@@ -4,8 +4,7 @@
 lines, pcap and pcapng; ``decode`` also reads a hex string.
 
 The same id means one frame from the PC and another one from the board. The sizes differ, except for
-the two emergency brake switches. So each frame is decoded for both senders unless the sender is
-known.
+the two emergency brake switches. So each frame is decoded for both senders.
 """
 
 import argparse
@@ -16,7 +15,6 @@ from typing import Any, get_args
 
 import msgspec
 
-from cli.inspect import output
 from cli.wire import capture, crc
 from common.cli_args import add_sources, sources
 from common.config import load
@@ -29,7 +27,6 @@ from common.wire.framing import Framing, Reason, Received, Rejected
 from common.wire.reports import FROM_BOARD, SONAR_FAULT_MM
 
 TABLES: dict[str, Kinds] = {"pc": TO_BOARD, "board": FROM_BOARD}
-SENDERS = (*TABLES, "both")
 
 # If no sender matches, the reason of the latest check is the most useful one.
 FURTHEST = (
@@ -52,8 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "print frames, one per line, with the reason for each invalid run of bytes"
     decode = tools.add_parser("decode", help=text, description=text)
     decode.add_argument("source", metavar="HEX|FILE|-", help="hex, a pcap, hex lines, or stdin")
-    decode.add_argument("--from", dest="sender", choices=SENDERS, default="both")
-    decode.add_argument("--json", action="store_true", help="one JSON object per line")
     add_sources(decode)
     text = "find the 16-bit CRC of captured frames"
     identify = tools.add_parser("identify-crc", help=text, description=text)
@@ -71,12 +66,9 @@ def decode(options: argparse.Namespace) -> int:
     framing = Framing(wire.crc, wire.crc_covers)
     bad = 0
     for datagram in capture.read(options.source):
-        for part in parts(framing, datagram.data, options.sender):
+        for part in parts(framing, datagram.data):
             bad += isinstance(part, Bad)
-            if options.json:
-                output.line(as_json(part, datagram.where))
-            else:
-                print(f"{datagram.where} {as_text(part, wire)}".lstrip())
+            print(f"{datagram.where} {as_text(part, wire)}".lstrip())
     return 1 if bad else 0
 
 
@@ -109,12 +101,11 @@ class Bad:
     detail: str
 
 
-def parts(framing: Framing, datagram: bytes, sender: str) -> Iterator[Good | Bad]:
+def parts(framing: Framing, datagram: bytes) -> Iterator[Good | Bad]:
     """Yield the parts of a datagram in order; together they contain all its bytes."""
-    tables = TABLES if sender == "both" else {sender: TABLES[sender]}
     offset = 0
     while offset < len(datagram):
-        read = {name: framing.part_at(offset, datagram, kinds) for name, kinds in tables.items()}
+        read = {name: framing.part_at(offset, datagram, kinds) for name, kinds in TABLES.items()}
         part = _best(offset, read)
         yield part
         offset += len(part.raw)
@@ -136,28 +127,12 @@ def as_text(part: Good | Bad, wire: Wire) -> str:
         return f"+{part.offset:<4} BAD {part.reason}: {part.detail}: {part.raw.hex()}"
     senders = " or ".join(part.frames)
     names = " or ".join(type(frame).__name__ for frame in part.frames.values())
-    commands = isinstance(next(iter(part.frames.values())), MotionCommand)
+    frame = next(iter(part.frames.values()))  # frames of two senders have the same fields
+    commands = isinstance(frame, MotionCommand)
     unit = wire.command_angular_unit if commands else wire.feedback_angular_unit
-    texts = [_text(name, value, unit) for name, value in _fields(part)]
+    fields = msgspec.structs.asdict(frame).items()
+    texts = [_text(name, value, unit) for name, value in fields]
     return f"+{part.offset:<4} {senders:<5} {names} {', '.join(texts)}".rstrip()
-
-
-def as_json(part: Good | Bad, where: str) -> dict[str, Any]:
-    """Return a part as a JSON object."""
-    place = {"where": where, "offset": part.offset, "hex": part.raw.hex()}
-    if isinstance(part, Bad):
-        return place | {"reason": part.reason, "detail": part.detail}
-    return place | {
-        "from": list(part.frames),
-        "frame": [type(frame).__name__ for frame in part.frames.values()],
-        "fields": dict(_fields(part)),
-    }
-
-
-def _fields(part: Good) -> list[tuple[str, Any]]:
-    """Return the fields; frames of two possible senders have the same fields."""
-    frame = next(iter(part.frames.values()))
-    return list(msgspec.structs.asdict(frame).items())
 
 
 def _text(name: str, value: Any, unit: AngularUnit) -> str:

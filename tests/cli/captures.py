@@ -4,7 +4,7 @@ import io
 import socket
 from collections.abc import Iterable
 
-from dpkt import ethernet, ip, ip6, pcap, pcapng, udp  # type: ignore[import-untyped]
+from dpkt import ethernet, ip, pcap, pcapng, udp  # type: ignore[import-untyped]
 
 from common.wire.commands import DistanceQuery, MotionCommand, MotionKind
 from common.wire.framing import Framing
@@ -23,22 +23,15 @@ def packet(data: bytes, source: str = BOARD, target: str = PC) -> ip.IP:
     """Return an IP packet from port 4002 to port 4001."""
     segment = udp.UDP(sport=4002, dport=4001, data=data)
     segment.ulen = len(segment)
-    if ":" in source:
-        ends = {"src": address(source), "dst": address(target)}
-        return ip6.IP6(nxt=ip.IP_PROTO_UDP, plen=len(segment), data=segment, **ends)
-    ends = {"src": address(source), "dst": address(target)}
+    ends = {"src": socket.inet_aton(source), "dst": socket.inet_aton(target)}
     whole = ip.IP(p=ip.IP_PROTO_UDP, data=segment, **ends)
     whole.len = len(whole)
     return whole
 
 
-def address(text: str) -> bytes:
-    return socket.inet_pton(socket.AF_INET6 if ":" in text else socket.AF_INET, text)
-
-
 def on_ethernet(network: ip.IP) -> bytes:
-    kind = ethernet.ETH_TYPE_IP6 if isinstance(network, ip6.IP6) else ethernet.ETH_TYPE_IP
-    return bytes(ethernet.Ethernet(type=kind, data=network)).ljust(60, b"\0")  # padded, as on cable
+    # Padded, as on the cable.
+    return bytes(ethernet.Ethernet(type=ethernet.ETH_TYPE_IP, data=network)).ljust(60, b"\0")
 
 
 def as_pcap(packets: Iterable[bytes], link: int = pcap.DLT_EN10MB) -> bytes:

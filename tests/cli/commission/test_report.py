@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from cli.commission.report import Checked, Report, Verdict, judged, render, seconds
+from cli.commission.report import Checked, Report, Verdict, failed, judged, render, seconds
 
 GOOD = Checked("Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
 SKIPPED = Checked("Turn", Verdict("skipped", "no blocks | today\nsorry"))
@@ -84,6 +84,7 @@ def test_a_partial_checkout_may_pass() -> None:
 
 def test_a_verdict_is_failed_by_any_problem() -> None:
     assert judged(["", "A.", "B."], "good") == Verdict("failed", "A. B.")
+    assert failed("A.") == judged(["A."], "good")
     assert judged(["", ""], "good") == Verdict("passed", "good")
 
 

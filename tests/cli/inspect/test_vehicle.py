@@ -136,8 +136,9 @@ def test_without_messages_the_rest_is_unknown() -> None:
     assert found(seen(newest=silent), "link") == [
         ("unknown", "the bridge does not report the board", "")
     ]
-    absent = dict.fromkeys((keys.BUMPER.path, keys.ULTRASONIC.path), NO_MESSAGE)
-    assert not [*found(seen(newest=absent), "bumper"), *found(seen(newest=absent), "sonar")]
+    left = keys.DRIVER.path.format(side="left")
+    absent = seen(newest=dict.fromkeys((keys.BUMPER.path, keys.ULTRASONIC.path, left), NO_MESSAGE))
+    assert [len(found(absent, where)) for where in ("bumper", "sonar", "drivers")] == [0, 0, 1]
 
 
 def test_frames_rejected_and_unsent_during_the_observation() -> None:

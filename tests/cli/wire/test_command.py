@@ -1,6 +1,5 @@
 """``t2 wire``: output, exit codes and errors; frames as text, with the reasons of invalid runs."""
 
-import json
 from pathlib import Path
 
 import msgspec
@@ -9,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cli.__main__ import main
-from cli.wire.command import Bad, Good, as_json, as_text, parts
+from cli.wire.command import Bad, Good, as_text, parts
 from common.cli_args import EXIT_CONFIG
 from common.settings import Wire
 from common.wire import commands as c
@@ -35,7 +34,7 @@ def test_decode_shows_the_place_in_a_capture(
 ) -> None:
     file = tmp_path / "trip.pcap"
     file.write_bytes(as_pcap([on_ethernet(packet(VELOCITY + DISTANCE))]))
-    assert main(["wire", "decode", "--from", "board", str(file)]) == 0
+    assert main(["wire", "decode", str(file)]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith("packet 1 10.7.5.224:4002 > 10.7.5.220:4001 +0    board Velocity")
     assert "+12   board DistanceReport distance 1234 mm, heading -90.5 deg" in second
@@ -44,13 +43,6 @@ def test_decode_shows_the_place_in_a_capture(
 def test_an_invalid_run_gives_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "decode", RUN.hex() + "ff"]) == 1
     assert "+13   BAD no_magic" in capsys.readouterr().out
-
-
-def test_json_lines(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["wire", "decode", "--json", (RUN + QUERY).hex()]) == 0
-    tables = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert [table["frame"] for table in tables] == [["MotionCommand"], ["DistanceQuery"]]
-    assert tables[0]["fields"] == {"kind": 1, "linear_mmps": 500, "angular_raw": 300}
 
 
 def test_wire_settings_apply(capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,14 +68,9 @@ def test_identify_crc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert 'set: wire.crc = "crc-16", wire.crc_covers = "payload"' in out
 
 
-def test_identify_crc_without_evidence_gives_exit_code_1(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_identify_crc_without_evidence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "identify-crc", QUERY.hex()]) == 1
     assert "inconclusive" in capsys.readouterr().out
-
-
-def test_identify_crc_without_frames(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "identify-crc", "0102"]) == 1
     assert "the magic 47 53 is missing" in capsys.readouterr().err
 
@@ -94,8 +81,8 @@ def test_identify_crc_without_frames(capsys: pytest.CaptureFixture[str]) -> None
 framing = Framing()
 
 
-def lines(raw: bytes, sender: str = "both", wire: Wire | None = None) -> list[str]:
-    return [as_text(part, wire or Wire()) for part in parts(framing, raw, sender)]
+def lines(raw: bytes, wire: Wire | None = None) -> list[str]:
+    return [as_text(part, wire or Wire()) for part in parts(framing, raw)]
 
 
 TEXTS = [
@@ -138,21 +125,6 @@ def test_the_other_angular_unit() -> None:
         assert texts[1 - number].endswith("angular 150.0 deg/s")
 
 
-@pytest.mark.parametrize(
-    ("sender", "name"), [("pc", "BumperBrakeSet"), ("board", "BumperBrakeReport")]
-)
-def test_a_known_sender(sender: str, name: str) -> None:
-    (line,) = lines(framing.pack(c.BumperBrakeSet(True)), sender)
-    assert line == f"+0    {sender:<5} {name} on yes"
-
-
-@pytest.mark.parametrize("sender", ["pc", "board"])
-def test_the_other_senders_frames_are_bad(sender: str) -> None:
-    other = REPORTS[0] if sender == "pc" else COMMANDS[0]
-    (part,) = parts(framing, framing.pack(other), sender)
-    assert isinstance(part, Bad)
-
-
 def test_frames_and_garbage_with_their_offsets() -> None:
     raw = framing.pack(c.DistanceQuery()) + b"\x01\x02" + framing.pack(r.BumperReport(False))
     assert lines(raw) == [
@@ -165,45 +137,25 @@ def test_frames_and_garbage_with_their_offsets() -> None:
 def test_the_reason_of_the_latest_check() -> None:
     raw = bytearray(framing.pack(r.DistanceReport(5, 5)))
     raw[-1] ^= 1
-    (part,) = parts(framing, bytes(raw), "both")
+    (part,) = parts(framing, bytes(raw))
     assert isinstance(part, Bad)
     assert part.reason == "bad_crc"  # and not the wrong size of a query
-
-
-def test_json() -> None:
-    good, bad = parts(framing, framing.pack(r.BumperBrakeReport(True)) + b"\xff", "both")
-    assert json.loads(json.dumps(as_json(good, "line 1"))) == {
-        "where": "line 1",
-        "offset": 0,
-        "hex": "475309000476c1c001",
-        "from": ["pc", "board"],
-        "frame": ["BumperBrakeSet", "BumperBrakeReport"],
-        "fields": {"on": True},
-    }
-    assert json.loads(json.dumps(as_json(bad, "line 1"))) == {
-        "where": "line 1",
-        "offset": 9,
-        "hex": "ff",
-        "reason": "no_magic",
-        "detail": "does not start with 47 53",
-    }
 
 
 @given(st.lists(st.sampled_from([*COMMANDS, *REPORTS]).map(framing.pack) | st.binary(max_size=9)))
 def test_every_byte_is_in_a_part(pieces: list[bytes]) -> None:
     raw = b"".join(pieces)
-    found = list(parts(framing, raw, "both"))
+    found = list(parts(framing, raw))
     assert b"".join(part.raw for part in found) == raw
     assert [part.offset for part in found] == [
         sum(len(before.raw) for before in found[:i]) for i in range(len(found))
     ]
     for part in found:
         assert as_text(part, Wire())
-        assert json.dumps(as_json(part, ""))
 
 
 @pytest.mark.parametrize("frame", [*COMMANDS, *REPORTS])
 def test_every_frame_is_known(frame: Frame) -> None:
-    (part,) = parts(framing, framing.pack(frame), "both")
+    (part,) = parts(framing, framing.pack(frame))
     assert isinstance(part, Good)
     assert frame in part.frames.values()
