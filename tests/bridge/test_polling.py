@@ -102,6 +102,7 @@ def test_when_the_next_is_due(
         polled.due(tick * MS)
         polled.answered("bumper", tick * MS)
         assert polled.queries["bumper"].due_ns == next_tick * MS
+        assert isinstance(polled.queries["bumper"].due_ns, int)
 
 
 @pytest.mark.parametrize("names", [(), ("bumper",)])
@@ -206,6 +207,13 @@ def test_an_odd_period_is_halved_three_times() -> None:
     for behind_ns in (0, DOUBLE):
         losses.on_answer(2 * PERIOD + MS + behind_ns)
     assert losses.lost(3 * PERIOD) == 1
+
+
+def test_what_left_the_window_is_forgotten_without_being_asked_for() -> None:
+    losses = Losses(PERIOD, TIMEOUT, WINDOW)
+    for number in range(100):
+        losses.on_poll(number * PERIOD)
+    assert len(losses._lost_ns) == 11
 
 
 class Line(RuleBasedStateMachine):

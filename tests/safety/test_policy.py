@@ -310,6 +310,16 @@ def test_being_pushed_off_the_bumper_uses_up_no_way() -> None:
     assert fixture.state.release.travelled == 0.0
 
 
+def test_an_old_velocity_is_no_runaway() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.linear = 0.9
+    fixture.tick()
+    fixture.muted = {"velocity"}
+    fixture.tick(40)
+    assert "silent" in fixture.state.latches
+    assert "runaway" not in fixture.state.latches
+
+
 @pytest.mark.parametrize(
     ("linear", "angular", "trips"),
     [
@@ -404,7 +414,7 @@ def test_a_new_contact_brakes_first_as_its_decision_does(latched_by: int | None)
 
 def test_other_samples_yield_one_motion() -> None:
     fixture = PolicyFixture().running(0.3)
-    fixture.tick()
+    assert fixture.tick().refused == ""
     assert len(fixture.motions) == 1
     fixture = hit()  # a release may be moving the vehicle off the obstacle
     fixture.tick()

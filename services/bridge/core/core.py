@@ -31,7 +31,7 @@ from common.errors import WireError
 from common.freshness import NS_PER_S, Latest
 from common.wire import commands, reports
 from common.wire.frame import Frame, Side
-from common.wire.framing import Framing, Received
+from common.wire.framing import Framing, Received, Rejected
 from services.bridge.config import Bridge as Settings
 from services.bridge.config import BridgeConfig
 from services.bridge.core.calls import Calls
@@ -47,6 +47,7 @@ Handler = Callable[[Any, bytes, int], Outputs]  # frame, raw bytes, receive time
 # The lease, the silence of the board and the guard's patience are ten ticks each.
 TICK_MAX_S = 0.02
 LINK_NS = NS_PER_S * 19 // 100  # half a tick less than 0.2 s: the tick that is due may come early
+PRESSED = reports.BumperReport(True)
 STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
 ASKED: dict[str, type[Frame]] = {
     "bumper": reports.BumperReport,
@@ -96,9 +97,6 @@ class Core:
         )
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message
-        pressed = reports.BumperReport(True)
-        # 1 equivalent mutant: without its bytes a hit is read first.
-        self._hit = Received(pressed, self._framing.pack(pressed))
         self._mileage: Latest[m.Mileage] | None = None
         self._faults: dict[Side, int] = {}
         self._frames: Counter[str] = Counter()  # since the last second
@@ -126,37 +124,24 @@ class Core:
 
     def datagram(self, datagram: bytes, port: int, now_ns: int) -> Outputs:
         """Process a datagram: BRAKE for a new hit, its report, then the other frames."""
-        hit = self._new_hit(datagram)
+        parts = self._framing.read(datagram, reports.FROM_BOARD)
+        hits = [one for one in parts if isinstance(one, Received) and one.frame == PRESSED]
+        hit = hits[0] if hits and not self._bumper.pressed else None
         if hit is not None:
             yield from self._on_frame(hit, port, now_ns)
-        for part in self._framing.read(datagram, reports.FROM_BOARD):
-            if part == hit:
-                # 1 equivalent mutant: no part is an empty text.
-                hit = None  # processed already
-                self._bumper.take(True)  # clear samples before it do not count
-            elif isinstance(part, Received):
-                yield from self._on_frame(part, port, now_ns)
-            else:
+        for part in parts:
+            if isinstance(part, Rejected):
                 self.rejected[part.reason] += 1
-
-    def _new_hit(self, datagram: bytes) -> Received | None:
-        """Return the first frame with a pressed bumper, unless it is known to be pressed."""
-        if self._bumper.pressed:
-            return None
-        if datagram == self._hit.raw:  # the usual one needs no reading
-            return self._hit
-        if reports.BumperReport.OPENING not in datagram:
-            return None
-        for part in self._framing.read(datagram, reports.FROM_BOARD):
-            if isinstance(part, Received) and part.frame == self._hit.frame:
-                return part
-        return None
+            elif part is hit:
+                self._bumper.take(True)  # clear samples before it do not count
+            else:
+                yield from self._on_frame(part, port, now_ns)
 
     def _on_frame(self, part: Received, port: int, now_ns: int) -> Outputs:
         frame, kind = part.frame, type(part.frame)
         if not self._ports.takes(kind, port, now_ns, urgent=self._is_urgent(frame)):
             self._counters["other_port"] += 1
-            if frame == self._hit.frame:
+            if frame == PRESSED:
                 self._bumper.take(True)  # clear samples count only if neither port shows a hit
             return
         try:
