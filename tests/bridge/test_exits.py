@@ -38,13 +38,6 @@ def test_a_second_signal_brakes_before_the_bridge_ends(bridge: BridgeFixture) ->
     bridge.board.wait_for(MotionKind.BREAK)
 
 
-def test_a_vehicle_that_does_not_stop_is_left_with_a_break(bridge: BridgeFixture) -> None:
-    bridge.drive()
-    bridge.board.speed_mmps = 500
-    assert end(bridge, signal.SIGTERM) == 0
-    bridge.board.wait_for(MotionKind.BREAK)
-
-
 @pytest.fixture
 def _signals() -> Iterator[None]:
     """Give the handlers back that ``serve`` replaces."""

@@ -200,27 +200,6 @@ def test_at_start_the_limit_counts_from_the_first_velocity() -> None:
     assert board.late()
 
 
-def dither(board: Board, seconds: float, linear: float | None) -> float | None:
-    """Alternate motions of 0.04 s and stops of 0.4 s; return when it is late."""
-    began_ns = board.now_ns
-    while board.now_ns - began_ns < seconds * NS_PER_S:
-        for tick in range(22):
-            board.step(linear, moves=tick < 2)
-            if board.late():
-                return (board.now_ns - began_ns) / NS_PER_S
-    return None
-
-
-@pytest.mark.parametrize("linear", [0.3, None])
-def test_short_motions_do_not_postpone_the_limit(linear: float | None) -> None:
-    board = stopping(0.3)
-    board.run(0.1, 0.3)
-    late_s = dither(board, 60.0, linear)
-    assert late_s is not None
-    assert late_s < 1.2
-    assert dither(Board(), 2.0, None) is None  # no velocity was known yet
-
-
 @pytest.mark.parametrize(("ticks", "renewed"), [(1, False), (24, False), (25, True)])
 def test_a_motion_of_half_a_second_renews_the_limit(ticks: int, renewed: bool) -> None:
     board = stopping(0.3)
@@ -303,10 +282,3 @@ def test_a_vehicle_that_left_has_to_stop_anew_and_is_held_until_it_drives() -> N
     assert not board.run(5.0)
     assert board.state.rolls
     assert not board.step(0.3, moves=True).rolls
-
-
-def test_a_commanded_motion_is_no_uncommanded_one() -> None:
-    board = standing()
-    for _ in range(50):
-        board.distance += 0.02
-        assert not board.step(1.0, moves=True).left
