@@ -32,42 +32,32 @@ def probe(trip: RoundTrip, number: int, sent_s: float, took_s: float) -> None:
     trip.answered(number, at(sent_s + took_s))
 
 
-def test_before_the_first_answer_the_delay_is_unknown(trip: RoundTrip) -> None:
-    assert trip.refusal(at(10)) == UNKNOWN
-    trip.sent(1, at(10))
-    assert trip.refusal(at(10)) == UNKNOWN
+SLOW_ONCE = [(10.0, 0.5), *((10.5 + number * PROBE_S, 0.01) for number in range(2, 30))]
 
 
-@pytest.mark.parametrize(("took_s", "counts"), [(0.0, True), (0.15, True), (0.151, False)])
-def test_the_limit_applies_to_the_round_trip(trip: RoundTrip, took_s: float, counts: bool) -> None:
-    probe(trip, 1, 10, took_s)
-    assert (trip.refusal(at(10 + took_s)) == "") is counts
-
-
-def test_a_refusal_names_the_round_trip_and_the_limit(trip: RoundTrip) -> None:
-    probe(trip, 1, 10, 0.42)
-    assert trip.refusal(at(10.42)) == "terminal too slow: 0.42 s, allowed 0.15 s"
-
-
-def test_a_key_before_the_answer_may_be_older_than_the_query(trip: RoundTrip) -> None:
-    probe(trip, 1, 10, 0.1)
-    assert trip.refusal(at(10.099)) == UNKNOWN
-    assert trip.refusal(at(10.1)) == ""
-
-
-def test_silence_counts_as_slow(trip: RoundTrip) -> None:
-    probe(trip, 1, 10, 0.01)
-    last_s = 10 + LIMIT_S + 2 * PROBE_S
-    assert trip.refusal(at(last_s)) == ""
-    assert "too slow: 0.16 s" in trip.refusal(at(last_s + 0.01))
-
-
-def test_one_slow_answer_counts_for_a_while(trip: RoundTrip) -> None:
-    probe(trip, 1, 10, 0.5)
-    for number in range(2, 30):
-        probe(trip, number, 10.5 + number * PROBE_S, 0.01)
-    assert "0.50 s" in trip.refusal(at(10.5 + RECOVER_S))
-    assert trip.refusal(at(10.501 + RECOVER_S)) == ""
+@pytest.mark.parametrize(
+    ("answers", "at_s", "refusal"),
+    [
+        ([], 10.0, UNKNOWN),
+        ([(10.0, 0.0)], 10.0, ""),
+        ([(10.0, 0.15)], 10.15, ""),
+        ([(10.0, 0.151)], 10.151, "terminal too slow: 0.15 s, allowed 0.15 s"),
+        ([(10.0, 0.42)], 10.42, "terminal too slow: 0.42 s, allowed 0.15 s"),
+        ([(10.0, 0.1)], 10.099, UNKNOWN),  # may be older than the query
+        ([(10.0, 0.01)], 10 + LIMIT_S + 2 * PROBE_S, ""),
+        ([(10.0, 0.01)], 10.01 + LIMIT_S + 2 * PROBE_S, "too slow: 0.16 s"),  # silence
+        (SLOW_ONCE, 10.5 + RECOVER_S, "too slow: 0.50 s"),
+        (SLOW_ONCE, 10.501 + RECOVER_S, ""),
+    ],
+)
+def test_a_key_is_refused_by_the_answers_before_it(
+    trip: RoundTrip, answers: list[tuple[float, float]], at_s: float, refusal: str
+) -> None:
+    trip.sent(0, at(9.9))  # without an answer
+    for number, (sent_s, took_s) in enumerate(answers, 1):
+        probe(trip, number, sent_s, took_s)
+    assert refusal in trip.refusal(at(at_s))
+    assert bool(trip.refusal(at(at_s))) is bool(refusal)
 
 
 def test_answers_out_of_order_and_unknown_ones_are_ignored(trip: RoundTrip) -> None:
