@@ -1,8 +1,8 @@
 """Retention policy: selects the recordings to remove when the disk runs full. Pure.
 
 Continuous recordings are removed first, then incidents, the oldest of each first. The newest
-recording of each kind is kept, and so are files that are marked or still being written. Files that
-the recorder did not name itself are never removed.
+recording of each kind is kept, and so are the recorder's latest files and those that are marked.
+Files that the recorder did not name itself are never removed.
 """
 
 import re
@@ -20,7 +20,7 @@ class StoredFile:
 
     name: str
     size: int  # bytes
-    kept: bool = False  # marked, or still being written
+    kept: bool = False  # marked, or the recorder's latest
 
 
 def removable(files: Iterable[StoredFile], robot: str) -> list[StoredFile]:

@@ -60,16 +60,6 @@ def test_a_flood_on_one_key_removes_no_sample_of_the_others(files: Files, count:
     assert [each for each in times if each != 15.0] == [10.0, 11.0, 12.0, 13.0, 14.0, 16.0]
 
 
-def test_after_a_huge_sample_the_next_largest_key_loses_samples() -> None:
-    buffer = RingBuffer(100 * NS_PER_S, 10 * (OVERHEAD + 10))
-    for number in range(9):
-        buffer.add(bare("tel/x", b"%010d" % number))
-    buffer.add(bare("tel/y", bytes(10)))
-    buffer.add(bare("tel/huge", bytes(10 * (OVERHEAD + 10))))
-    buffer.add(bare("evt/y", bytes(10)))
-    assert kept(buffer) == [*(b"%010d" % number for number in range(1, 9)), bytes(10), bytes(10)]
-
-
 def test_a_slow_disk_loses_no_sample_of_a_dump(files: Files) -> None:
     box = box_of(files)
     box.add(at(0))

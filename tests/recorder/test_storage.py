@@ -1,15 +1,8 @@
 """File names, free space and removal of old recordings."""
 
-import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
-import pytest
-
-from common.settings import Vehicle
-from services.recorder.mcap_codec import Encoder
 from services.recorder.storage import MB, RETRY_NS, Storage
-from services.recorder.writer import RecordingWriter
 from tests.recorder.files_fixture import CONTINUOUS, INCIDENTS, names
 from tests.recorder.samples import BEGIN_NS
 
@@ -79,27 +72,11 @@ def test_room_is_made_with_hysteresis(tmp_path: Path) -> None:
     assert not storage.has_room
 
 
-def test_room_below_the_hysteresis_is_enough_after_a_removal(tmp_path: Path) -> None:
-    disk = Disk(tmp_path, 15 * MB, *CONTINUOUS)
-    storage = Storage(tmp_path, 14 * MB, disk.free, robot="001")
-    storage.has_room = False
-    assert names(storage.check(0)) == CONTINUOUS[:2]
-    assert storage.has_room
-
-
 def test_a_file_with_a_keep_mark_stays(tmp_path: Path) -> None:
     disk = Disk(tmp_path, 12 * MB, *INCIDENTS)
     (tmp_path / f"{INCIDENTS[0]}.keep").touch()
     Storage(tmp_path, 10 * MB, disk.free, robot="001").check(0)
     assert disk.names() == sorted([INCIDENTS[0], INCIDENTS[2], f"{INCIDENTS[0]}.keep"])
-
-
-def test_an_open_file_stays(tmp_path: Path) -> None:
-    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS[1:])
-    writing = RecordingWriter(tmp_path / CONTINUOUS[0], Encoder(Vehicle()), {})
-    Storage(tmp_path, 10.5 * MB, disk.free, robot="001").check(0)
-    assert disk.names() == [CONTINUOUS[0], CONTINUOUS[2]]
-    writing.close()
 
 
 def test_the_latest_file_of_this_process_stays_whatever_its_clock(tmp_path: Path) -> None:
@@ -110,11 +87,3 @@ def test_the_latest_file_of_this_process_stays_whatever_its_clock(tmp_path: Path
     storage.check(0)
     assert began.exists()
     assert disk.names() == sorted([began.name, INCIDENTS[2]])
-
-
-def test_a_file_that_vanishes_is_skipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / CONTINUOUS[0]).symlink_to("nowhere")
-    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS[1:])
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=9 * MB))
-    assert names(Storage(tmp_path, 10 * MB, robot="001").check(0)) == CONTINUOUS[1:2]
-    assert disk.names() == [CONTINUOUS[0], CONTINUOUS[2]]

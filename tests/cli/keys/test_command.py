@@ -1,12 +1,11 @@
 """``t2 keys`` from the command line: life cycle of a certificate, and errors."""
 
-import os
-import pty
 import re
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +13,7 @@ from cli.__main__ import main
 from cli.keys.member_list import CA_DAYS, DAY_S
 from common.cli_args import EXIT_CONFIG
 from common.members import read
-from tests.cli.processes import PATIENCE_S, t2
+from tests.cli.processes import PATIENCE_S
 
 
 class Keys:
@@ -44,10 +43,15 @@ class Keys:
 
 
 @pytest.fixture
-def keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Keys:
-    made = Keys(tmp_path / "keys", capsys)
-    made.run("init", "--site", "berlin")
-    return made
+def empty(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Keys:
+    """Without an authority."""
+    return Keys(tmp_path / "keys", capsys)
+
+
+@pytest.fixture
+def keys(empty: Keys) -> Keys:
+    empty.run("init", "--site", "berlin")
+    return empty
 
 
 def test_life_cycle_of_a_certificate(keys: Keys) -> None:
@@ -136,12 +140,9 @@ def test_an_empty_serial_revokes_nothing(keys: Keys, capsys: pytest.CaptureFixtu
     "words",
     [("issue", "viewer", "v"), ("renew", "viewer", "v"), ("revoke", "viewer", "v"), ("list",)],
 )
-def test_without_an_authority(
-    words: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    message = Keys(tmp_path / "none", capsys).run(*words, code=1)
-    assert "none has no CA; `t2 keys init` creates one" in message
-    assert not (tmp_path / "none").exists()
+def test_without_an_authority(words: tuple[str, ...], empty: Keys) -> None:
+    assert "keys has no CA; `t2 keys init` creates one" in empty.run(*words, code=1)
+    assert not empty.folder.exists()
 
 
 def test_an_expired_authority(keys: Keys, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,63 +161,32 @@ def test_an_expired_authority(keys: Keys, monkeypatch: pytest.MonkeyPatch) -> No
 # --- the passphrase -----------------------------------------------------------------------------
 
 
-def test_no_passphrase_prompt_without_a_terminal(tmp_path: Path) -> None:
-    asked = subprocess.run(
-        t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys")),
-        stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE_S, check=False,
-    )  # fmt: skip
-    assert asked.returncode == 1
-    assert "the CA's key needs its passphrase: run it in a terminal" in asked.stderr
-    assert not (tmp_path / "keys").exists()
-
-
 @pytest.mark.parametrize(
     ("typed", "code", "message"),
     [
-        ("horse\nhorse\n", 0, "holds the certificate authority"),
-        ("horse\nhouse\n", EXIT_CONFIG, "the two passphrases differ; nothing was created"),
-        ("\n", EXIT_CONFIG, "an empty passphrase does not protect the key"),
+        (("horse", "horse"), 0, "holds the certificate authority"),
+        (("horse", "house"), EXIT_CONFIG, "the two passphrases differ; nothing was created"),
+        (("",), EXIT_CONFIG, "an empty passphrase does not protect the key"),
+        ((), 1, "the CA's key needs its passphrase: run it in a terminal"),  # without a terminal
     ],
 )
-def test_the_passphrase_prompt_repeats_and_hides_the_input(
-    typed: str, code: int, message: str, tmp_path: Path
+def test_a_new_passphrase_is_typed_twice(
+    typed: tuple[str, ...],
+    code: int,
+    message: str,
+    empty: Keys,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    command = t2("keys", "init", "--passphrase", "--folder", str(tmp_path / "keys"))
-    got, shown = on_a_terminal(command, typed)
-    assert (got, message in shown) == (code, True), shown
-    assert "horse" not in shown
-    assert (tmp_path / "keys").exists() is (code == 0)
-
-
-def test_an_encrypted_key_asks_for_its_passphrase(tmp_path: Path) -> None:
-    folder = ("--folder", str(tmp_path / "keys"))
-    on_a_terminal(t2("keys", "init", "--passphrase", *folder), "horse\nhorse\n")
-    for typed, code, message in (("house\n", 1, "wrong passphrase"), ("horse\n", 0, "viewer.v.")):
-        got, shown = on_a_terminal(t2("keys", "issue", "viewer", "v", *folder), typed)
-        assert (got, message in shown) == (code, True), shown
-
-
-def on_a_terminal(command: list[str], typed: str) -> tuple[int, str]:
-    """Run a command on a pseudo-terminal, and type a line at each prompt."""
-    terminal, theirs = pty.openpty()
-    shown, lines = "", typed.splitlines(keepends=True)
-    with subprocess.Popen(
-        command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True
-    ) as process:
-        os.close(theirs)
-        while chunk := _read(terminal):
-            shown += chunk
-            if lines and shown.endswith(": "):
-                os.write(terminal, lines.pop(0).encode())
-    os.close(terminal)
-    return process.returncode, shown
-
-
-def _read(terminal: int) -> str:
-    try:
-        return os.read(terminal, 4096).decode()
-    except OSError:  # on Linux: the other end is closed
-        return ""
+    answers = iter(typed)
+    monkeypatch.setattr("cli.keys.operations.getpass", lambda _: next(answers))
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: bool(typed)))
+    assert message in empty.run("init", "--passphrase", code=code)
+    assert empty.folder.exists() is (code == 0)
+    if code == 0:
+        assert b"ENCRYPTED" in (empty.folder / "ca.key").read_bytes()
+        answers = iter(("house", "horse"))
+        assert "wrong passphrase" in empty.run("issue", "viewer", "v", code=1)
+        assert "viewer.v." in empty.run("issue", "viewer", "v")
 
 
 # --- without the library ------------------------------------------------------------------------

@@ -180,13 +180,3 @@ def test_children_end_with_their_parent(number: signal.Signals, code: int, tmp_p
         parent.send_signal(number)
         assert parent.wait() == code
         wait_gone(pids)
-
-
-def test_a_missing_command_is_an_error(supervised: list[Supervisor]) -> None:
-    supervisor = Supervisor([("calm", SLEEP), ("none", ["/no/such/program"])])
-    supervised.append(supervisor)
-    with pytest.raises((OSError, subprocess.SubprocessError)):
-        supervisor.run()
-    calm = supervisor.children[0].process
-    assert calm is not None
-    assert calm.returncode == -signal.SIGTERM

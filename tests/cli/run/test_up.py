@@ -39,12 +39,7 @@ def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
         up.send_signal(signal.SIGINT)
         assert up.wait(PATIENCE_S) == 0
         wait_gone(list(second.values()))
-    message = log.read_text()
-    assert "Traceback" not in message
-    # In reverse order: the bridge stops the vehicle while the board still runs.
-    assert message.rindex('"service": "odom", "event": "stopped"') < message.rindex(
-        '"service": "bridge", "event": "stopped"'
-    )
+    assert "Traceback" not in log.read_text()
 
 
 @pytest.mark.parametrize(
