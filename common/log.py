@@ -20,7 +20,6 @@ from common.settings import Log, LogLevel
 NAME = "t2"  # of the logger of all our lines; others are of libraries
 QUEUE_MAX = 1000  # lines
 FLUSH_S = 0.5  # how long the end of a program waits for its last lines
-COLOURS = {"debug": 2, "info": 32, "warning": 33, "error": 31}  # of a terminal, by ECMA-48
 
 Fields: TypeAlias = Mapping[str, object]
 Receiver: TypeAlias = Callable[[LogLevel, str, Fields], None]
@@ -45,7 +44,7 @@ class Logger:
 class Formatter(logging.Formatter):
     """Returns a line: a JSON object with the time in UTC, or text with the local time."""
 
-    def __init__(self, service: str = "", form: Literal["json", "text", "coloured"] = "text"):
+    def __init__(self, service: str = "", form: Literal["json", "text"] = "text"):
         super().__init__()
         self._service, self._form = service, form
 
@@ -59,12 +58,9 @@ class Formatter(logging.Formatter):
             line = {**fields, "event": event, "level": level, "timestamp": stamp}
             return json.dumps(line, default=repr)
         at = datetime.fromtimestamp(record.created)
-        word = f"{level:7}"
-        if self._form == "coloured":
-            word = f"\x1b[{COLOURS.get(level, COLOURS['error'])}m{word}\x1b[0m"
         shown = " ".join(f"{name}={_shown(value)}" for name, value in fields.items())
         event = event if event.isprintable() else repr(event)
-        return f"{at.isoformat(timespec='milliseconds')} [{word}] {event:30} {shown}".rstrip()
+        return f"{at.isoformat(timespec='milliseconds')} [{level:7}] {event:30} {shown}".rstrip()
 
 
 class Output(logging.Handler):
@@ -128,10 +124,9 @@ def configure(settings: Log, service: str) -> Output:
 
     Of libraries, only warnings and errors are logged.
     """
-    terminal = sys.stderr.isatty()
-    form: Literal["json", "text", "coloured"] = "json"
-    if settings.format == "text" or (settings.format == "auto" and terminal):
-        form = "coloured" if terminal and "NO_COLOR" not in os.environ else "text"
+    form = settings.format
+    if form == "auto":
+        form = "text" if sys.stderr.isatty() else "json"
     output = Output(sys.stderr, Formatter(service, form))
     _install(output, settings.level)
     return output
