@@ -31,6 +31,18 @@ def test_no_member_may_write_motion_commands() -> None:
             assert not may(given, "write", keys.MOTION.on(MINE)), role
 
 
+@pytest.mark.parametrize("role", ["viewer", "fleet"])
+def test_viewer_and_fleet_cannot_move_a_robot(role: str) -> None:
+    given = ROLES[role]
+    for key in (keys.DRIVE.on(MINE, source="x"), keys.DRIVE.on("*", source="*"), "**"):
+        assert not may(given, "write", key)
+    for call in keys.CALLS:
+        assert not may(given, "ask", call.on(MINE))
+    assert may(given, "write", keys.estop_key(MINE)) is (role == "fleet")
+    for topic in keys.TOPICS:
+        assert may(given, "read", topic.on(MINE, service="x", side="left", source="x"))
+
+
 def test_a_driver_is_limited_to_its_robots() -> None:
     given = driver((MINE,))
     for wanted, robot in ((True, MINE), (False, OTHER), (False, "*")):
