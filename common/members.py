@@ -26,7 +26,7 @@ class Profile(Struct, frozen=True, kw_only=True):
     role: Role
     name: Name
     robots: tuple[str, ...] = ()  # that a driver, device or ros may use, or that a robot is
-    sources: tuple[SourceName, ...] = ()  # that a driver or device may use; empty: any of a driver
+    sources: tuple[SourceName, ...] = ()  # that a driver or device may use
     addresses: tuple[str, ...] = ()  # IP addresses and host names of a router
 
     @property

@@ -113,7 +113,7 @@ def rights(member: Member, router: RouterSettings) -> Rights:
     if member.role == "site":
         return site()
     if member.role == "driver":
-        return driver(member.robots, member.sources or (ANY,))
+        return driver(member.robots, member.sources)
     if member.role == "device":
         return device(member.robots, member.sources)
     return fleet() if member.role == "fleet" else viewer()
@@ -130,11 +130,11 @@ def viewer(services: Sequence[str] = LAPTOP_SERVICES) -> Rights:
     }
 
 
-def driver(robots: Iterable[str], sources: Sequence[str] = (ANY,)) -> Rights:
+def driver(robots: Iterable[str], sources: Sequence[str]) -> Rights:
     """Return the rights to see everything, drive and stop these robots; an operator also resets."""
     own_robots = tuple(robots)
     viewing = viewer(DRIVER_SERVICES)
-    own_calls = keys.CALLS if {ANY, *OPERATORS_SOURCES} & {*sources} else PROGRAMS_CALLS
+    own_calls = keys.CALLS if {*OPERATORS_SOURCES} & {*sources} else PROGRAMS_CALLS
     calls = (call.on(each) for each in own_robots for call in own_calls)
     actuation = (key for each in own_robots for key in actuation_keys(each, sources))
     return {

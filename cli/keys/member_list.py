@@ -204,7 +204,7 @@ def as_table(members: Members, now_s: float) -> str:
             member.role,
             member.name,
             robots(member),
-            sources(member),
+            " ".join(member.sources) or "-",
             f"{member.expires:%Y-%m-%d}",
             state(member, now_s),
             member.common_name,
@@ -229,13 +229,6 @@ def advice(members: Members, ca_ends_s: float, now_s: float) -> Iterator[str]:
 def robots(member: Member) -> str:
     """Return the robots of a member as text."""
     return "every" if EVERY_ROBOT in member.robots else " ".join(member.robots) or "-"
-
-
-def sources(member: Member) -> str:
-    """Return the sources of a member as text; a driver's certificate without any may use each."""
-    if member.role == "driver" and not member.sources:
-        return "any"
-    return " ".join(member.sources) or "-"
 
 
 def days_left(ends_s: float, now_s: float) -> int:

@@ -47,7 +47,8 @@ def renew(options: argparse.Namespace) -> int:
         old = member_list.newest(folder.read(), options.role, options.name)
         robots = old.robots if old.role in BOUND else ()
         addresses = options.address or old.addresses
-        wanted = member_list.profile(old.role, old.name, robots, addresses, old.sources)
+        sources = old.sources or member_list.default_sources(old.role, old.name)
+        wanted = member_list.profile(old.role, old.name, robots, addresses, sources)
         _create_certificate(folder, wanted, options, settings=False)
     _print(instructions.certificate_renewed(old))
     return 0

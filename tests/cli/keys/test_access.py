@@ -44,7 +44,7 @@ def test_viewer_and_fleet_cannot_move_a_robot(role: str) -> None:
 
 
 def test_a_driver_is_limited_to_its_robots() -> None:
-    given = driver((MINE,))
+    given = driver((MINE,), ("teleop",))
     for wanted, robot in ((True, MINE), (False, OTHER), (False, "*")):
         assert may(given, "write", keys.DRIVE.on(robot, source="teleop")) is wanted
         assert may(given, "write", keys.estop_key(robot)) is wanted
@@ -55,7 +55,7 @@ def test_a_driver_is_limited_to_its_sources() -> None:
     for sources, may_use in (
         (("teleop", "web"), {"teleop": True, "web": True, "nav": False, "*": False}),
         (("nav",), {"teleop": False, "nav": True, "*": False}),
-        ((), {"teleop": True, "nav": True, "*": True}),  # a list without sources
+        ((), {"teleop": False, "*": False}),
     ):
         bo = replace(member("driver", "bo", (MINE,)), sources=sources)
         for source, wanted in may_use.items():
@@ -66,7 +66,7 @@ def test_a_driver_is_limited_to_its_sources() -> None:
 @pytest.mark.parametrize(
     ("sources", "wanted"),
     [(("nav",), False), (("nav", "ros2"), False), (("nav", "teleop"), True), (("web",), True),
-     (("checkout",), True), ((), True)],
+     (("checkout",), True), ((), False)],
 )  # fmt: skip
 def test_only_operators_sources_may_reset(sources: tuple[str, ...], wanted: bool) -> None:
     given = rights(replace(member("driver", "bo", (MINE,)), sources=sources), ROUTER)

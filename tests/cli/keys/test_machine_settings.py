@@ -9,7 +9,7 @@ from cli.keys.machine_settings import SOCKET, bus_toml, endpoints
 from cli.keys.member_list import profile
 from cli.settings import Everything
 from common.config import Sources, load
-from common.members import Profile
+from common.members import OPERATORS_SOURCES, Profile
 from common.settings import Shared
 
 ROBOT = profile("robot", "001")
@@ -44,7 +44,7 @@ def test_a_site_has_no_robot_id() -> None:
         (ANNA, [OTHER], ["tls/192.168.201.1:7447", "tls/10.7.5.220:7447"]),
         (ANNA, [ROBOT, SITE], ["tls/site.example:7447"]),
         (
-            Profile(role="driver", name="b", robots=("*",)),
+            Profile(role="driver", name="b", robots=("*",), sources=OPERATORS_SOURCES),
             [OTHER],
             ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"],
         ),
@@ -65,7 +65,9 @@ def test_other_members_connect(who: Profile, routers: list[Profile], endpoints: 
 )
 def test_the_robot_id_is_set_for_a_single_robot(robots: tuple[str, ...], chosen: object) -> None:
     assert (
-        tomllib.loads(bus_toml(Profile(role="driver", name="b", robots=robots), [])).get("robot")
+        tomllib.loads(
+            bus_toml(Profile(role="driver", name="b", robots=robots, sources=OPERATORS_SOURCES), [])
+        ).get("robot")
         == chosen
     )
 

@@ -211,7 +211,7 @@ def test_the_table() -> None:
     site = members(member("driver", "anna"), every, member("viewer", "guest", days=-1))
     assert member_list.as_table(site, NOW_S).splitlines() == [
         "role    name   robots  sources       until  state    certificate",
-        "driver  anna   001     any      2027-09-17  valid    driver.anna.00000001",
+        "driver  anna   001     -        2027-09-17  valid    driver.anna.00000001",
         "driver  ben    every   nav web  2027-09-17  valid    driver.ben.00000002",
         "viewer  guest  -       -        2026-11-20  expired  viewer.guest.00000001",
     ]
