@@ -27,6 +27,12 @@ CONSTANT = {
     "safety.runaway_linear": "0.3 m/s",
     "safety.runaway_angular": "0.5 rad/s",
     "safety.release_lease": "the lease of the source",
+    "dashboard.round_trip": "0.35 s, by the heartbeat of safety that the page was shown",
+    "dashboard.call_round_trip": "1 s, by the heartbeat of safety that the page was shown",
+    "dashboard.messages_per_second": "8 kB/s of each connection",
+    "dashboard.connections": "64 pages and 192 requests, of which the oldest makes room",
+    "dashboard.connections_per_address": "64 pages and 192 requests of all addresses",
+    "dashboard.request_timeout": "until 192 newer requests are open",
     "recorder.roll_size": "200 MB",
     "recorder.roll_time": "600 s",
     "recorder.black_box": "120 s",
@@ -48,6 +54,7 @@ REMOVED = {
         for section, names in LENGTHENED.items()
         for name in names
     },
+    "dashboard.embed": "was removed: open the other page in a window of its own",
     **{path: f"is no setting any more, always {value}" for path, value in CONSTANT.items()},
     **{
         f"sim.{name}": "is no setting any more; a profile changes the simulated vehicle: "

@@ -53,11 +53,11 @@ class DriveSource(Source[Drive]):
         """Request a motion (m/s, rad/s, in ``base_link``) until the source's lease expires."""
         return self.put(request(linear, angular))
 
-    def put(self, drive: Drive) -> Drive:
-        """Put a request with its header and echo."""
+    def put(self, drive: Drive, echo: int | None = None) -> Drive:
+        """Put a request; its echo is the heartbeat that a screen showed, the newest by default."""
         if not codec.finite(drive.linear, drive.angular):
             raise ValueError(f"non-finite request: {drive.linear} m/s, {drive.angular} rad/s")
-        return self._put(drive)
+        return self._put(drive, echo)
 
 
 class KeepalivePublisher(Source[EstopKeepalive]):

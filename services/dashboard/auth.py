@@ -1,15 +1,13 @@
 """Authentication middleware of the web server: valid credentials, or the token page.
 
-Every response carries the headers that exclude other pages and scripts. It also closes its
-connection: a connection serves one request within one deadline, or each part of a download within
-one.
+Every response carries the headers that exclude other pages and scripts. It ends its connection: the
+next request comes on a new one, which the listener always accepts.
 """
 
 import asyncio
 import base64
 import hashlib
 import html
-from collections.abc import Callable
 from pathlib import Path
 from string import Template
 from urllib.parse import parse_qs, urlsplit
@@ -19,17 +17,13 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from services.dashboard.admission import Place
 from services.dashboard.config import Dashboard
 from services.dashboard.credentials import COOKIE, Credentials
 from services.dashboard.i18n import TEXTS
-from services.dashboard.listener import Connection
 
 WRONG_TOKEN_DELAY_S = 1.0
 BODY_MAX = 1024  # bytes of a form with a token
 SAFE_METHODS = ("GET", "HEAD")
-ESTOP = "/estop/"
-FULL = "too many connections; only E-STOP is served\n"
 TOKEN_PAGE = (Path(__file__).parent / "static" / "token.html").read_text(encoding="utf-8")
 STYLE = TOKEN_PAGE.partition("<style>")[2].partition("</style>")[0]
 STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
@@ -43,39 +37,32 @@ HEADERS = {
     "connection": "close",
 }
 
-# Responses that may take longer than a request.
-LONG = "/recordings/"
-
-FindConnection = Callable[[tuple[str, int] | None], Connection | None]
-
 
 class AuthMiddleware:
     """Passes requests with valid credentials to the application."""
 
-    def __init__(
-        self, app: ASGIApp, credentials: Credentials, find: FindConnection, settings: Dashboard
-    ) -> None:
+    def __init__(self, app: ASGIApp, credentials: Credentials, settings: Dashboard) -> None:
         self.app = app
-        self._policy = content_policy(settings.camera, settings.embed)
+        self._policy = content_policy(settings.camera)
         self._credentials = credentials
-        self._find = find
         self._secure = bool(settings.certificate)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request or WebSocket."""
-        connection = self._find(scope["client"])
-        answer = await self._answer(connection, scope, receive)
-        is_long = answer is self.app and scope["path"].startswith(LONG)
-        await answer(scope, receive, self._with_headers(connection, send, is_long))
 
-    async def _answer(
-        self, connection: Connection | None, scope: Scope, receive: Receive
-    ) -> ASGIApp:
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers.update(HEADERS)
+                headers.setdefault("content-security-policy", self._policy)
+            await send(message)
+
+        answer = await self._answer(scope, receive)
+        await answer(scope, receive, send_with_headers)
+
+    async def _answer(self, scope: Scope, receive: Receive) -> ASGIApp:
         """Return the application for a request with valid credentials, else the refusal."""
         is_socket = scope["type"] == "websocket"
-        is_reserved = connection is not None and connection.place is Place.RESERVE
-        if is_reserved and not scope["path"].startswith(ESTOP):
-            return _close if is_socket else PlainTextResponse(FULL, 503, {"retry-after": "1"})
         headers, credentials = Headers(scope=scope), self._credentials
         acts = is_socket or scope["method"] not in SAFE_METHODS
         if credentials.may_act(headers) if acts else credentials.may_view(headers):
@@ -111,43 +98,16 @@ class AuthMiddleware:
                 return ""
         return parse_qs(body.decode("latin1")).get("token", [""])[0].strip()
 
-    def _with_headers(self, connection: Connection | None, send: Send, is_long: bool) -> Send:
-        """Return ``send`` with the response headers.
 
-        A WebSocket has no deadline. A long response renews it with each part.
-        """
-
-        async def send_with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                headers.update(HEADERS)
-                headers.setdefault("content-security-policy", self._policy)
-            elif message["type"] == "websocket.accept" and connection is not None:
-                connection.lift_deadline()
-            await send(message)  # until the client has taken the part
-            if is_long and connection is not None and message.get("more_body"):
-                connection.renew_deadline()
-
-        return send_with_headers
-
-
-def content_policy(camera: str, embed: str) -> str:
-    """Return the policy of the page; only the origins of these two URLs may be shown in it.
-
-    The page also fetches the embedded one, without reading it, to report one that does not answer.
-    """
-    frames = _origin(embed) or "'none'"
+def content_policy(camera: str) -> str:
+    """Return the policy of the page; only the camera's origin may be shown in it."""
+    parts = urlsplit(camera)
+    origin = f"{parts.scheme}://{parts.netloc}" if camera else ""
     return (
-        f"default-src 'none'; script-src 'self'; connect-src 'self' {_origin(embed)}; "
-        f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self' {_origin(camera)}; "
-        f"frame-src {frames}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+        f"default-src 'none'; script-src 'self'; connect-src 'self'; "
+        f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self' {origin}; "
+        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
     )
-
-
-def _origin(url: str) -> str:
-    """Return scheme, host and port of a URL; empty for none."""
-    parts = urlsplit(url)
-    return f"{parts.scheme}://{parts.netloc}" if url else ""
 
 
 async def _close(_: Scope, __: Receive, send: Send) -> None:

@@ -1,7 +1,7 @@
 """Messages from the browser, as tagged JSON; any other message is refused.
 
-``n`` is the number of the snapshot that a message answers: see ``driver_lock.py`` for a hold, a
-reset or a switch.
+``echo`` is safety's heartbeat in the snapshot that a message answers. Its age is judged by safety,
+in a switch by the bridge; see ``driver_lock.py`` for a hold.
 """
 
 from typing import Annotated
@@ -12,18 +12,16 @@ from common.messages import Direction, LedRequest, SwitchesRequest
 from services.dashboard.config import GEARS
 
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
-ROBOT_OR_NONE = r"^[A-Za-z0-9_.-]{0,64}\Z"
 
 
 class ClientMessage(Struct, frozen=True, tag_field="k", tag=str.lower, forbid_unknown_fields=True):
     """A message from a viewer."""
 
 
-class Look(ClientMessage, frozen=True):
-    """Select a robot, and set the viewer's name."""
+class Name(ClientMessage, frozen=True):
+    """Set the viewer's name."""
 
-    robot: Annotated[str, Meta(pattern=ROBOT)]
-    name: Annotated[str, Meta(max_length=24)] = ""
+    name: Annotated[str, Meta(max_length=24)]
 
 
 class Take(ClientMessage, frozen=True):
@@ -37,12 +35,12 @@ class Leave(ClientMessage, frozen=True):
 
 
 class Hold(ClientMessage, frozen=True):
-    """The held controls, in answer to snapshot ``n``; x is forward, y counter-clockwise.
+    """The held controls; x is forward, y counter-clockwise.
 
     With ``release`` the vehicle moves slowly off a pressed bumper instead, in this direction.
     """
 
-    n: int
+    echo: int
     x: float = 0.0
     y: float = 0.0
     release: Direction | None = None
@@ -59,28 +57,25 @@ class Gear(ClientMessage, frozen=True):
 
 
 class Alive(ClientMessage, frozen=True):
-    """The page is visible, in answer to snapshot ``n``: it keeps the emergency stop alive."""
+    """The page is visible: it keeps the emergency stop alive."""
 
-    n: int
+    echo: int
 
 
 class Estop(ClientMessage, frozen=True):
-    """Emergency stop, latched, from any viewer; without a robot: the selected one."""
-
-    robot: Annotated[str, Meta(pattern=ROBOT_OR_NONE)] = ""
+    """Emergency stop, latched, from any viewer."""
 
 
 class Reset(ClientMessage, frozen=True):
-    """Reset the causes that are latched in snapshot ``n``."""
+    """Reset the causes that the answered snapshot shows as latched."""
 
-    n: int = 0  # not the number of a snapshot
+    echo: int
 
 
 class Switch(ClientMessage, frozen=True):
-    """Set the board's emergency brakes, as an operator who saw snapshot ``n``."""
+    """Set the board's emergency brakes; ``to`` carries the echo."""
 
     to: SwitchesRequest
-    n: int = 0
 
 
 class Lamp(ClientMessage, frozen=True):
@@ -89,4 +84,4 @@ class Lamp(ClientMessage, frozen=True):
     to: LedRequest
 
 
-AnyMessage = Look | Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch | Lamp
+AnyMessage = Name | Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch | Lamp

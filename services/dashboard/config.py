@@ -19,9 +19,6 @@ GEARS = 5
 class Dashboard(settings.Section, frozen=True, kw_only=True):
     """Settings of the web server and of driving.
 
-    A reverse proxy and Docker's port forwarding use one address for all clients. Behind these, set
-    ``connections_per_address`` to the value of ``connections``.
-
     The token is in a file and not in the settings, because the settings are published on the bus.
     """
 
@@ -33,19 +30,11 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     source: SourceName = "web"  # the name to drive under; safety knows its priority
     # A name in safety.estop_keepalive that an open and visible page keeps alive; empty: none.
     estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
-    # The URL of an MJPEG stream, and of a page in a frame; ``{robot}`` in the path is the id
-    # of the robot that is shown. Empty: none.
+    # The URL of an MJPEG stream; ``{robot}`` in the path is the robot's id. Empty: none.
     camera: Url = ""
-    embed: Url = ""
     recordings: str = "recordings"  # the recorder's folder on this host; empty: none
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
-    round_trip: Annotated[float, Meta(ge=0.1, le=1.0)] = 0.3  # s; a hold with a longer one lapses
-    call_round_trip: Annotated[float, Meta(ge=0.2, le=2.0)] = 1.0  # s; of a reset or a switch
-    messages_per_second: Annotated[float, Meta(ge=30.0, le=500.0)] = 60.0  # of one browser
-    connections: Annotated[int, Meta(ge=8, le=512)] = 128
-    connections_per_address: Annotated[int, Meta(ge=8, le=512)] = 32
-    request_timeout: Annotated[float, Meta(ge=1.0, le=30.0)] = 5.0  # s; of header, body and answer
 
     def __post_init__(self) -> None:
         try:

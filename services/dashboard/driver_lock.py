@@ -1,14 +1,13 @@
-"""The driver lock: which viewer drives a robot, and whether its hold is still valid.
+"""The viewers with a part in a robot's safety: the one that drives, and the page of the e-stop.
 
-One viewer has the driver lock; the others watch. Another viewer takes it over with ``force``.
-
-A browser may hang, run in the background, or sit behind a network that delivers late. So every
-snapshot that is sent has a number, and the browser answers each one with the controls that it
-holds. A hold is valid only while the snapshot that it answers is younger than the allowed round
-trip:
+**Driver lock.** One viewer has the driver lock; the others watch. Another viewer takes it over with
+``force``. A browser may hang, run in the background, or sit behind a network that delivers late. So
+the browser answers each snapshot with the controls that it holds and with the heartbeat of safety
+that it was shown. That heartbeat becomes the echo of the drive requests: safety refuses a late one.
+Here a hold is valid only while that state of safety is younger than ``HOLD_S``:
 
 ========= ===================== =============================== ====================
-state     hold, young snapshot  hold, old or unknown snapshot   no hold in time
+state     hold, young state     hold, old or unknown state      no hold in time
 ========= ===================== =============================== ====================
 FREE      HELD                  FREE, refused                   FREE
 HELD      HELD                  HELD, refused                   LAPSED
@@ -17,18 +16,24 @@ LAPSED    LAPSED, refused       LAPSED, refused                 LAPSED
 
 ``let_go`` leads to FREE from any state. After a lapse it is required before the next hold: a hold
 that returns after a gap is an old request.
+
+**Keepalive.** A page that is open, visible and answers snapshots can keep the emergency stop alive.
+One page holds it. When that page is hidden, closed or cut off, nothing is sent for it any more, and
+safety brakes and latches. Another page takes over only after that: a change that nobody notices
+would hide that the first operator is gone.
 """
 
-from collections import deque
 from dataclasses import dataclass, field
 from enum import Enum
 
 from common.codec import finite
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Direction, SafetyState
 from common.motion import clamp
 
-SNAPSHOTS_KEPT = 64  # 3 s; an older one is too old for any setting
+HOLD_S = 0.35  # safety refuses an echo of over 0.4 s
+
+Shown = Latest[SafetyState] | None  # the state that a browser answers; None if it is unknown
 
 
 class HoldState(Enum):
@@ -52,16 +57,11 @@ class Push:
 class DriverLock:
     """The driver lock of one robot on this dashboard."""
 
-    round_trip_s: float
     driver: str | None = None  # a viewer
     state: HoldState = HoldState.FREE
     push: Push = field(default_factory=Push)
     gear: int = 1
-    answered: int = 0  # the newest snapshot that a hold answered
-    _sent: deque[tuple[int, int, SafetyState | None]] = field(
-        default_factory=lambda: deque(maxlen=SNAPSHOTS_KEPT)
-    )
-    _answered_ns: int = 0  # when the newest answered snapshot was sent
+    shown: Shown = None  # the state that the newest valid hold answers
 
     def take(self, viewer: str, force: bool) -> bool:
         """Give the lock to a viewer, unless another one has it and ``force`` is not set."""
@@ -78,32 +78,14 @@ class DriverLock:
             self.let_go(viewer)
             self.driver = None
 
-    def sent(self, number: int, now_ns: int, state: SafetyState | None = None) -> None:
-        """Note that a snapshot with this state of safety is sent to the viewers now."""
-        self._sent.append((number, now_ns, state))
-
-    def seen(self, number: int, now_ns: int, limit_s: float) -> SafetyState | None:
-        """Return safety's state in a snapshot; None if it is unknown, too old or had none.
-
-        A reset, a switch and a release answer a snapshot by its number. The call carries the echo
-        and the causes of that snapshot, so that a delayed click has no effect on anything newer.
-        """
-        known = (sent for sent in self._sent if sent[0] == number)
-        _, sent_ns, state = next(known, (number, 0, None))
-        return state if now_ns - sent_ns <= limit_s * NS_PER_S else None
-
-    def hold(self, viewer: str, snapshot: int, push: Push, now_ns: int) -> bool:
-        """Handle a browser's hold in answer to a snapshot; return whether it is valid."""
-        sent_ns = next((at_ns for number, at_ns, _ in self._sent if number == snapshot), None)
-        if viewer != self.driver or not finite(push.linear, push.angular) or sent_ns is None:
-            return False
-        if self.state is HoldState.LAPSED or now_ns - sent_ns > self.round_trip_s * NS_PER_S:
-            return False
-        if self.state is HoldState.HELD and sent_ns < self._answered_ns:
-            return False  # reordered: a newer one was received before
-        self.state, self._answered_ns, self.answered = HoldState.HELD, sent_ns, snapshot
-        self.push = Push(clamp(push.linear, 1.0), clamp(push.angular, 1.0), push.release)
-        return True
+    def hold(self, viewer: str, push: Push, shown: Shown, now_ns: int) -> None:
+        """Handle a browser's hold in answer to a state of safety."""
+        is_young = fresh(shown, now_ns, HOLD_S)
+        if viewer != self.driver or self.state is HoldState.LAPSED or not is_young:
+            return
+        if finite(push.linear, push.angular):
+            self.state, self.shown = HoldState.HELD, shown
+            self.push = Push(clamp(push.linear, 1.0), clamp(push.angular, 1.0), push.release)
 
     def let_go(self, viewer: str) -> None:
         """End the driver's hold."""
@@ -116,10 +98,8 @@ class DriverLock:
             self.state, self.push = HoldState.LAPSED, Push()
 
     def held(self, now_ns: int) -> Push | None:
-        """Return the valid hold, or None; a hold whose round trip is overdue lapses."""
-        if self.state is HoldState.HELD and (
-            now_ns - self._answered_ns > self.round_trip_s * NS_PER_S
-        ):
+        """Return the valid hold, or None; a hold whose state of safety is too old lapses."""
+        if not fresh(self.shown, now_ns, HOLD_S):
             self.lapse()
         return self.push if self.state is HoldState.HELD else None
 
@@ -127,3 +107,31 @@ class DriverLock:
         """Change the gear, as the driver."""
         if viewer == self.driver:
             self.gear = gear
+
+
+@dataclass
+class PageKeepalive:
+    """The page that keeps one robot's emergency stop alive on this dashboard."""
+
+    name: str  # in safety.estop_keepalive; empty: none
+    holder: str | None = None  # a viewer
+    _shown_ns: int = 0  # when the state was received that the holder answered last
+
+    def answer(
+        self, viewer: str, shown: Shown, newest: SafetyState | None, now_ns: int
+    ) -> int | None:
+        """Return the heartbeat to echo for a page's answer; None when it does not count."""
+        known = newest.estop_keepalives if newest else ()
+        ours = next((one for one in known if one.source == self.name), None)
+        if ours is None or shown is None:
+            return None
+        is_held = ours.alive or now_ns - self._shown_ns <= ours.timeout * NS_PER_S
+        if viewer != self.holder and is_held:
+            return None
+        self.holder, self._shown_ns = viewer, shown.received_ns
+        return shown.value.heartbeat
+
+    def left(self, viewer: str) -> None:
+        """Forget a page that is gone."""
+        if self.holder == viewer:
+            self.holder = None

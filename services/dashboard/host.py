@@ -8,6 +8,7 @@ import signal
 import ssl
 import sys
 import threading
+from collections import Counter
 from pathlib import Path
 
 from common import clock, log
@@ -29,13 +30,14 @@ class Host:
         settings = loaded.config.dashboard
         self._credentials = Credentials(token(settings))
         check_certificate(settings)
-        self._socket = listen(settings)
+        # The server's thread counts, the node's reads: all names exist from the start.
+        counters = Counter({"requests_displaced": 0, "connections_aborted": 0})
+        self._socket = listen(settings, counters)
         log.configure(loaded.config.log, "dashboard")
         self._node = node = Node("dashboard", loaded)
-        # The server's thread counts, the node's reads: all names exist from the start.
-        node.counters = self._socket.counters
-        hub = WebSocketHub(node.loop.post, settings.messages_per_second, node.counters)
-        self._fleet = hub.fleet = Fleet(node, hub.send)
+        node.counters = counters
+        self._fleet = Fleet(node)
+        hub = WebSocketHub(node.loop.post, self._fleet)
         node.announce()
         self._systemd = Systemd()
         self._server = serving(

@@ -18,7 +18,7 @@ PATH = "/recordings/"
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,120}\.(mcap|html)")
 LIST_MAX = 50  # the newest
 CHUNK = 65_536  # bytes
-RATE = 2_000_000  # bytes per second: a download leaves room for a driver on the same link
+RATE = 2_000_000  # bytes per second: downloads leave room for a driver on the same link
 # A report is one file without scripts; a recording may have put anything into its texts.
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
 
@@ -33,16 +33,8 @@ class Recording(Struct, frozen=True):
 
 
 def routes(folder: Path) -> list[Route]:
-    """Return the routes that list and serve this folder; requests change nothing.
-
-    One recording at a time is downloaded, so that ``RATE`` holds for all browsers together.
-    """
-    one_at_a_time = asyncio.Lock()
-
-    async def download(path: Path) -> AsyncIterator[bytes]:
-        async with one_at_a_time:
-            async for chunk in throttled(path):
-                yield chunk
+    """Return the routes that list and serve this folder; requests change nothing."""
+    pace = asyncio.Lock()
 
     async def index(_: Request) -> Response:
         found = await asyncio.to_thread(lambda: list(listed(folder)))
@@ -54,12 +46,10 @@ def routes(folder: Path) -> list[Route]:
             return PlainTextResponse("no such recording\n", status_code=404)
         if path.suffix == ".html":
             policy = {"content-security-policy": REPORT_POLICY}
-            return StreamingResponse(throttled(path), media_type="text/html", headers=policy)
-        if one_at_a_time.locked():
-            return PlainTextResponse("another download is under way\n", status_code=503)
+            return StreamingResponse(throttled(path, pace), media_type="text/html", headers=policy)
         attachment = {"content-disposition": f'attachment; filename="{path.name}"'}
         return StreamingResponse(
-            download(path), media_type="application/octet-stream", headers=attachment
+            throttled(path, pace), media_type="application/octet-stream", headers=attachment
         )
 
     return [Route(PATH, index), Route(PATH + "{name}", file)]
@@ -88,9 +78,10 @@ def status_of(path: Path) -> os.stat_result | None:
     return None
 
 
-async def throttled(path: Path) -> AsyncIterator[bytes]:
-    """Yield the content of a file, no faster than ``RATE``."""
+async def throttled(path: Path, pace: asyncio.Lock) -> AsyncIterator[bytes]:
+    """Yield the content of a file; ``RATE`` holds for all that share ``pace`` together."""
     with path.open("rb") as file:
         while chunk := await asyncio.to_thread(file.read, CHUNK):
             yield chunk
-            await asyncio.sleep(CHUNK / RATE)
+            async with pace:
+                await asyncio.sleep(CHUNK / RATE)

@@ -1,6 +1,6 @@
 """One robot on the bus: its telemetry, its driver's requests and calls; in the node's loop.
 
-Each robot has a bus session of its own, which opens when the first viewer selects the robot.
+Each robot has a bus session of its own, which opens with the first viewer of its page.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,16 +21,14 @@ from common.client import (
     request,
     reset_request,
 )
-from common.codec import finite
 from common.keys import Call, Topic
 from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
 from services.dashboard.config import Dashboard
-from services.dashboard.driver_lock import DriverLock, HoldState, Push
-from services.dashboard.keepalive import PageKeepalive
+from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
 from services.dashboard.sectors import Protection
 from services.dashboard.snapshot import DriverState
-from services.dashboard.telemetry_cache import TelemetryCache, Trail, path_of
+from services.dashboard.telemetry_cache import TelemetryCache, path_of
 
 R = TypeVar("R", bound=msgspec.Struct)
 # Takes the level, the text or its key in ``i18n``, and the key of the result that it explains.
@@ -50,11 +48,8 @@ class Robot:
     def __init__(self, bus: Bus, settings: Dashboard, broadcast: Notify) -> None:
         self.bus = bus
         self.telemetry = TelemetryCache()
-        self.trail = Trail()
         self.protection = Protection()
-        self.driver_lock = DriverLock(settings.round_trip)
-        self.used_ns = 0  # the last time that a viewer selected or stopped it
-        self.trail_sent = False  # whether the viewers have the current trail
+        self.driver_lock = DriverLock()
         self._settings = settings
         self._broadcast = broadcast  # to all viewers of this robot
         self._requests = DriveRequests()
@@ -84,18 +79,18 @@ class Robot:
     def tick(self, now_ns: int) -> None:
         """Send the requests of this tick and repeat what is not confirmed."""
         safety = self.telemetry.newest(keys.SAFETY, now_ns)
-        if safety is None:
-            self.driver_lock.lapse()  # the return of safety must not move the vehicle
-        elif not self._is_queried:
-            self._query_services()
+        if safety and not self._is_queried:
+            self._query_protection()
         self._repeat_estop(safety)
         self._yield(safety)
         push = self.driver_lock.held(now_ns)
         drive = self._requests.tick(self._requested(push) if push else None)
         if drive is not None:
-            self.telemetry.update(self._requests_path, self._source.put(drive), now_ns)
+            # A held control is as old as what its operator was shown; our own zeros are new.
+            shown = self.driver_lock.shown if push else None
+            sent = self._source.put(drive, shown.value.heartbeat if shown else None)
+            self.telemetry.update(self._requests_path, sent, now_ns)
         self._check_resets(safety, now_ns)
-        self._update_trail(now_ns)
 
     @property
     def may_drive(self) -> bool:
@@ -139,17 +134,20 @@ class Robot:
             self._log.warning("emergency stop", requested_by=requested_by)
         self._estop.start()
 
-    def keep_alive(self, viewer: str, number: int, now_ns: int) -> None:
-        """Keep the emergency stop alive for a page that answers a snapshot."""
-        shown = self.driver_lock.seen(number, now_ns, self._settings.call_round_trip)
+    def keep_alive(self, viewer: str, answered: int, now_ns: int) -> None:
+        """Keep the emergency stop alive for a page that answers this heartbeat."""
         newest = self.telemetry.newest(keys.SAFETY, now_ns)
-        echo = self.keepalive.answer(viewer, shown, newest, now_ns)
+        echo = self.keepalive.answer(viewer, self.telemetry.shown(answered), newest, now_ns)
         if echo is not None and self._keepalives:
             self._keepalives.beat(echo)
 
-    def reset(self, seen: m.SafetyState, notify: Notify) -> None:
-        """Clear the causes that were latched in this state; report the confirmation later."""
-        check = ResetCheck(seen)
+    def reset(self, echo: int, notify: Notify) -> None:
+        """Clear the causes that a snapshot showed as latched; report the confirmation later."""
+        shown = self.telemetry.shown(echo)
+        if shown is None:
+            notify("warning", "too_late", "")
+            return
+        check = ResetCheck(shown.value)
 
         def answered(done: m.ResetDone) -> None:
             check.answer(done)
@@ -157,14 +155,10 @@ class Robot:
 
         self.bus.call(
             keys.RESET,
-            reset_request(seen),
+            reset_request(shown.value),
             answered,
             lambda reason: notify("warning", reason, "reset_refused"),
         )
-
-    def switch(self, seen: m.SafetyState, to: m.SwitchesRequest, notify: Notify) -> None:
-        """Set the board's emergency brakes, as an operator who saw this state."""
-        self.call(keys.SET_SWITCHES, msgspec.structs.replace(to, echo=seen.heartbeat), notify)
 
     def call(self, call: Call[Any, R], request: msgspec.Struct, notify: Notify) -> None:
         """Call a service of the robot and report its answer."""
@@ -227,18 +221,9 @@ class Robot:
     def _on_event(self, arrival: Arrival[m.Event]) -> None:
         self.telemetry.add_event(arrival.key.rpartition("/")[2], arrival.message)
 
-    def _update_trail(self, now_ns: int) -> None:
-        odometry = self.telemetry.newest(keys.ODOMETRY, now_ns)
-        if odometry is None or not finite(odometry.x, odometry.y):
-            return
-        if self.trail.add(odometry.x, odometry.y, odometry.epoch):
-            self.trail_sent = False
-
-    def _query_services(self) -> None:
-        """Query safety's settings and odometry's trajectory."""
+    def _query_protection(self) -> None:
         self._is_queried = True
         self.bus.look_up("safety", "config", self._on_config, self._query_later)
-        self.bus.look_up("odom", "path", self._on_path, lambda _: None)
 
     def _query_later(self, _: str) -> None:
         self._is_queried = False
@@ -247,9 +232,3 @@ class Robot:
         given = msgspec.json.decode(answer)
         values = {name: given[path]["value"] for name, path in PROTECTION.items() if path in given}
         self.protection = msgspec.convert(values, Protection)
-
-    def _on_path(self, answer: bytes) -> None:
-        given = msgspec.json.decode(answer)
-        points = [(round(x, 3), round(y, 3)) for x, y, _ in given["points"]]
-        self.trail.begin(points, given["epoch"])
-        self.trail_sent = False

@@ -1,4 +1,4 @@
-"""The vehicle as it is drawn: the tones of the eight sonar sectors, and the wheel angles.
+"""Tones of the eight sonar sectors, as the page draws them.
 
 A sector's tone shows the effect of its reading on safety, by safety's own formula and settings: the
 speed allowed toward a reading d is the v for which v * r + v^2 / (2 a) = d - margin, and
@@ -22,7 +22,6 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from common.messages import SONAR_NAMES, Cause, RangeStatus, Ultrasonic
-from common.settings import Vehicle
 
 Tone = Literal["dark", "clear", "slow", "stop", "fault"]
 Number = Annotated[float, Meta(gt=0)]
@@ -30,7 +29,6 @@ Number = Annotated[float, Meta(gt=0)]
 WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")
 OF_STATUS: dict[RangeStatus, Tone] = {"no_echo": "clear", "too_near": "stop", "fault": "fault"}
 OF_CAUSE: dict[str, Tone] = {"obstacle": "slow", "blocked": "stop", "sonar": "fault"}
-CREEPING_MPS = 0.02  # a slower wheel is drawn straight
 
 
 class Protection(Struct, frozen=True, kw_only=True):
@@ -76,24 +74,6 @@ def sonars_named(text: str) -> list[int]:
             text = text.replace(words, "")
             found.append(SONAR_NAMES.index(name))
     return found
-
-
-def wheel_angles(linear: float, angular: float, vehicle: Vehicle) -> tuple[float, ...]:
-    """Return the wheel angles of a motion (m/s, rad/s), in radians, counter-clockwise.
-
-    Front left, front right, rear left, rear right. The board reports no angles; these are the only
-    ones at which all four wheels roll.
-    """
-    front, left = vehicle.wheelbase / 2, vehicle.track / 2
-    places = ((front, left), (front, -left), (-front, left), (-front, -left))
-    return tuple(_angle(linear - angular * y, angular * x) for x, y in places)
-
-
-def _angle(ahead: float, aside: float) -> float:
-    if math.hypot(ahead, aside) < CREEPING_MPS:
-        return 0.0
-    # A wheel that rolls backward points forward, too.
-    return math.atan2(aside, ahead) if ahead >= 0 else math.atan2(-aside, -ahead)
 
 
 def _by_range(reading: float | None, protection: Protection) -> Tone:

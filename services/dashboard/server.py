@@ -4,6 +4,7 @@ import html
 import json
 import re
 import socket
+from collections import Counter
 from collections.abc import Callable
 from ipaddress import ip_address
 from pathlib import Path
@@ -14,6 +15,7 @@ from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
 
 from common.errors import LinkError
 from services.dashboard import recordings
@@ -22,15 +24,14 @@ from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import Dashboard
 from services.dashboard.credentials import Credentials
 from services.dashboard.i18n import phrases, table
-from services.dashboard.listener import Listener
+from services.dashboard.listener import BACKLOG, Listener
 from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub
 
 SHUTDOWN_S = 1  # for browsers to disconnect
 STATIC = Path(__file__).parent / "static"
 MEDIA_TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 HEADER_MAX = 16_384  # bytes
-BACKLOG = 256  # connections that are not yet accepted
-RECEIVE_BUFFER = 16_384  # bytes in the kernel per connection: bounds a flood
+ROBOT_ID = "{the robot}"
 # Documentation addresses (RFC 5737, RFC 3849), which route to the default gateway.
 REMOTE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
 
@@ -51,15 +52,13 @@ def serving(
 
     return uvicorn.Server(
         uvicorn.Config(
-            AuthMiddleware(
-                _application(settings, robot, hub), credentials, listener.connection, settings
-            ),
-            loop="asyncio",  # the listener's limits need asyncio
+            AuthMiddleware(_application(settings, robot, hub, listener), credentials, settings),
+            loop="asyncio",  # the listener needs it
             http="h11",
             h11_max_incomplete_event_size=HEADER_MAX,
             backlog=BACKLOG,
             lifespan="off",
-            proxy_headers=False,  # limits use the peer's address, which cannot be forged
+            proxy_headers=False,
             server_header=False,
             log_config=None,  # its lines go through common/log.py
             log_level="error",  # any client can cause warnings
@@ -79,12 +78,17 @@ def serving(
     )
 
 
-def _application(settings: Dashboard, robot: str, hub: WebSocketHub) -> Starlette:
+def _application(
+    settings: Dashboard, robot: str, hub: WebSocketHub, listener: Listener
+) -> Starlette:
     """Return the application behind the authentication."""
-    text, files = page(settings, robot), assets()
+    template, files = page(settings), assets()
 
-    async def index(_: Request) -> Response:
-        return HTMLResponse(text)
+    async def index(request: Request) -> Response:
+        shown = request.query_params.get("robot", robot)
+        if not re.match(ROBOT, shown):
+            return PlainTextResponse("not the id of a robot\n", status_code=404)
+        return HTMLResponse(template.replace(ROBOT_ID, shown))
 
     async def file(request: Request) -> Response:
         if (found := files.get(request.path_params["name"])) is None:
@@ -101,13 +105,17 @@ def _application(settings: Dashboard, robot: str, hub: WebSocketHub) -> Starlett
             )
         return PlainTextResponse("requested\n")
 
+    async def live(socket: WebSocket) -> None:
+        listener.upgraded(socket.client)
+        await hub.serve(socket)
+
     return Starlette(
         routes=[
             Route("/", index),
             Route("/t2/{name}", file),
             Route("/estop/{robot}", stop, methods=["POST"]),
             *(recordings.routes(Path(settings.recordings)) if settings.recordings else ()),
-            WebSocketRoute("/live", hub.serve),
+            WebSocketRoute("/live", live),
         ]
     )
 
@@ -117,13 +125,12 @@ def _script(content: object) -> str:
     return json.dumps(content, ensure_ascii=False).replace("<", "\\u003c")
 
 
-def page(settings: Dashboard, robot: str) -> str:
-    """Return the page, which opens with this robot."""
+def page(settings: Dashboard) -> str:
+    """Return the page, with ``ROBOT_ID`` in place of the robot that it shows."""
     template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
-    camera, embed = html.escape(settings.camera), html.escape(settings.embed)
     return template.substitute(
-        robot=robot, texts=_script(table()), phrases=_script(phrases()), camera=camera, embed=embed,
-        recordings="yes" if settings.recordings else "",
+        robot=ROBOT_ID, texts=_script(table()), phrases=_script(phrases()),
+        camera=html.escape(settings.camera), recordings="yes" if settings.recordings else "",
     )  # fmt: skip
 
 
@@ -136,13 +143,11 @@ def assets() -> dict[str, tuple[bytes, str]]:
     }
 
 
-def listen(settings: Dashboard) -> Listener:
+def listen(settings: Dashboard, counters: Counter[str]) -> Listener:
     """Return a bound socket; raise ``LinkError`` if the port is in use."""
     host, port = settings.host, settings.port
-    sock = Listener(socket.AF_INET6 if ":" in host else socket.AF_INET, settings)
+    sock = Listener(socket.AF_INET6 if ":" in host else socket.AF_INET, counters)
     try:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         sock.bind((host, port))
     except OSError as error:
         sock.close()

@@ -7,29 +7,14 @@ there is no fresh message, or no finite number. Distances are metres, angles rad
 
 from collections.abc import Mapping
 
-from msgspec import Struct, convert
+from msgspec import Struct
 
 from common import keys
 from common.codec import finite
-from common.messages import Cause, Driver, Limits, LimitState, Link, Release, Switches
-from common.settings import Vehicle
+from common.messages import Driver, Health, Link, SafetyState, Switches
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.sectors import Protection, Tone, tones, wheel_angles
+from services.dashboard.sectors import Protection, Tone, tones
 from services.dashboard.telemetry_cache import TelemetryCache
-
-
-class State(Struct, frozen=True):
-    """The state of safety."""
-
-    verdict: str
-    text: str
-    source: str | None
-    latched: tuple[str, ...]
-    causes: tuple[Cause, ...]
-    limits: Limits
-    release: Release | None
-    release_refusal: str
-    limit_sources: tuple[LimitState, ...]
 
 
 class DriverState(Struct, frozen=True):
@@ -47,7 +32,6 @@ class DriverState(Struct, frozen=True):
 class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
     """The values that change with the motion."""
 
-    n: int  # the snapshot's number, which a hold answers
     connected: bool  # to a router
     measured: tuple[float, ...] | None  # linear and angular, as the next two
     requested: tuple[float, ...] | None
@@ -56,32 +40,11 @@ class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
     epoch: int
     ranges: tuple[float | None, ...]
     tones: tuple[Tone, ...]
-    wheels: tuple[float, ...]
     bumper: bool | None
     link: str | None
-    safety: State | None
+    safety: SafetyState | None
     driver: DriverState
     keeper: str | None  # the viewer whose page keeps the emergency stop alive
-
-
-class Service(Struct, frozen=True):
-    """A service, by its liveliness tokens and its health."""
-
-    name: str
-    instances: int
-    version: str = ""
-    uptime: float | None = None
-    lateness: float | None = None
-    rss: int | None = None
-    counters: dict[str, int] = {}  # those that are not zero
-
-
-class Stream(Struct, frozen=True):
-    """A key with its rate (Hz) and the age of its last message."""
-
-    key: str
-    rate: float
-    age: float
 
 
 class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
@@ -89,8 +52,8 @@ class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
 
     robots: dict[str, bool]  # whether any of its services is alive
     viewers: dict[str, str]  # names by id
-    services: tuple[Service, ...]
-    streams: tuple[Stream, ...]
+    instances: dict[str, int]  # liveliness tokens of each service
+    health: dict[str, Health]  # of the services that publish it
     left: Driver | None
     right: Driver | None
     switches: Switches | None
@@ -103,9 +66,7 @@ def fast_snapshot(
     driver: DriverState,
     now_ns: int,
     *,
-    number: int,
     connected: bool,
-    vehicle: Vehicle,
     protection: Protection,
     keeper: str | None = None,
 ) -> FastSnapshot:
@@ -116,25 +77,21 @@ def fast_snapshot(
     bumper = telemetry.newest(keys.BUMPER, now_ns)
     motion = telemetry.newest(keys.MOTION, now_ns)
     link = telemetry.newest(keys.LINK, now_ns)
-    state = _state(telemetry, now_ns)
+    state = telemetry.newest(keys.SAFETY, now_ns)
     drive = (
         telemetry.newest(keys.DRIVE, now_ns, source=state.source)
         if state and state.source
         else None
     )
-    measured = _numbers(velocity.linear, velocity.angular) if velocity else None
-    linear, angular = measured or (0.0, 0.0)
     return FastSnapshot(
-        n=number,
         connected=connected,
-        measured=measured,
+        measured=_numbers(velocity.linear, velocity.angular) if velocity else None,
         requested=_numbers(drive.linear, drive.angular) if drive else None,
         allowed=_numbers(motion.linear, motion.angular) if motion else None,
         pose=_numbers(odometry.x, odometry.y, odometry.heading) if odometry else None,
         epoch=odometry.epoch if odometry else 0,
         ranges=tuple(map(_number, sonar.ranges)) if sonar else (None,) * 8,
         tones=tones(sonar, state.causes if state else (), protection),
-        wheels=wheel_angles(linear, angular, vehicle),
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
         safety=state,
@@ -151,12 +108,13 @@ def slow_snapshot(
     now_ns: int,
 ) -> SlowSnapshot:
     """Return the slow snapshot at this time."""
-    ages = telemetry.ages_s(now_ns)
+    services = telemetry.services()
+    health = {name: telemetry.newest(keys.HEALTH, now_ns, service=name) for name in services}
     return SlowSnapshot(
         robots=dict(robots),
         viewers=dict(names),
-        services=tuple(_service(telemetry, name, now_ns) for name in telemetry.services()),
-        streams=tuple(Stream(key, telemetry.rates.get(key, 0.0), age) for key, age in ages.items()),
+        instances={name: len(telemetry.alive.get(name, ())) for name in services},
+        health={name: one for name, one in health.items() if one},
         left=telemetry.newest(keys.DRIVER, now_ns, side="left"),
         right=telemetry.newest(keys.DRIVER, now_ns, side="right"),
         switches=telemetry.newest(keys.SWITCHES, now_ns),
@@ -171,24 +129,3 @@ def _numbers(*values: float) -> tuple[float, ...] | None:
 
 def _number(value: float | None) -> float | None:
     return value if value is not None and finite(value) else None
-
-
-def _state(telemetry: TelemetryCache, now_ns: int) -> State | None:
-    safety = telemetry.newest(keys.SAFETY, now_ns)
-    return convert(safety, State, from_attributes=True) if safety else None
-
-
-def _service(telemetry: TelemetryCache, name: str, now_ns: int) -> Service:
-    instances = len(telemetry.alive.get(name, ()))
-    health = telemetry.newest(keys.HEALTH, now_ns, service=name)
-    if health is None:
-        return Service(name, instances)
-    return Service(
-        name,
-        instances,
-        health.version,
-        health.uptime,
-        health.lateness,
-        health.rss,
-        {name: count for name, count in health.counters.items() if count},
-    )

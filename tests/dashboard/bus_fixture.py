@@ -1,12 +1,13 @@
 """The other programs on the bus of a dashboard under test."""
 
 import time
+from typing import Any
 
 from common import clock, keys
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import Cause, Drive, Release
+from common.messages import Cause, Drive, EstopKeepalive, KeepaliveState, Release
 from tests.factories import safety_state
 from verification.harness.dashboard import Client
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -20,13 +21,14 @@ class Peer:
     def __init__(self, loop: Loop) -> None:
         self.requests: list[Drive] = []
         self.estops: list[int] = []
-        self.stops_elsewhere: list[int] = []
         self.alive: list[str] = []
         self.safe = True
         self.latched: tuple[str, ...] = ()
         self.causes: tuple[Cause, ...] = ()
         self.release: Release | None = None
         self.release_refusal = ""
+        self.keepalives: tuple[KeepaliveState, ...] = ()
+        self.kept_alive: list[EstopKeepalive] = []
         self.boot = 0  # of safety
         self._loop = loop
 
@@ -36,14 +38,15 @@ class Peer:
         bus.subscribe(
             keys.DRIVE, lambda it: self.requests.append(it.message), source="web", depth=64
         )
+        bus.subscribe(
+            keys.ESTOP_KEEPALIVE, lambda it: self.kept_alive.append(it.message), source="web"
+        )
         bus.on_any(keys.estop_key("001"), self.estops.append)
-        bus.on_any(keys.estop_key("one-more"), self.stops_elsewhere.append)
         bus.watch_live(
             keys.live_key("001", "dashboard", "*"), lambda key, _: self.alive.append(key)
         )
         bus.live(keys.live_key("two words", "bridge", "x"))
         bus.live(keys.live_key("002", "bridge", "x"))
-        bus.live(keys.live_key("one-more", "bridge", "x"))
 
         def publish(now_ns: int) -> None:
             if self.safe:
@@ -55,6 +58,7 @@ class Peer:
                         causes=self.causes,
                         release=self.release,
                         release_refusal=self.release_refusal,
+                        estop_keepalives=self.keepalives,
                     )
                 )
 
@@ -92,4 +96,9 @@ def drive(it: Client, peer: Peer) -> None:
         if snapshot["driver"]["hold"] == "lapsed":
             it.send("free")  # the host has stalled
         else:
-            it.send("hold", n=snapshot["n"], **HOLD)
+            it.send("hold", echo=echo_of(snapshot), **HOLD)
+
+
+def echo_of(snapshot: dict[str, Any]) -> int:
+    """Return the heartbeat of safety that a snapshot shows; 0 without a state."""
+    return int(snapshot["safety"]["heartbeat"]) if snapshot["safety"] else 0

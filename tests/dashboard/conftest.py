@@ -31,7 +31,7 @@ def peer(endpoint: str) -> Iterator[Peer]:
 
 @pytest.fixture(scope="module")
 def server(endpoint: str, peer: Peer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with dashboard(endpoint, tmp_path_factory.mktemp("server"), "dashboard.round_trip=0.5") as it:
+    with dashboard(endpoint, tmp_path_factory.mktemp("server")) as it:
         yield it
 
 

@@ -96,7 +96,7 @@ def phone_of(
     context = browser.new_context(viewport=PHONE, has_touch=True, is_mobile=True, locale=locale)
     phone = context.new_page()
     phone.goto(server.url)
-    phone.wait_for_selector("#robots option", state="attached")
+    phone.wait_for_selector("#robots a", state="attached")
     touch = context.new_cdp_session(phone)
 
     def finger(kind: str, *points: tuple[float, float]) -> None:

@@ -1,11 +1,10 @@
-"""The page in a real browser, with the whole stack and the simulated vehicle."""
+"""Roles, stories and faults on the page in a real browser, with the whole stack."""
 
 from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Browser, Page
 
-from sim.requests import Driver
 from tests.dashboard.page import (
     BROWSER_MARKS,
     center_of,
@@ -32,10 +31,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
 
 @pytest.fixture(scope="module")
 def server(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    # A browser on a shared host answers late; test_server.py tests late answers.
-    with dashboard(
-        stack.endpoint, tmp_path_factory.mktemp("server"), "dashboard.round_trip=1.0"
-    ) as it:
+    with dashboard(stack.endpoint, tmp_path_factory.mktemp("server")) as it:
         yield it
 
 
@@ -58,61 +54,62 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     assert problems == []
 
 
-def test_the_content_of_the_page(page: Page, stack: RunningStack) -> None:
+def test_the_content_of_the_page(page: Page) -> None:
     wait_for_text(page, "#verdict", "STOP")
     wait_for_text(page, "#sentence", "No source requests motion.")
-    wait_for_text(page, "#speed", "0.00")
     wait_for_text(page, "#driver", "No driver")
     wait_for_text(page, "#bumper", "clear")
-    assert page.locator("#sonar-view .sector").count() == 8
     assert page.locator("#sonar-view .sector[data-tone=clear]").count() == 8  # an empty world
     for service in ("bridge", "safety", "odom", "dashboard"):
         page.wait_for_selector(f"tr[data-service={service}][data-state=alive]")
-    wait_for_text(page, "#streams", "tel/odom/odometry")
     wait_for_text(page, "#ultrasonic_brake", "on")
-    stack.control.do(Driver(side="left", bits=1 << 2))
-    wait_for_text(page, "[data-bit='2']", "Encoder")
-    wait_for_text(page, "#causes", "left motor driver")
+    page.click("#robots summary")
+    assert page.get_attribute("#robots a", "href") == "/?robot=001"
     page.click("#language")
-    wait_for_text(page, "[data-bit='2']", "编码器")
     wait_for_text(page, "#verdict", "停止")
-    wait_for_text(page, "#sentence", "左侧电机驱动器报告故障")
-    page.click("#language")
-    stack.control.do(Driver(side="left", bits=0))
-    take_control(page)
-    reset_all(page)
+    wait_for_text(page, "#sentence", "没有来源请求运动")
 
 
-def test_driving_by_mouse(page: Page, stack: RunningStack) -> None:
-    take_control(page)
-    x, y, way = center_of(page, "#stick")
-
-    def press() -> None:
-        page.mouse.move(x, y)
-        page.mouse.down()
-        page.mouse.move(x, y - way)
-
-    drive_until_moving(stack, press, page.mouse.up)
-    page.wait_for_function("() => Number(document.querySelector('#speed').textContent) > 0.1")
-    wait_for_text(page, "#driver", "You drive")
-    page.mouse.up()
-    wait_for_standstill(stack)
-    wait_for_text(page, "#hold", "Released")
-
-
-def test_driving_by_keyboard_and_a_lost_focus(page: Page, stack: RunningStack) -> None:
+def test_a_driver_holds_a_key_and_a_viewer_stops(
+    browser: Browser, page: Page, server: Server, stack: RunningStack
+) -> None:
+    context, phone, _ = phone_of(browser, server, "zh-CN")
     take_control(page)
     page.keyboard.press("3")
     wait_for_text(page, "#top", "0.50")
-    page.keyboard.press("1")
-    drive_until_moving(stack, lambda: page.keyboard.down("s"), lambda: page.keyboard.up("s"))
-    assert stack.speed() < 0
-    page.evaluate("window.dispatchEvent(new Event('blur'))")
+    drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
+    wait_for_text(page, "#driver", "You drive")
+    wait_for_text(phone, "#driver", "驾驶")
+    phone.tap("#estop")
     wait_for_standstill(stack)
-    page.keyboard.down("s")  # a repeat: the key never came up
-    wait_for_text(page, "#hold", "Released")
+    wait_for_text(page, "#verdict", "BRAKE")
+    wait_for_text(phone, "#causes", "急停")
+    page.keyboard.up("w")
+    context.close()
+    reset_all(page)
+    wait_for_text(page, "#verdict", "STOP")
+
+
+def test_driving_by_touch_and_a_second_finger_stops(
+    browser: Browser, server: Server, stack: RunningStack
+) -> None:
+    context, phone, finger = phone_of(browser, server, "en-GB")
+    take_control(phone)
+    x, y, way = center_of(phone, "#stick")
+    stop = center_of(phone, "#estop")[:2]
+
+    def press() -> None:
+        finger("touchStart", (x, y))
+        finger("touchMove", (x, y - way))
+
+    drive_until_moving(stack, press, lambda: finger("touchEnd"))
+    finger("touchStart", (x, y - way), stop)
+    finger("touchMove", (x, y - way), (stop[0] + 40, stop[1]))  # it slides: never a click
+    wait_for_text(phone, "#causes", "Emergency stop.")
+    finger("touchEnd")
     wait_for_standstill(stack)
-    page.keyboard.up("s")
+    reset_all(phone)
+    context.close()
 
 
 PAD = """() => {
@@ -130,7 +127,7 @@ PAD = """() => {
 def test_driving_by_gamepad(page: Page, stack: RunningStack) -> None:
     def deadman(down: bool) -> None:
         page.evaluate("down => { window.pad.buttons[4].pressed = down; }", down)
-        page.wait_for_timeout(200)  # the page looks at it with each picture
+        page.wait_for_timeout(200)  # the page looks at it with each snapshot
 
     take_control(page)
     page.evaluate(PAD)
@@ -141,63 +138,30 @@ def test_driving_by_gamepad(page: Page, stack: RunningStack) -> None:
     drive_until_moving(stack, lambda: deadman(True), lambda: deadman(False))
     page.evaluate("() => { window.pad.mapping = ''; }")
     wait_for_standstill(stack)
-    wait_for_text(
-        page, "#gamepad", "cannot drive: the browser does not know its buttons: An odd one"
-    )
+    wait_for_text(page, "#gamepad", "cannot drive: the browser does not know its buttons")
 
 
-def test_a_page_in_the_background_releases(page: Page, stack: RunningStack) -> None:
+HIDDEN = """() => {
+  Object.defineProperty(document, 'hidden', { configurable: true, get: () => true });
+  document.dispatchEvent(new Event('visibilitychange'));
+}"""
+LOST = {
+    "its focus": "window.dispatchEvent(new Event('blur'))",
+    "its place in the foreground": HIDDEN,
+    "the key to a menu": "window.dispatchEvent(new Event('contextmenu'))",
+}
+
+
+@pytest.mark.parametrize("script", LOST.values(), ids=LOST)
+def test_a_page_that_loses_its_input_releases(page: Page, stack: RunningStack, script: str) -> None:
     take_control(page)
-    drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
-    page.evaluate(
-        """() => {
-          Object.defineProperty(document, 'hidden', { configurable: true, get: () => true });
-          document.dispatchEvent(new Event('visibilitychange'));
-        }"""
-    )
+    drive_until_moving(stack, lambda: page.keyboard.down("s"), lambda: page.keyboard.up("s"))
+    page.evaluate(script)
     wait_for_standstill(stack)
-    page.keyboard.up("w")
-
-
-def test_driving_by_touch_and_a_stop_from_another_viewer(
-    browser: Browser, page: Page, server: Server, stack: RunningStack
-) -> None:
-    context, phone, finger = phone_of(browser, server, "zh-CN")
-    wait_for_text(phone, "#link", "主板：在线")
-    take_control(phone)
-    x, y, way = center_of(phone, "#stick")
-
-    def press() -> None:
-        finger("touchStart", (x, y))
-        finger("touchMove", (x, y - way))
-
-    drive_until_moving(stack, press, lambda: finger("touchEnd"))
-    wait_for_text(page, "#driver", "drives")
-    page.keyboard.press("Space")  # of a viewer who does not drive
-    page.keyboard.press("e")
+    page.keyboard.down("s")  # a repeat: the key never came up
+    wait_for_text(page, "#hold", "Released")
     wait_for_standstill(stack)
-    wait_for_text(page, "#verdict", "BRAKE")
-    wait_for_text(phone, "#verdict", "制动")
-    wait_for_text(phone, "#causes", "急停")
-    finger("touchEnd")
-    assert phone.is_visible("#estop")
-    reset_all(phone)
-    context.close()
-    wait_for_text(page, "#driver", "No driver")
-
-
-def test_a_second_finger_stops(browser: Browser, server: Server) -> None:
-    context, phone, finger = phone_of(browser, server, "en-GB")
-    take_control(phone)
-    stick = center_of(phone, "#stick")[:2]
-    stop = center_of(phone, "#estop")[:2]
-    finger("touchStart", stick)
-    finger("touchStart", stick, stop)
-    finger("touchMove", stick, (stop[0] + 40, stop[1]))  # it slides: never a click
-    wait_for_text(phone, "#causes", "Emergency stop.")
-    finger("touchEnd")
-    reset_all(phone)
-    context.close()
+    page.keyboard.up("s")
 
 
 def test_the_server_is_lost_and_comes_back(page: Page, server: Server, stack: RunningStack) -> None:

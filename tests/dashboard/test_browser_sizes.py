@@ -17,7 +17,6 @@ from tests.dashboard.page import (
 )
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.stack import RunningStack, running_stack
-from verification.harness.waiting import wait_until
 
 pytestmark = BROWSER_MARKS
 
@@ -39,7 +38,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
 @pytest.fixture(scope="module")
 def server(stack: RunningStack, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     folder = tmp_path_factory.mktemp("server")
-    with dashboard(stack.endpoint, folder, "dashboard.round_trip=1.0") as it:
+    with dashboard(stack.endpoint, folder) as it:
         yield it
 
 
@@ -148,42 +147,3 @@ def test_a_driver_sees_everything(
     page.set_viewport_size({"width": 1440, "height": 900})
     reset_all(page)
     assert found == {}, f"{found}; see {tmp_path}"
-
-
-def test_no_notice_covers_the_stick(page: Page) -> None:
-    page.set_viewport_size({"width": 844, "height": 390})
-    page.click("#leave")
-    page.wait_for_selector(".driving:not(.is-driver)")
-    page.keyboard.press("w")  # without control
-    page.wait_for_selector("#toasts div")
-    assert not overlap(page.evaluate(BOX, "#toasts div"), page.evaluate(BOX, "#stick"))
-
-
-def test_a_reset_is_offered_only_where_safety_accepts_it(page: Page, stack: RunningStack) -> None:
-    wait_for_title(page, "Nothing is latched")
-    stack.control.do(Bumper(pressed=True))
-    page.wait_for_selector("#release.due")
-    page.click("#estop")
-    page.wait_for_selector("#reset.due")  # safety refuses a release until the stop is reset
-    wait_for_text(page, "#sentence", "It is still pressed: reset first, then move off.")
-    wait_for_text(page, "#release-forbidden", "Reset first, then move off.")
-    assert page.is_disabled("#release-backward")
-    wait_until(lambda: page.is_enabled("#reset"), "a reset is offered")
-    page.keyboard.press("r")
-    page.wait_for_selector("#release.due")
-    assert page.locator("#reset.due").count() == 0
-    wait_until(lambda: page.is_enabled("#release-backward"), "a release is offered")
-    stack.control.do(Bumper(pressed=False))
-    page.wait_for_selector("#reset.due")
-    reset_all(page)
-    wait_for_title(page, "Nothing is latched")
-    page.click("#language")
-    wait_for_title(page, "没有锁定的原因")
-
-
-def wait_for_title(page: Page, expected: str) -> None:
-    """Wait until the reset is disabled for this reason."""
-    wait_until(
-        lambda: page.is_disabled("#reset") and page.get_attribute("#reset", "title") == expected,
-        f"the reset is disabled: {expected}",
-    )

@@ -10,29 +10,28 @@ READ = msgspec.json.Decoder(client.AnyMessage)
 
 
 @pytest.mark.parametrize(
-    ("text", "word"),
+    ("text", "message"),
     [
-        ('{"k":"look","robot":"001","name":"Ada"}', client.Look("001", "Ada")),
+        ('{"k":"name","name":"Ada"}', client.Name("Ada")),
         ('{"k":"take"}', client.Take()),
         ('{"k":"take","force":true}', client.Take(force=True)),
         ('{"k":"leave"}', client.Leave()),
-        ('{"k":"hold","n":3,"x":0.5,"y":-1}', client.Hold(3, 0.5, -1.0)),
-        ('{"k":"hold","n":3,"x":0,"y":0,"release":"backward"}', client.Hold(3, release="backward")),
+        ('{"k":"hold","echo":3,"x":0.5,"y":-1}', client.Hold(3, 0.5, -1.0)),
+        ('{"k":"hold","echo":3,"release":"backward"}', client.Hold(3, release="backward")),
         ('{"k":"free"}', client.Free()),
         ('{"k":"gear","gear":5}', client.Gear(5)),
+        ('{"k":"alive","echo":3}', client.Alive(3)),
         ('{"k":"estop"}', client.Estop()),
-        ('{"k":"estop","robot":"002"}', client.Estop("002")),
-        ('{"k":"reset"}', client.Reset(0)),
-        ('{"k":"reset","n":9}', client.Reset(9)),
+        ('{"k":"reset","echo":9}', client.Reset(9)),
         (
-            '{"k":"switch","n":9,"to":{"bumper_brake":false}}',
-            client.Switch(SwitchesRequest(bumper_brake=False), 9),
+            '{"k":"switch","to":{"bumper_brake":false,"echo":9}}',
+            client.Switch(SwitchesRequest(bumper_brake=False, echo=9)),
         ),
         ('{"k":"lamp","to":{"channel":1,"mode":2}}', client.Lamp(LedRequest(channel=1, mode=2))),
     ],
 )
-def test_valid_messages_are_decoded(text: str, word: client.ClientMessage) -> None:
-    assert READ.decode(text) == word
+def test_valid_messages_are_decoded(text: str, message: client.ClientMessage) -> None:
+    assert READ.decode(text) == message
 
 
 @pytest.mark.parametrize(
@@ -43,15 +42,13 @@ def test_valid_messages_are_decoded(text: str, word: client.ClientMessage) -> No
         "[1]",
         '{"k":"drive"}',
         '{"k":"hold"}',
-        '{"k":"hold","n":1,"x":"fast"}',
-        '{"k":"hold","n":1,"z":1}',
-        '{"k":"hold","n":1,"release":"sideways"}',
-        '{"k":"estop","robot":"a/b"}',
+        '{"k":"hold","echo":1,"x":"fast"}',
+        '{"k":"hold","echo":1,"z":1}',
+        '{"k":"hold","echo":1,"release":"sideways"}',
+        '{"k":"reset"}',
         '{"k":"gear","gear":6}',
         '{"k":"gear","gear":0}',
-        '{"k":"look","robot":"*"}',
-        '{"k":"look","robot":"a/b"}',
-        '{"k":"look","robot":"001","name":"' + "x" * 25 + '"}',
+        '{"k":"name","name":"' + "x" * 25 + '"}',
         '{"k":"lamp","to":{"channel":256,"mode":1}}',
     ],
 )

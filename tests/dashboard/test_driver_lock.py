@@ -1,4 +1,4 @@
-"""The driver lock: its table, the round trip, hostile values."""
+"""The driver lock, and the page that keeps the emergency stop alive."""
 
 import math
 
@@ -6,145 +6,137 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.freshness import NS_PER_S
-from services.dashboard.driver_lock import SNAPSHOTS_KEPT, DriverLock, HoldState, Push
+from common.freshness import NS_PER_S, Latest
+from common.messages import KeepaliveState, SafetyState
+from services.dashboard.driver_lock import (
+    HOLD_S,
+    DriverLock,
+    HoldState,
+    PageKeepalive,
+    Push,
+    Shown,
+)
+from tests.factories import safety_state
 
 AHEAD = Push(1.0, 0.0)
-LIMIT_S = 0.3
+HOLD_NS = round(HOLD_S * NS_PER_S)
+NOW_NS = 10 * NS_PER_S
+FREE, HELD, LAPSED = HoldState
 
 
-def at(seconds: float) -> int:
-    return round(seconds * NS_PER_S)
+def shown(received_ns: int = NOW_NS, heartbeat: int = 7) -> Shown:
+    return Latest(safety_state(heartbeat=heartbeat), received_ns)
 
 
 @pytest.fixture
 def lock() -> DriverLock:
-    """The viewer "a" drives, and snapshot 1 was sent at 10 s."""
-    lock = DriverLock(LIMIT_S)
+    """The viewer "a" drives."""
+    lock = DriverLock()
     assert lock.take("a", force=False)
-    lock.sent(1, at(10))
     return lock
 
 
-def test_there_is_no_driver_at_first() -> None:
-    lock = DriverLock(LIMIT_S)
-    lock.sent(1, at(10))
-    assert not lock.hold("a", 1, AHEAD, at(10))
-    assert lock.held(at(10)) is None
+def in_state(lock: DriverLock, state: HoldState) -> None:
+    if state is not FREE:
+        lock.hold("a", AHEAD, shown(), NOW_NS)
+    if state is LAPSED:
+        lock.lapse()
+    assert lock.state is state
+
+
+@pytest.mark.parametrize(
+    ("state", "answered", "after", "push"),
+    [
+        (FREE, shown(NOW_NS - HOLD_NS), HELD, Push(0.5)),
+        (FREE, shown(NOW_NS - HOLD_NS - 1), FREE, Push()),
+        (FREE, None, FREE, Push()),
+        (HELD, shown(NOW_NS - HOLD_NS), HELD, Push(0.5)),
+        (HELD, shown(NOW_NS - HOLD_NS - 1), HELD, AHEAD),
+        (HELD, None, HELD, AHEAD),
+        (LAPSED, shown(), LAPSED, Push()),
+        (LAPSED, shown(NOW_NS - HOLD_NS - 1), LAPSED, Push()),
+    ],
+)
+def test_a_hold_in_each_state(
+    lock: DriverLock, state: HoldState, answered: Shown, after: HoldState, push: Push
+) -> None:
+    in_state(lock, state)
+    lock.hold("a", Push(0.5), answered, NOW_NS)
+    assert (lock.state, lock.push) == (after, push)
+
+
+@pytest.mark.parametrize("state", HoldState)
+def test_only_the_driver_ends_a_hold(lock: DriverLock, state: HoldState) -> None:
+    in_state(lock, state)
+    lock.let_go("b")
+    assert lock.state is state
+    lock.let_go("a")
+    assert (lock.state, lock.push) == (FREE, Push())
+
+
+@pytest.mark.parametrize(("state", "after"), [(FREE, FREE), (HELD, LAPSED), (LAPSED, LAPSED)])
+def test_a_lapse(lock: DriverLock, state: HoldState, after: HoldState) -> None:
+    in_state(lock, state)
+    lock.lapse()
+    assert (lock.state, lock.push) == (after, Push())
+
+
+def test_a_hold_lapses_with_the_age_of_what_it_answers(lock: DriverLock) -> None:
+    assert lock.held(NOW_NS) is None
+    lock.hold("a", AHEAD, shown(), NOW_NS + HOLD_NS // 2)
+    assert lock.held(NOW_NS + HOLD_NS) == AHEAD
+    assert lock.shown == shown()  # its heartbeat is the echo of the requests
+    assert lock.held(NOW_NS + HOLD_NS + 1) is None
+    assert lock.state is LAPSED
 
 
 def test_one_viewer_has_the_lock(lock: DriverLock) -> None:
     assert not lock.take("b", force=False)
-    assert lock.driver == "a"
-    assert not lock.hold("b", 1, AHEAD, at(10))
-    assert lock.take("a", force=False)
-
-
-def test_a_takeover_ends_the_hold_and_starts_in_gear_1(lock: DriverLock) -> None:
-    lock.shift("a", 4)
-    lock.hold("a", 1, AHEAD, at(10))
-    assert lock.take("b", force=True)
-    assert (lock.driver, lock.gear, lock.held(at(10))) == ("b", 1, None)
-    assert not lock.hold("a", 1, AHEAD, at(10))
+    lock.hold("b", AHEAD, shown(), NOW_NS)
+    lock.shift("b", 5)
+    lock.leave("b")
+    assert (lock.driver, lock.state, lock.gear) == ("a", FREE, 1)
 
 
 def test_taking_the_lock_again_changes_nothing(lock: DriverLock) -> None:
     lock.shift("a", 4)
-    lock.hold("a", 1, AHEAD, at(10))
+    in_state(lock, HELD)
     assert lock.take("a", force=True)
-    assert (lock.gear, lock.held(at(10))) == (4, AHEAD)
+    assert (lock.gear, lock.held(NOW_NS)) == (4, AHEAD)
 
 
-def test_leaving_ends_the_hold(lock: DriverLock) -> None:
-    lock.hold("a", 1, AHEAD, at(10))
-    lock.leave("b")
-    assert lock.held(at(10)) == AHEAD
+def test_a_takeover_ends_the_hold_and_starts_in_gear_1(lock: DriverLock) -> None:
+    lock.shift("a", 4)
+    in_state(lock, HELD)
+    assert lock.take("b", force=True)
+    assert (lock.driver, lock.gear, lock.state) == ("b", 1, FREE)
+    lock.hold("a", AHEAD, shown(), NOW_NS)
+    assert lock.state is FREE
+
+
+def test_leaving_ends_the_hold_and_frees_the_lock(lock: DriverLock) -> None:
+    in_state(lock, HELD)
     lock.leave("a")
-    assert (lock.driver, lock.held(at(10))) == (None, None)
+    assert (lock.driver, lock.state) == (None, FREE)
     assert lock.take("b", force=False)
-
-
-def test_only_the_driver_shifts(lock: DriverLock) -> None:
-    lock.shift("b", 5)
-    assert lock.gear == 1
-
-
-def test_only_the_driver_ends_the_hold(lock: DriverLock) -> None:
-    lock.hold("a", 1, AHEAD, at(10))
-    lock.let_go("b")
-    assert lock.state is HoldState.HELD
-
-
-def test_a_hold_is_valid_for_the_round_trip_of_its_snapshot(lock: DriverLock) -> None:
-    assert lock.hold("a", 1, AHEAD, at(10.3))
-    assert lock.held(at(10.3)) == AHEAD
-    assert lock.held(at(10.3) + 1) is None
-    assert lock.state is HoldState.LAPSED
-
-
-def test_an_answer_to_an_old_snapshot_is_refused(lock: DriverLock) -> None:
-    assert not lock.hold("a", 1, AHEAD, at(10.3) + 1)
-    assert lock.state is HoldState.FREE
-
-
-def test_an_answer_to_an_unknown_snapshot_is_refused(lock: DriverLock) -> None:
-    assert not lock.hold("a", 2, AHEAD, at(10))
-
-
-def test_only_the_newest_snapshots_are_kept(lock: DriverLock) -> None:
-    for number in range(2, 2 + SNAPSHOTS_KEPT):
-        lock.sent(number, at(10))
-    assert not lock.hold("a", 1, AHEAD, at(10))
-    assert lock.hold("a", 2, AHEAD, at(10))
-
-
-def test_every_answer_renews_the_hold(lock: DriverLock) -> None:
-    for number in range(2, 40):
-        now_ns = at(10) + number * NS_PER_S // 20
-        lock.sent(number, now_ns)
-        assert lock.hold("a", number, AHEAD, now_ns)
-        assert lock.held(now_ns + NS_PER_S // 4) == AHEAD
-
-
-def test_a_reordered_hold_changes_nothing(lock: DriverLock) -> None:
-    lock.sent(2, at(10.05))
-    assert lock.hold("a", 2, AHEAD, at(10.1))
-    assert not lock.hold("a", 1, Push(-1.0), at(10.1))
-    assert lock.held(at(10.1)) == AHEAD
-    assert lock.answered == 2
-
-
-def test_after_a_lapse_a_release_is_required(lock: DriverLock) -> None:
-    lock.hold("a", 1, AHEAD, at(10))
-    assert lock.held(at(11)) is None
-    lock.sent(2, at(11))
-    assert not lock.hold("a", 2, AHEAD, at(11))
-    lock.let_go("a")
-    assert lock.hold("a", 2, AHEAD, at(11))
-
-
-def test_a_free_lock_does_not_lapse(lock: DriverLock) -> None:
-    lock.lapse()
-    assert lock.state is HoldState.FREE
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
 def test_a_non_finite_push_is_refused(lock: DriverLock, wrong: float) -> None:
-    assert not lock.hold("a", 1, Push(wrong, 0.0), at(10))
-    assert not lock.hold("a", 1, Push(0.0, wrong), at(10))
-    assert lock.held(at(10)) is None
+    lock.hold("a", Push(wrong, 0.0), shown(), NOW_NS)
+    lock.hold("a", Push(0.0, wrong), shown(), NOW_NS)
+    assert lock.state is FREE
 
 
 def test_a_push_is_clamped(lock: DriverLock) -> None:
-    lock.hold("a", 1, Push(7.0, -7.0, release="backward"), at(10))
-    assert lock.held(at(10)) == Push(1.0, -1.0, release="backward")
+    lock.hold("a", Push(7.0, -7.0, release="backward"), shown(), NOW_NS)
+    assert lock.held(NOW_NS) == Push(1.0, -1.0, release="backward")
 
 
 STEPS = st.lists(
     st.tuples(
-        st.sampled_from(["take", "force", "leave", "hold", "free", "sent", "wait"]),
+        st.sampled_from(["take", "force", "leave", "hold", "free", "wait"]),
         st.sampled_from(["a", "b"]),
-        st.integers(0, 12),
         st.floats(0.0, 0.5),
     ),
     max_size=60,
@@ -152,14 +144,16 @@ STEPS = st.lists(
 
 
 class Play:
-    """A lock, and the time of each viewer's last valid hold."""
+    """A lock, the age of its newest hold, and whether the driver has lapsed since it let go."""
 
     def __init__(self) -> None:
-        self.lock = DriverLock(LIMIT_S)
-        self.now_ns = 0
-        self.counted_ns: dict[str, int] = {}
+        self.lock = DriverLock()
+        self.now_ns = NOW_NS
+        self.answered_ns = 0
+        self.lapsed: str | None = None
 
-    def step(self, what: str, who: str, number: int, seconds: float) -> None:
+    def step(self, what: str, who: str, seconds: float) -> None:
+        span_ns = round(seconds * NS_PER_S)
         match what:
             case "take" | "force":
                 self.lock.take(who, force=what == "force")
@@ -167,21 +161,73 @@ class Play:
                 self.lock.leave(who)
             case "free":
                 self.lock.let_go(who)
-            case "sent":
-                self.lock.sent(number, self.now_ns)
-            case "hold" if self.lock.hold(who, number, AHEAD, self.now_ns):
-                self.counted_ns[who] = self.now_ns
+                self.lapsed = None if who == self.lock.driver else self.lapsed
+            case "hold":
+                answered = shown(self.now_ns - span_ns)
+                self.lock.hold(who, AHEAD, answered, self.now_ns)
+                if self.lock.shown is answered:
+                    self.answered_ns = self.now_ns - span_ns
             case "wait":
-                self.now_ns += round(seconds * NS_PER_S)
+                self.now_ns += span_ns
+        self.lapsed = None if self.lapsed != self.lock.driver else self.lapsed
 
 
 @given(STEPS)
-def test_a_valid_hold_is_the_drivers_and_within_the_round_trip(
-    steps: list[tuple[str, str, int, float]],
+def test_a_valid_hold_is_the_drivers_and_young_and_none_returns_after_a_gap(
+    steps: list[tuple[str, str, float]],
 ) -> None:
     play = Play()
     for step in steps:
         play.step(*step)
+        before = play.lock.state
         if play.lock.held(play.now_ns) is not None:
             assert play.lock.driver is not None
-            assert play.now_ns - play.counted_ns[play.lock.driver] <= LIMIT_S * NS_PER_S
+            assert play.now_ns - play.answered_ns <= HOLD_NS
+            assert play.lapsed is None
+        elif before is HELD:
+            play.lapsed = play.lock.driver
+
+
+TIMEOUT_NS = NS_PER_S
+
+
+def kept(alive: bool, heartbeat: int = 7, name: str = "web") -> SafetyState:
+    one = KeepaliveState(source=name, age=0.1 if alive else None, alive=alive, timeout=1.0)
+    return safety_state(heartbeat=heartbeat, estop_keepalives=(one,))
+
+
+def test_the_first_page_keeps_the_stop_alive_and_echoes_what_it_showed() -> None:
+    page = PageKeepalive("web")
+    assert page.answer("ada", shown(heartbeat=7), kept(False, 9), NOW_NS) == 7
+    assert page.holder == "ada"
+    assert page.answer("ada", shown(heartbeat=8), kept(True, 9), NOW_NS) == 8
+
+
+@pytest.mark.parametrize(
+    ("answered", "newest"),
+    [
+        (None, kept(False)),
+        (shown(), None),
+        (shown(), kept(False, name="pendant")),
+        (shown(), kept(True)),  # another program keeps it alive
+    ],
+)
+def test_an_answer_that_proves_nothing_is_not_sent(
+    answered: Shown, newest: SafetyState | None
+) -> None:
+    page = PageKeepalive("web")
+    assert page.answer("ada", answered, newest, NOW_NS) is None
+    assert page.holder is None
+
+
+def test_another_page_takes_over_only_after_safety_has_noticed() -> None:
+    page = PageKeepalive("web")
+    page.answer("ada", shown(), kept(False), NOW_NS + NS_PER_S // 2)
+    now_ns = NOW_NS + TIMEOUT_NS
+    assert page.answer("bob", shown(now_ns), kept(False), now_ns) is None  # not published yet
+    page.left("bob")
+    assert page.holder == "ada"
+    page.left("ada")
+    assert page.answer("bob", shown(now_ns), kept(True), now_ns + 1) is None  # still counts
+    assert page.answer("bob", shown(now_ns, 8), kept(False), now_ns + 1) == 8
+    assert page.holder == "bob"

@@ -27,10 +27,10 @@ def used_keys() -> set[str]:
         found |= set(re.findall(r'\bt\("([\w.]+)"\)', text))
         found |= set(re.findall(r'toast\("(\w+)"', text))
         found |= set(re.findall(r'"(release_\w+|moved_\w+|believed_\w+)"', text))
-    fleet = (CODE / "fleet.py").read_text(encoding="utf-8")
-    found |= set(re.findall(r'_notify\([^)]*"(\w+)"\)', fleet))
-    robot = (CODE / "robot.py").read_text(encoding="utf-8")
-    return found | set(re.findall(r'"(?:error|info|warning)", "(\w+)"', robot))
+    for name in ("fleet.py", "robot_page.py", "robot.py"):
+        code = (CODE / name).read_text(encoding="utf-8")
+        found |= set(re.findall(r'"(?:error|info|warning)", "(\w+)"', code))
+    return found
 
 
 def test_the_search_finds_known_keys() -> None:

@@ -27,21 +27,21 @@ class RobotFixture:
             lambda *words: self.notices.append(words),
         )
         self.now_ns = 0
+        self.delay_ns = 0  # of the browser's answers
         self.release: Direction | None = None
         self.latched: tuple[str, ...] = ()
         assert self.robot.driver_lock.take("1", force=False)
 
     def ticks(self, number: int, source: str | None, *, held: bool = True) -> None:
         lock = self.robot.driver_lock
-        for count in range(number):
+        for _ in range(number):
             self.now_ns += TICK_NS
-            self.bus.deliver(keys.SAFETY, safety_state(heartbeat=count, source=source))
-            state = safety_state(source=source, latched=self.latched)
-            self.robot.telemetry.update("tel/safety/state", state, self.now_ns)
-            lock.sent(self.now_ns, self.now_ns, state)
+            state = safety_state(heartbeat=self.now_ns, source=source, latched=self.latched)
+            self.bus.deliver(keys.SAFETY, state, self.now_ns)
             if held:
                 push = Push(release=self.release) if self.release else Push(1.0)
-                lock.hold("1", self.now_ns, push, self.now_ns)
+                shown = self.robot.telemetry.shown(self.now_ns - self.delay_ns)
+                lock.hold("1", push, shown, self.now_ns)
             else:
                 lock.let_go("1")
             self.robot.tick(self.now_ns)
@@ -93,6 +93,19 @@ def test_nobody_is_overruled_who_holds_no_control(fixture: RobotFixture) -> None
     fixture.ticks(20, "nav", held=False)
     assert fixture.overruled_by() is None
     assert fixture.robot.driver_state({}).other == "nav"
+
+
+def test_a_request_echoes_what_the_driver_was_shown_and_a_zero_the_newest(
+    fixture: RobotFixture,
+) -> None:
+    requests = next(p for p in fixture.bus.publishers if p.topic is keys.DRIVE)
+    fixture.ticks(5, "web")
+    fixture.delay_ns = 3 * TICK_NS
+    fixture.ticks(1, "web")
+    assert isinstance(requests.last, Drive)
+    assert (requests.last.linear, requests.last.echo) == (0.2, fixture.now_ns - 3 * TICK_NS)
+    fixture.ticks(1, "web", held=False)
+    assert (requests.last.linear, requests.last.echo) == (0.0, fixture.now_ns)
 
 
 def test_a_release_is_requested_after_a_neutral_request(fixture: RobotFixture) -> None:

@@ -1,12 +1,10 @@
-"""Tones of the sonar sectors and wheel angles."""
-
-import math
+"""Tones of the sonar sectors."""
 
 import pytest
 
 from common.messages import SONAR_NAMES, Cause, RangeStatus, Ultrasonic
 from common.settings import Vehicle
-from services.dashboard.sectors import Protection, Tone, sonars_named, tones, wheel_angles
+from services.dashboard.sectors import Protection, Tone, sonars_named, tones
 from services.safety.config import Safety
 from services.safety.core.planning import zones
 
@@ -91,26 +89,3 @@ def test_the_default_protection_equals_safetys_settings() -> None:
 def test_full_speed_needs_the_distance_of_safetys_zones() -> None:
     field = zones(Vehicle(), Safety())
     assert field.allowed(AS_SHIPPED.full_speed_room) == pytest.approx(AS_SHIPPED.max_linear)
-
-
-def test_wheel_angles_straight_ahead() -> None:
-    assert wheel_angles(0.5, 0.0, Vehicle()) == (0.0, 0.0, 0.0, 0.0)
-    assert wheel_angles(-0.5, 0.0, Vehicle()) == (0.0, 0.0, 0.0, 0.0)
-    assert wheel_angles(0.0, 0.0, Vehicle()) == (0.0, 0.0, 0.0, 0.0)
-
-
-def test_wheel_angles_of_a_turn_on_the_spot() -> None:
-    one = Vehicle(wheelbase=0.6, track=0.6)
-    quarter = math.pi / 4
-    across = (-quarter, quarter, quarter, -quarter)
-    assert wheel_angles(0.0, 0.5, one) == pytest.approx(across)
-
-
-def test_wheel_angles_in_a_left_turn() -> None:
-    front_left, front_right, rear_left, rear_right = wheel_angles(0.5, 0.3, Vehicle())
-    assert front_left > front_right > 0 > rear_right > rear_left
-    assert rear_left == pytest.approx(-front_left)
-
-
-def test_wheel_angles_backward_point_forward() -> None:
-    assert wheel_angles(-0.5, -0.3, Vehicle()) == pytest.approx(wheel_angles(0.5, 0.3, Vehicle()))

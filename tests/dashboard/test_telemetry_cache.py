@@ -1,21 +1,18 @@
-"""Newest messages, rates, events and trajectory of a robot."""
-
-import pytest
+"""Newest messages and events of a robot."""
 
 from common import keys
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Bumper, Drive, Driver, Event, Health, Velocity
 from services.dashboard.telemetry_cache import (
     EVENTS_MAX,
-    OTHERS,
-    POINTS,
-    SPACING_M,
-    UNKNOWN_MAX,
+    FIXED,
+    INVENTED_MAX,
+    STATES_MAX,
     TelemetryCache,
-    Trail,
     max_age_s,
     path_of,
 )
+from tests.factories import safety_state
 
 BUMPER = "tel/bridge/bumper"
 HEALTH = Health(
@@ -39,17 +36,15 @@ def test_the_newest_message_until_it_is_too_old() -> None:
     telemetry.update(BUMPER, Bumper(pressed=True), NS_PER_S)
     assert telemetry.newest(keys.BUMPER, NS_PER_S + NS_PER_S // 2) == Bumper(pressed=True)
     assert telemetry.newest(keys.BUMPER, NS_PER_S + NS_PER_S // 2 + 1) is None
-    assert telemetry.ages_s(2 * NS_PER_S) == {BUMPER: 1.0}
 
 
-def test_invented_names_share_an_entry_and_displace_nothing() -> None:
+def test_invented_names_are_bounded_and_displace_nothing() -> None:
     telemetry = TelemetryCache()
     for number in range(1000):
         telemetry.update(f"@cmd/drive/{number}", Drive(linear=0.0, angular=0.0, echo=0), number)
     telemetry.update("tel/bridge/driver/left", Driver(faults=("under_voltage",), bits=8), NS_PER_S)
     telemetry.update("tel/safety/health", HEALTH, NS_PER_S)
-    assert len(telemetry.ages_s(NS_PER_S)) == UNKNOWN_MAX + 3
-    assert telemetry.ages_s(1999)[OTHERS] == 1000 / NS_PER_S
+    assert len(telemetry._latest) <= len(FIXED) + INVENTED_MAX + 2
     assert telemetry.newest(keys.DRIVER, NS_PER_S, side="left") is not None
     assert telemetry.services() == ["safety"]
 
@@ -63,30 +58,6 @@ def test_a_message_of_another_type_is_not_returned() -> None:
     telemetry = TelemetryCache()
     telemetry.update(BUMPER, Velocity(linear=0.0, angular=0.0), 0)
     assert telemetry.newest(keys.BUMPER, 0) is None
-
-
-def test_rates_cover_the_last_seconds() -> None:
-    telemetry = TelemetryCache()
-    telemetry.update_rates(0)
-    for _ in range(20):
-        telemetry.update(BUMPER, Bumper(pressed=False), 0)
-    telemetry.update_rates(NS_PER_S // 2)
-    assert telemetry.rates == {BUMPER: 40.0}
-    telemetry.update_rates(3 * NS_PER_S)
-    assert telemetry.rates == {BUMPER: pytest.approx(20 / 3)}
-    telemetry.update_rates(4 * NS_PER_S)
-    assert telemetry.rates == {}
-
-
-def test_the_rate_of_a_slow_stream_is_constant() -> None:
-    telemetry, seen = TelemetryCache(), set()
-    for tick in range(40):
-        if tick % 2:
-            telemetry.update(BUMPER, Bumper(pressed=False), 0)
-        telemetry.update_rates(tick * NS_PER_S // 2)
-        if tick > 6:
-            seen.add(telemetry.rates[BUMPER])
-    assert seen == {1.0}
 
 
 def test_events_are_sorted_by_the_senders_time_and_bounded() -> None:
@@ -114,43 +85,15 @@ def test_services_by_token_or_by_health() -> None:
     assert telemetry.alive == {"safety": {"b"}}
 
 
+def test_a_state_of_safety_is_found_by_its_heartbeat_while_it_is_new() -> None:
+    telemetry = TelemetryCache()
+    states = [safety_state(heartbeat=number) for number in range(1, STATES_MAX + 2)]
+    for state in states:
+        telemetry.update("tel/safety/state", state, 10 * state.heartbeat)
+    assert telemetry.shown(2) == Latest(states[1], 20)
+    assert telemetry.shown(STATES_MAX + 1) == Latest(states[-1], 10 * (STATES_MAX + 1))
+    assert [telemetry.shown(number) for number in (0, 1, STATES_MAX + 2)] == [None] * 3
+
+
 def test_the_path_behind_the_robot() -> None:
     assert path_of("t2/v1/001/tel/bridge/driver/left") == "tel/bridge/driver/left"
-
-
-def test_near_points_are_skipped() -> None:
-    trail = Trail()
-    for x in (0.0, SPACING_M / 2, SPACING_M, SPACING_M * 1.5):
-        assert not trail.add(x, 0.0, epoch=0)
-    assert list(trail.points) == [(0.0, 0.0), (SPACING_M, 0.0)]
-
-
-def test_a_new_epoch_clears_the_trail() -> None:
-    trail = Trail()
-    trail.add(0.0, 0.0, epoch=0)
-    assert trail.add(5.0, 5.0, epoch=1)
-    assert list(trail.points) == [(5.0, 5.0)]
-
-
-def test_the_trail_is_bounded() -> None:
-    trail = Trail()
-    for x in range(POINTS + 1):
-        trail.add(float(x), 0.0, epoch=0)
-    assert len(trail.points) == POINTS
-    assert trail.points[0] == (1.0, 0.0)
-
-
-def test_stored_points_of_odometry_are_prepended() -> None:
-    trail = Trail()
-    trail.add(2.0, 0.0, epoch=4)
-    trail.begin([(0.0, 0.0), (1.0, 0.0)], epoch=4)
-    assert list(trail.points) == [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0)]
-    trail.begin([(9.0, 9.0)], epoch=3)
-    assert len(trail.points) == 3
-
-
-def test_stored_points_may_come_first() -> None:
-    trail = Trail()
-    trail.begin([(1.0, 0.0)], epoch=2)
-    assert trail.add(3.0, 0.0, epoch=3)
-    assert list(trail.points) == [(3.0, 0.0)]

@@ -22,8 +22,8 @@ from websockets.typing import Origin
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 
-LOOK_TEXT = b'{"k":"look","robot":"001"}'
-LOOK = bytes([0x81, 0x80 | len(LOOK_TEXT)]) + bytes(4) + LOOK_TEXT  # a frame, masked with zeros
+FREE_TEXT = b'{"k":"free"}'
+FREE = bytes([0x81, 0x80 | len(FREE_TEXT)]) + bytes(4) + FREE_TEXT  # a frame, masked with zeros
 BATCH = 500
 PER_SECOND = 50_000
 
@@ -123,10 +123,9 @@ class Client:
 @contextlib.contextmanager
 def connected(server: Server, robot: str = "001") -> Iterator[Client]:
     """Show a robot while the context lasts."""
-    address = f"ws://127.0.0.1:{server.port}/live"
+    address = f"ws://127.0.0.1:{server.port}/live?robot={robot}"
     with connect(address, origin=Origin(server.url.rstrip("/"))) as socket:
         it = Client(socket)
-        it.send("look", robot=robot)
         it.wait_for("hello")
         yield it
 
@@ -153,11 +152,11 @@ def flooded(server: Server) -> Iterator[None]:
 
 def _flood(server: Server, stop: threading.Event) -> None:
     """Send requests on one connection until it ends."""
-    address, origin = f"ws://127.0.0.1:{server.port}/live", Origin(server.url.rstrip("/"))
+    address, origin = f"ws://127.0.0.1:{server.port}/live?robot=001", Origin(server.url.rstrip("/"))
     with connect(address, origin=origin, open_timeout=5) as viewer:
         began, sent = time.monotonic(), 0
         while not stop.is_set():
-            viewer.socket.sendall(LOOK * BATCH)
+            viewer.socket.sendall(FREE * BATCH)
             sent += BATCH
             time.sleep(max(0.0, began + sent / PER_SECOND - time.monotonic()))
 

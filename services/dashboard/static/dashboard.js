@@ -16,7 +16,6 @@ const { toast, confirm } = notices;
 const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
 const CONGESTED = 2048; // bytes that wait in the browser
-const INVALID_MESSAGE = 1003; // close code of the server
 const $ = (id) => document.getElementById(id);
 const stored = (key, otherwise) => localStorage.getItem(`t2.${key}`) ?? otherwise;
 
@@ -25,18 +24,19 @@ let language = stored("language", navigator.language.startsWith("zh") ? "zh" : "
 let socket = null;
 let fast = null; // the newest snapshots
 let fastAt = -Infinity;
-let aliveN = -2; // the snapshot that was last answered with a sign of life
+let aliveEcho = -2; // the heartbeat that was last answered with a sign of life
 let slow = null;
 const EVENTS_MAX = 80;
 let events = [];
 let hello = null;
-let robot = null; // the selected one
-let drawn = -1; // number of the drawn snapshot
+let drawn; // the drawn snapshot; null without a connection
 
 const t = (key) => texts[language][key] ?? key;
 const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
-const shown = () => hello?.robot ?? robot ?? $("page").dataset.robot;
+const robot = $("page").dataset.robot;
+// The heartbeat of safety in a snapshot: its age is the age of what the operator saw.
+const echoOf = (snapshot) => snapshot?.safety?.heartbeat ?? 0;
 // A hold is sent only while the socket is not congested: a burst of old answers is useless.
 const send = (message) => {
   const open = socket?.readyState === WebSocket.OPEN
@@ -46,15 +46,14 @@ const send = (message) => {
 };
 
 function connect() {
-  const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`;
+  const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live?robot=${robot}`;
   const opened = (socket = new WebSocket(address));
-  opened.onopen = look;
+  opened.onopen = sendName;
   opened.onmessage = (event) => handle(JSON.parse(event.data));
-  opened.onclose = (event) => {
+  opened.onclose = () => {
     if (opened !== socket) return;
     driving.letGo();
     fastAt = -Infinity;
-    if (event.code === INVALID_MESSAGE) forget();
     setTimeout(reconnect, RETRY_MS);
   };
 }
@@ -67,54 +66,30 @@ async function reconnect() {
   else connect();
 }
 
-// The stored robot or name made an invalid message: it would be refused again and again.
-function forget() {
-  for (const name of ["robot", "name"]) localStorage.removeItem(`t2.${name}`);
-  $("name").value = "";
-  robot = null;
-}
-
-function look() {
-  send({ k: "look", robot: robot ?? $("page").dataset.robot, name: stored("name", "") });
-}
-
-function choose(name) {
-  robot = name;
-  if (robot === hello?.robot) return;
-  hello = null;
-  look();
-}
-
-// Once: later only the viewer changes the selected robot.
-function selectStored() {
-  const name = stored("robot", null);
-  choose(slow.robots[name] && !isDriver() ? name : $("page").dataset.robot);
-}
+const sendName = () => send({ k: "name", name: stored("name", "") });
 
 const HANDLERS = {
   hello(message) {
     hello = message;
     sonarView.build(message.vehicle);
     trail.size(message.vehicle);
-    slots.show();
   },
   fast(message) {
     if (!hello) return;
     fast = message;
     fastAt = performance.now();
     // At most 10 a second. A hidden page, or one without a socket, is not alive.
-    if (hello.keepalive && !document.hidden && Math.abs(message.n - aliveN) >= 2) {
-      aliveN = message.n;
-      send({ k: "alive", n: aliveN });
+    if (hello.keepalive && !document.hidden && Math.abs(echoOf(fast) - aliveEcho) >= 2) {
+      aliveEcho = echoOf(fast);
+      send({ k: "alive", echo: aliveEcho });
     }
-    driving.answer(message.n, isDriver(), message.driver.hold, message.safety);
+    driving.answer(echoOf(fast), isDriver(), message.driver.hold, message.safety);
     estop.update(message.safety);
     charts.add(message, fastAt);
     trail.add(message);
   },
   slow(message) {
     slow = message;
-    if (robot === null && hello) selectStored();
     panels.showSlow(message, t);
     showRobots();
   },
@@ -122,7 +97,7 @@ const HANDLERS = {
     events = [...(message.all ? [] : events), ...message.lines].sort((a, b) => a.t - b.t).slice(-EVENTS_MAX);
     panels.showEvents(events, t, language);
   },
-  path: (message) => trail.begin(message.points),
+  path: trail.begin,
   notice: (message) => toast(message.text, message.level, message.about),
   taken: (message) => confirm("take_over", `${stateBar.viewerName(message.by, t)} ${t("take_over_from")}`,
     () => send({ k: "take", force: true })),
@@ -135,15 +110,14 @@ const newest = () => (lost() ? null : fast);
 
 /** What the state bar and the header show; `fast` is null without a connection. */
 const view = () => ({
-  fast: newest(), t, language, robot: shown(), isDriver: isDriver(), viewer: hello?.id,
+  fast: newest(), t, language, robot, isDriver: isDriver(), viewer: hello?.id,
   keepsAlive: !!hello?.keepalive, watching: Object.keys(slow?.viewers ?? {}).length,
 });
 
 function draw() {
   requestAnimationFrame(draw);
-  const number = lost() ? "lost" : fast.n;
-  if (number === drawn) return;
-  drawn = number;
+  if (newest() === drawn) return;
+  drawn = newest();
   document.body.classList.toggle("stale", lost());
   stateBar.show(view());
   driving.show(isDriver(), newest());
@@ -156,14 +130,17 @@ function draw() {
   charts.draw(t);
 }
 
+// The page of another robot is another page: a link.
 function showRobots() {
-  const names = Object.keys(slow.robots);
-  const list = $("robots");
-  const wanted = names.map((name) => `${slow.robots[name] ? "●" : "○"} ${name}`);
-  if ([...list.options].map((it) => it.text).join() !== wanted.join()) {
-    list.replaceChildren(...names.map((name, i) => new Option(wanted[i], name)));
-  }
-  if (hello && document.activeElement !== list) list.value = hello.robot;
+  const names = Object.keys(slow.robots).sort();
+  const stamp = JSON.stringify(slow.robots);
+  if ($("robots").dataset.stamp === stamp) return;
+  $("robots").dataset.stamp = stamp;
+  $("robots").querySelector("nav").replaceChildren(...names.map((name) => {
+    const link = document.createElement("a");
+    Object.assign(link, { href: `/?robot=${name}`, textContent: `${slow.robots[name] ? "●" : "○"} ${name}` });
+    return link;
+  }));
 }
 
 // --- language, commands ------------------------------------------------------------------
@@ -175,7 +152,7 @@ function showTexts() {
   for (const it of document.querySelectorAll("[data-t-title]")) it.title = t(it.dataset.tTitle);
   if (slow) panels.showSlow(slow, t);
   panels.showEvents(events, t, language);
-  drawn = -1;
+  drawn = undefined;
 }
 
 function stop() {
@@ -186,11 +163,8 @@ function stop() {
 function reset() {
   if (!isDriver()) toast(fast?.driver.may === false ? "view_only_why" : "take_first");
   else if (stateBar.resetRefusal(newest())) toast(stateBar.resetRefusal(newest()), "warning");
-  else send({ k: "reset", n: seen() });
+  else send({ k: "reset", echo: echoOf(drawn) });
 }
-
-// The drawn snapshot: each command names the snapshot that the operator saw.
-const seen = () => (typeof drawn === "number" && drawn >= 0 ? drawn : 0);
 
 function lamp() {
   const value = (name) => Number($(`lamp-${name}`).value);
@@ -202,7 +176,7 @@ function lamp() {
 
 function toggle(name) {
   const on = slow?.switches?.[name] === true;
-  const apply = () => send({ k: "switch", to: { [name]: !on }, n: seen() });
+  const apply = () => send({ k: "switch", to: { [name]: !on, echo: echoOf(drawn) } });
   if (on) confirm(name, t("switch_off"), apply);
   else apply();
 }
@@ -216,21 +190,19 @@ function begin() {
   on("take", () => send({ k: "take", force: false }));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
-  theme.begin(() => { drawn = -1; });
+  theme.begin(() => { drawn = undefined; });
   $("language").onclick = () => {
     language = language === "en" ? "zh" : "en";
     localStorage.setItem("t2.language", language);
     showTexts();
   };
   $("name").value = stored("name", "");
-  $("name").onchange = () => { localStorage.setItem("t2.name", $("name").value); look(); };
-  $("robots").onchange = () => { localStorage.setItem("t2.robot", $("robots").value); $("robots").blur(); choose($("robots").value); };
+  $("name").onchange = () => { localStorage.setItem("t2.name", $("name").value); sendName(); };
   for (const name of ["ultrasonic_brake", "bumper_brake"]) $(name).onclick = () => toggle(name);
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
-  estop.begin({ send, lost, toast, robot: shown, mayDrive: () => fast?.driver.may !== false });
-  slots.begin({ t, robot: shown, isDriver });
-  trail.begin([]);
+  estop.begin({ send, lost, toast, robot, mayDrive: () => fast?.driver.may !== false });
+  slots.begin({ t, robot });
   trail.listen();
   showTexts();
   connect();

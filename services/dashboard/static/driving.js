@@ -1,6 +1,6 @@
 // Input of the driver: stick, keys, gamepad, release. Only held controls drive. Every loss of input
 // releases them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
-// as the answer to a snapshot, so that the server can compute its age.
+// as the answer to a snapshot, with its heartbeat of safety, which bounds the age of the hold.
 import { translated } from "./phrases.js";
 import { isUsedUp, nextStep, resetRefusal } from "./state_bar.js";
 
@@ -57,7 +57,7 @@ function gamepad() {
   return { x: shaped(-(pad.axes[STICKS.linear] ?? 0)), y: shaped(-(pad.axes[STICKS.angular] ?? 0)) };
 }
 
-export function answer(n, isDriver, hold, safety) {
+export function answer(echo, isDriver, hold, safety) {
   release = safety?.release ?? null;
   mustReset = safety?.latched.some((it) => it !== "contact") ?? false;
   // The bumper was pressed during the release: this direction is forbidden.
@@ -65,7 +65,7 @@ export function answer(n, isDriver, hold, safety) {
   driving = isDriver;
   if (!driving) return;
   const controls = held();
-  if (controls) sent = page.send({ k: "hold", n, ...controls });
+  if (controls) sent = page.send({ k: "hold", echo, ...controls });
   // After a lapse the server requires a release before the next hold.
   else if (sent || hold !== "free") free();
 }

@@ -5,7 +5,7 @@ const TIMEOUT_MS = 3000;
 const POST_MS = 1000;
 const MIN_AGE_MS = 300; // an earlier snapshot may be older than the request
 let page = null;
-let pending = null; // { robot, since, mayDrive }
+let pending = null; // { since, mayDrive }
 
 export function begin(given) {
   page = given;
@@ -14,13 +14,13 @@ export function begin(given) {
 
 export function request() {
   if (!pending) page.toast("estop_asked", "warning");
-  pending = { robot: page.robot(), since: performance.now(), mayDrive: page.mayDrive() };
+  pending = { since: performance.now(), mayDrive: page.mayDrive() };
   sendStop();
 }
 
 export function update(safety) {
   const isEarly = !pending || performance.now() - pending.since < MIN_AGE_MS;
-  if (!isEarly && pending.robot === page.robot() && safety?.latched.includes("estop")) pending = null;
+  if (!isEarly && safety?.latched.includes("estop")) pending = null;
 }
 
 function repeat() {
@@ -33,10 +33,10 @@ function repeat() {
 }
 
 function sendStop() {
-  page.send({ k: "estop", robot: pending.robot });
+  page.send({ k: "estop" });
   const failed = () => { if (page.lost()) page.toast("estop_unconfirmed", "error"); };
   // With keepalive it is sent even if the page is being closed.
-  fetch(`/estop/${encodeURIComponent(pending.robot)}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
+  fetch(`/estop/${page.robot}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
     .then((response) => {
       if (response.status === 404) page.toast("estop_unknown", "error");
       else if (!response.ok) failed();

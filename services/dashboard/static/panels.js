@@ -3,7 +3,6 @@ import { translated } from "./phrases.js";
 
 const $ = (id) => document.getElementById(id);
 const BITS = ["over_current", "over_voltage", "encoder", "under_voltage", "overload"];
-const SILENT_AGE = 3; // s
 
 function create(tag, text = "", attributes = {}) {
   const it = document.createElement(tag);
@@ -77,14 +76,7 @@ export function showSlow(slow, t) {
   }
   $("services").replaceChildren(
     row("th", ["service", "alive", "version", "uptime", "lateness", "memory"].map((it) => [t(it)])),
-    ...slow.services.map((it) => service(it, t)),
-  );
-  $("streams").replaceChildren(
-    row("th", [[t("key")], [t("rate"), "number"], [t("age"), "number"]]),
-    ...slow.streams.map((it) => row("td", [
-      [it.key], [it.rate.toFixed(1), "number"],
-      [duration(it.age), it.age > SILENT_AGE ? "number bad" : "number"],
-    ])),
+    ...Object.entries(slow.instances).map(([name, instances]) => service(name, instances, slow.health[name], t)),
   );
 }
 
@@ -94,17 +86,16 @@ function row(tag, cells) {
   return line;
 }
 
-function service(it, t) {
-  const hasHealth = it.uptime != null;
-  const state = it.instances ? (hasHealth ? "alive" : "silent") : "gone";
+function service(name, instances, health, t) {
+  const state = instances ? (health ? "alive" : "silent") : "gone";
   const line = row("td", [
-    [it.name], [t(state) + (it.instances > 1 ? ` ×${it.instances}` : ""), state === "alive" ? "" : "bad"],
-    [it.version], [hasHealth ? duration(it.uptime) : ""],
-    [hasHealth ? `${(it.lateness * 1000).toFixed(0)} ms` : ""], [hasHealth ? `${(it.rss / 1e6).toFixed(0)} MB` : ""],
+    [name], [t(state) + (instances > 1 ? ` ×${instances}` : ""), state === "alive" ? "" : "bad"],
+    ...(health ? [[health.version], [duration(health.uptime)], [`${(health.lateness * 1000).toFixed(0)} ms`],
+      [`${(health.rss / 1e6).toFixed(0)} MB`]] : []),
   ]);
-  line.dataset.service = it.name;
+  line.dataset.service = name;
   line.dataset.state = state;
-  const counters = Object.entries(it.counters).map(([name, count]) => `${name} ${count}`);
+  const counters = Object.entries(health?.counters ?? {}).filter(([, count]) => count).map((it) => it.join(" "));
   if (counters.length) line.firstChild.append(create("small", counters.join(", ")));
   return line;
 }

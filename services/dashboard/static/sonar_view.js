@@ -1,6 +1,7 @@
 // The sonar view: the vehicle from above in metres, x up and y to the left.
 const NS = "http://www.w3.org/2000/svg";
 const REACH = 1.9; // m of a sector at most, so that all fit
+const CREEPING = 0.02; // m/s; a slower wheel is drawn straight
 const HALF = 0.36; // rad, half of a sector as drawn
 const parts = { sectors: [], labels: [], wheels: [], body: null, mounts: [] };
 
@@ -30,7 +31,8 @@ export function build(vehicle) {
   const { length, width, wheelbase, track } = vehicle;
   parts.wheels = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => {
     const place = create(svg, "g", { transform: `translate(${at((x * wheelbase) / 2, (y * track) / 2)})` });
-    return create(place, "rect", { class: "wheel", x: -0.055, y: -0.15, width: 0.11, height: 0.3, rx: 0.03 });
+    const part = create(place, "rect", { class: "wheel", x: -0.055, y: -0.15, width: 0.11, height: 0.3, rx: 0.03 });
+    return { part, x: (x * wheelbase) / 2, y: (y * track) / 2 };
   });
   parts.body = create(svg, "rect", {
     class: "body", x: -width / 2, y: -length / 2, width, height: length, rx: 0.1, "fill-opacity": 0.55,
@@ -44,6 +46,13 @@ function sector({ x, y, yaw }, reach) {
   const end = (angle) => at(x + reach * Math.cos(angle), y + reach * Math.sin(angle));
   // Counter-clockwise as seen from above, y to the left: the flag is 0 on the screen.
   return `M${at(x, y)}L${end(yaw - HALF)}A${reach} ${reach} 0 0 0 ${end(yaw + HALF)}Z`;
+}
+
+// The board reports no wheel angles: those at which all wheels roll, in degrees clockwise.
+function turned({ x, y }, { measured }) {
+  const [linear, angular] = measured ?? [0, 0];
+  const [ahead, aside] = [linear - angular * y, angular * x];
+  return Math.hypot(ahead, aside) < CREEPING ? 0 : ((-Math.atan(aside / ahead) * 180) / Math.PI).toFixed(1);
 }
 
 function label(range, tone, t) {
@@ -63,8 +72,6 @@ export function draw(snapshot, t) {
     parts.labels[i].setAttribute("y", (-mount.x - far * Math.cos(mount.yaw)).toFixed(3));
     parts.labels[i].textContent = label(range, tone, t);
   });
-  snapshot.wheels.forEach((angle, i) => {
-    parts.wheels[i].setAttribute("transform", `rotate(${((-angle * 180) / Math.PI).toFixed(1)})`);
-  });
+  parts.wheels.forEach((wheel) => wheel.part.setAttribute("transform", `rotate(${turned(wheel, snapshot)})`));
   parts.body.dataset.pressed = snapshot.bumper === true;
 }

@@ -14,10 +14,13 @@ let pose = null;
 const fingers = new Map();
 
 export const size = (given) => { vehicle = given; };
-export const begin = (given) => {
-  points = given.slice();
-  epoch = null; // the points may belong to another robot
-};
+
+// Points [x, y, heading] that odometry has stored, before those that this page has seen.
+export function begin(stored) {
+  const same = epoch === null || epoch === stored.epoch;
+  points = [...stored.points.map(([x, y]) => [x, y]), ...(same ? points : [])];
+  epoch = stored.epoch;
+}
 
 export function add(snapshot) {
   if (!snapshot.pose) return;

@@ -1,0 +1,169 @@
+"""The page of one robot: its viewers, their messages, and the snapshots that they are shown.
+
+A snapshot is encoded once and sent to all viewers.
+"""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import msgspec
+
+from common import clock, keys
+from common.bus.bus import Bus
+from common.messages import Level
+from services.dashboard import client_messages as client
+from services.dashboard.config import DashboardConfig
+from services.dashboard.driver_lock import Push
+from services.dashboard.robot import Robot
+from services.dashboard.snapshot import fast_snapshot, slow_snapshot
+
+SLOW_TICKS = 10  # between two slow snapshots
+
+# Takes the viewers, the text, and whether it replaces an older one that still waits.
+Send = Callable[[Collection[str], bytes, bool], None]
+
+
+@dataclass
+class Viewer:
+    """One browser."""
+
+    name: str
+    has_path: bool = False  # that odometry has stored
+    events_sent: int = -1  # the robot's event count when they were last sent; -1: none were
+
+
+def notice(level: Level, text: str, about: str = "") -> bytes:
+    """Return a message: a text or its key in ``i18n``, and the key of the result it explains."""
+    return msgspec.json.encode({"k": "notice", "level": level, "text": text, "about": about})
+
+
+class RobotPage:
+    """One robot, and the browsers that show it."""
+
+    def __init__(self, bus: Bus, config: DashboardConfig, send: Send) -> None:
+        self.robot = Robot(bus, config.dashboard, self._broadcast)
+        self.viewers: dict[str, Viewer] = {}
+        self.used_ns = 0  # the last time that it had a viewer, or was stopped
+        self._config = config
+        self._send_text = send
+        self._ticks = 0
+
+    def join(self, viewer: str) -> None:
+        """Add a browser."""
+        self.viewers[viewer] = Viewer(viewer)
+        hello = {
+            "k": "hello",
+            "id": viewer,
+            "vehicle": self._config.vehicle,
+            "gears": self._config.dashboard.gears_linear,
+            "keepalive": bool(self._config.dashboard.estop_keepalive),
+        }
+        self._send([viewer], hello)
+
+    def leave(self, viewer: str) -> None:
+        """Remove a browser and free its driver lock."""
+        self.viewers.pop(viewer, None)
+        self.robot.driver_lock.leave(viewer)
+        self.robot.keepalive.left(viewer)
+
+    def handle(self, viewer: str, message: client.AnyMessage) -> None:
+        """Handle a viewer's message."""
+        match message:
+            case client.Name(name):
+                self.viewers[viewer].name = name.strip() or viewer
+            case client.Alive(echo):
+                self.robot.keep_alive(viewer, echo, clock.now_ns())
+            case client.Take(force):
+                self._take(viewer, force)
+            case _ if self.robot.driver_lock.driver == viewer:
+                self._drive(viewer, message)
+            case client.Gear() | client.Reset() | client.Switch() | client.Lamp():
+                self._notify(viewer, "warning", "take_first")
+
+    def tick(self, now_ns: int, robots: Mapping[str, bool]) -> None:
+        """Send the requests of the robot's driver, and the snapshots."""
+        self.robot.tick(now_ns)
+        if not self.viewers:
+            return
+        self.used_ns, self._ticks = now_ns, self._ticks + 1
+        names = {key: viewer.name for key, viewer in self.viewers.items()}
+        robot = self.robot
+        fast = fast_snapshot(
+            robot.telemetry,
+            robot.driver_state(names),
+            now_ns,
+            connected=robot.bus.connected,
+            protection=robot.protection,
+            keeper=robot.keepalive.holder,
+        )
+        self._send(self.viewers, fast, replaces=True)
+        if self._ticks % SLOW_TICKS == 0:
+            slow = slow_snapshot(robot.telemetry, robots, names, robot.protection, now_ns)
+            self._send(self.viewers, slow, replaces=True)
+        if self._ticks % SLOW_TICKS == 1:
+            self._send_events()
+            self._send_paths(now_ns)
+
+    def _take(self, viewer: str, force: bool) -> None:
+        lock = self.robot.driver_lock
+        before = lock.driver
+        if not self.robot.may_drive:
+            self._notify(viewer, "error", "barred")
+        elif not lock.take(viewer, force):
+            name = self.viewers[before].name if before in self.viewers else ""
+            self._send([viewer], {"k": "taken", "by": name})
+        elif before not in (None, viewer):
+            self._notify(str(before), "warning", "taken_over")
+
+    def _drive(self, viewer: str, message: client.AnyMessage) -> None:
+        robot, lock, notify = self.robot, self.robot.driver_lock, partial(self._notify, viewer)
+        match message:
+            case client.Hold(echo, x, y, release):
+                shown = robot.telemetry.shown(echo)
+                lock.hold(viewer, Push(x, y, release), shown, clock.now_ns())
+            case client.Free():
+                lock.let_go(viewer)
+            case client.Leave():
+                lock.leave(viewer)
+            case client.Gear(gear):
+                lock.shift(viewer, gear)
+            case client.Reset(echo):
+                robot.reset(echo, notify)
+            case client.Switch(to):
+                robot.call(keys.SET_SWITCHES, to, notify)
+            case client.Lamp(to):
+                robot.call(keys.SET_LED, to, notify)
+
+    def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
+        self._send_text([viewer], notice(level, text, about), False)
+
+    def _broadcast(self, level: Level, text: str, about: str = "") -> None:
+        for viewer in self.viewers:
+            self._notify(viewer, level, text, about)
+
+    def _send_events(self) -> None:
+        telemetry = self.robot.telemetry
+        count = telemetry.event_count
+        for sent in {viewer.events_sent for viewer in self.viewers.values()} - {count}:
+            lines = [line for line in telemetry.events if line.n > sent]
+            late = [key for key, viewer in self.viewers.items() if viewer.events_sent == sent]
+            self._send(late, {"k": "events", "lines": lines, "all": sent < 0})
+            for key in late:
+                self.viewers[key].events_sent = count
+
+    def _send_paths(self, now_ns: int) -> None:
+        """Query the path that odometry has stored, for viewers without it."""
+        late = [key for key, viewer in self.viewers.items() if not viewer.has_path]
+        if not late or not self.robot.telemetry.newest(keys.ODOMETRY, now_ns):
+            return
+        for key in late:
+            self.viewers[key].has_path = True
+        path = partial(self._send_path, late)
+        self.robot.bus.look_up("odom", "path", path, lambda _: None)
+
+    def _send_path(self, viewers: Collection[str], answer: bytes) -> None:
+        self._send(viewers, {"k": "path", **msgspec.json.decode(answer)})
+
+    def _send(self, viewers: Collection[str], message: object, replaces: bool = False) -> None:
+        self._send_text(list(viewers), msgspec.json.encode(message), replaces)

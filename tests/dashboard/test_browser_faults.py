@@ -1,0 +1,217 @@
+"""The page in a real browser at a simulated safety: release, roles, what is not there."""
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import msgspec
+import pytest
+from playwright.sync_api import Browser, Page
+
+from common.loop import Loop
+from common.messages import KeepaliveState
+from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.page import BROWSER_MARKS, center_of, take_control, text, wait_for_text
+from tests.dashboard.servers import FREE, NEWER, CallServers
+from verification.harness.bus import at, joined, router_process, running
+from verification.harness.certificates import Site
+from verification.harness.dashboard import Server, dashboard
+from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
+
+pytestmark = BROWSER_MARKS
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    page = browser.new_page(viewport={"width": 1280, "height": 800}, locale="en-GB")
+    problems: list[str] = []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    yield page
+    page.close()
+    assert problems == []
+
+
+def at_a_contact(page: Page, server: Server) -> None:
+    page.goto(server.url)
+    wait_for_text(page, "#causes", "The bumper was hit.")
+    take_control(page)
+
+
+def has_ended(calls: CallServers) -> bool:
+    return calls.peer.requests[-1].release == "none"
+
+
+def test_the_operator_chooses_the_direction(page: Page, server: Server, calls: CallServers) -> None:
+    at_a_contact(page, server)
+    believed = "Backward is believed free: the last motion was forward 0.40 m"
+    wait_for_text(page, "#release-free", believed)
+    wait_for_text(page, "#release-left", "0.15 m")
+    x, y, _ = center_of(page, "#release-backward")
+    page.mouse.move(x, y)
+    page.mouse.down()
+    wait_until(lambda: calls.releases() == {"backward"}, "requests backward")
+    page.mouse.up()
+    wait_until(lambda: has_ended(calls), "the end of them")
+    calls.peer.requests.clear()
+    page.keyboard.down("f")
+    wait_until(lambda: calls.releases() == {"forward"}, "requests forward")
+    page.keyboard.up("f")
+    wait_until(lambda: has_ended(calls), "the end of them")
+
+
+def test_a_forbidden_direction_is_released_and_disabled(
+    page: Page, server: Server, calls: CallServers
+) -> None:
+    at_a_contact(page, server)
+    calls.peer.release_refusal = "The vehicle still moves."
+    page.keyboard.down("b")
+    wait_until(lambda: calls.releases() == {"backward"}, "requests backward")
+    wait_for_text(page, "#release-forbidden", "The vehicle still moves.")
+    calls.peer.release = msgspec.structs.replace(FREE, forbidden=("backward",), left=0.02)
+    wait_until(lambda: has_ended(calls), "the end of them")
+    wait_for_text(page, "#release-forbidden", "Backward is forbidden until a reset")
+    assert page.is_disabled("#release-backward")
+    assert page.is_enabled("#release-forward")
+    page.keyboard.up("b")
+    calls.peer.requests.clear()
+    page.keyboard.press("b")
+    wait_for_text(page, "#toasts", "Backward is forbidden")
+    assert calls.releases() == set()
+
+
+def test_a_reset_answers_what_is_on_the_screen(
+    page: Page, server: Server, calls: CallServers
+) -> None:
+    at_a_contact(page, server)
+    calls.boot += 1
+    calls.is_effective = False
+    calls.peer.release = msgspec.structs.replace(FREE, left=0.0)
+    calls.peer.causes = (NEWER,)
+    wait_for_text(page, "#causes", "0.1 s")
+    page.keyboard.press("r")
+    wait_for_text(page, "#toasts", "RESET NOT CONFIRMED")
+    assert calls.resets[0].causes == (NEWER.id,)
+
+
+def test_an_emergency_stop_goes_out_without_the_socket(
+    page: Page, server: Server, calls: CallServers
+) -> None:
+    at_a_contact(page, server)
+    page.evaluate("() => { WebSocket.prototype.send = () => {}; }")
+    calls.peer.estops.clear()
+    page.click("#estop")
+    wait_until(lambda: calls.peer.estops, "the emergency stop")
+    calls.peer.latched = ("contact", "estop")
+
+
+def test_a_page_in_the_background_does_not_keep_the_stop_alive(
+    page: Page, endpoint: str, peer: Peer, tmp_path: Path
+) -> None:
+    peer.keepalives = (KeepaliveState(source="web", age=None, alive=False, timeout=1.0),)
+    with dashboard(endpoint, tmp_path, "dashboard.estop_keepalive=web") as server:
+        page.goto(server.url)
+        wait_until(lambda: peer.kept_alive, "messages")
+        wait_for_text(page, "#keeper", "This page keeps the emergency stop alive")
+        hidden = "Object.defineProperty(document, 'hidden', { get: () => true })"
+        page.evaluate(hidden)
+        page.wait_for_timeout(300)
+        peer.kept_alive.clear()
+        page.wait_for_timeout(700)
+        assert peer.kept_alive == []
+    peer.keepalives = ()
+
+
+TLS = ("ca", "certificate", "private_key")
+
+
+@pytest.fixture
+def view_only(tmp_path: Path) -> Iterator[Server]:
+    """A dashboard with a viewer's certificate, at a router with a simulated safety on board."""
+    site = Site(tmp_path / "keys")
+    viewer = site.member("viewer", "hall")
+    robot = site.member("robot", "001", "--address", "127.0.0.1")
+    tls = [f"bus.{name}={getattr(viewer, name)}" for name in TLS]
+    with (
+        site.router(robot) as (secured, onboard),
+        running(Loop()) as loop,
+        joined(at(onboard), "001", loop, Peer(loop).declare),
+        dashboard(secured, tmp_path, *tls) as server,
+    ):
+        yield server
+
+
+def test_a_viewer_is_offered_no_stick(page: Page, view_only: Server) -> None:
+    page.goto(view_only.url)
+    wait_for_text(page, "#driver", "View only")
+    wait_for_text(page, "#view-only", "View only: this certificate may not drive")
+    for control in ("#take", "#stick", "#gears", "#reset"):
+        assert not page.is_visible(control), control
+    page.evaluate("document.querySelector('#take').click()")
+    page.keyboard.down("w")
+    page.wait_for_timeout(500)
+    assert "You drive" not in text(page, "#driver")
+
+
+IMAGE = (
+    b'<svg xmlns="http://www.w3.org/2000/svg" width="64" height="36">'
+    b'<rect width="64" height="36"/></svg>'
+)
+
+
+class Camera(BaseHTTPRequestHandler):
+    """A camera of robot 001."""
+
+    def do_GET(self) -> None:
+        """Serve an image."""
+        is_found = self.path == "/001/stream"
+        self.send_response(200 if is_found else 404)
+        self.send_header("content-type", "image/svg+xml")
+        self.end_headers()
+        self.wfile.write(IMAGE if is_found else b"")
+
+    def log_message(self, *_: object) -> None:
+        """Print nothing."""
+
+
+@pytest.fixture
+def camera() -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Camera) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+def test_camera_and_recordings(page: Page, endpoint: str, camera: str, tmp_path: Path) -> None:
+    (tmp_path / "001-20260315-081530.mcap").write_bytes(bytes(10))
+    sets = (f"dashboard.recordings={tmp_path}", f"dashboard.camera={camera}/{{robot}}/stream")
+    with dashboard(endpoint, tmp_path, *sets) as server:
+        page.goto(server.url)
+        width = "document.querySelector('#camera img').naturalWidth"
+        wait_until(lambda: page.evaluate(width) == 64, "the camera's image")
+        page.click("#recordings summary")
+        wait_for_text(page, "#recordings", "001-20260315-081530.mcap")
+        wait_for_text(page, "#recordings", "t2 report 001-20260315-081530.mcap")
+        page.evaluate(f"document.querySelector('#camera img').src = '{camera}/none'")
+        wait_for_text(page, "#camera", "The camera does not answer.")
+
+
+WHY = "No connection to the router"
+
+
+def test_without_a_router_no_control_looks_usable(page: Page, tmp_path: Path) -> None:
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with contextlib.ExitStack() as router, contextlib.ExitStack() as rest:
+        router.enter_context(router_process(where))
+        server = rest.enter_context(dashboard(where, tmp_path))
+        page.goto(server.url)
+        wait_until(lambda: page.evaluate("!document.body.matches('.stale')"), "snapshots")
+        take_control(page)
+        assert page.locator("#stick.disabled").count() == 0
+        router.close()
+        wait_for_text(page, "#verdict", "NO ROUTER")
+        wait_until(lambda: page.get_attribute("#reset", "title") == WHY, "the reason")
+        assert page.is_disabled("#reset")
+        assert page.get_attribute("#stick", "title") == WHY
