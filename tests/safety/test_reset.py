@@ -4,13 +4,14 @@ import copy
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import settings
 from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from services.safety.core import operator_requests
-from services.safety.core.causes import FaultBudget, Held, latched
+from services.safety.core.causes import GOOD_SAMPLES, FaultBudget, Held, latched
 from services.safety.core.inputs import Event, Inputs, Reset
 from services.safety.core.state import Reply, State
 from tests.safety.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit
@@ -175,41 +176,61 @@ def test_an_unnamed_contact_excuses_nothing_that_is_named() -> None:
 STOPPED = stopped()
 
 
-@settings(max_examples=40, deadline=None)
-@given(
-    st.lists(st.sampled_from(["estop", "driver", "contact", "reset", "stale", "wait"]), max_size=12)
-)
-def test_nothing_is_ever_cleared_that_was_not_named(acts: list[str]) -> None:
-    fixture = copy.copy(STOPPED)
-    seen = fixture.latched()
-    for act in acts:
-        before = set(fixture.latched())
-        named: tuple[int, ...] = ()
-        if act == "estop":
-            fixture.estop()
-        elif act == "driver":
-            blink(fixture)
-        elif act == "contact":
-            fixture.pressed = True
-            fixture.tick(2)
-            fixture.pressed = False
-            fixture.tick(4)
-        elif act == "wait":
-            seen = fixture.latched()
-            fixture.tick(5)
-        elif act == "reset":
-            named = fixture.latched()
-            fixture.reset()
-        else:
-            named = seen
-            fixture.decide(Reset(fixture.echo, seen))
-        gone = {one for one in before - set(fixture.latched()) if not _renewed(act)}
-        assert gone <= set(named)
+class Latches(RuleBasedStateMachine):
+    """Trips, looks, requests and resets in any order: a latch ends by a reset that names it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fixture = copy.copy(STOPPED)
+        self.seen = self.fixture.latched()
+        self.held: set[str] = set()
+        self.asked = 0.3  # by the newest request
+        self.was_neutral = False  # since the last latch
+
+    @rule(cause=st.sampled_from(["estop", "driver", "contact"]), ticks=st.integers(1, 4))
+    def trip(self, cause: str, ticks: int) -> None:
+        self.fixture.pressed, self.fixture.left_bits = cause == "contact", int(cause == "driver")
+        if cause == "estop":
+            self.fixture.estop()
+        self.fixture.tick(ticks)
+        self.fixture.pressed, self.fixture.left_bits = False, 0
+
+    @rule()
+    def look(self) -> None:
+        self.seen = self.fixture.latched()
+
+    @rule(linear=st.sampled_from([None, 0.0, 0.3]), ticks=st.integers(1, 10))
+    def wait(self, linear: float | None, ticks: int) -> None:
+        for _ in range(ticks):
+            self.fixture.tick()
+            self.was_neutral |= not self.held and 0.0 in (self.asked, linear)
+            if linear is not None:
+                self.fixture.request(linear)
+                self.asked = linear
+            assert self.was_neutral or self.fixture.verdict.twist.is_zero
+
+    @rule(name=st.sampled_from(["all", "seen", "first"]))
+    def reset(self, name: str) -> None:
+        before = {one.id: one for one in map(self.fixture.state.latches.__getitem__, self.held)}
+        ids = self.seen if name == "seen" else self.fixture.latched()[: 1 if name == "first" else 9]
+        reply = self.fixture.decide(Reset(self.fixture.echo, ids)).reply
+        assert reply
+        gone = before.keys() - set(self.fixture.latched())
+        assert gone == set(reply.cleared)
+        assert gone <= set(ids)
+        assert all(before[one].good >= GOOD_SAMPLES for one in gone)
+        self.held = set(latched(self.fixture.state.latches))
+
+    @invariant()
+    def what_is_latched_stays_and_stops(self) -> None:
+        now = set(latched(self.fixture.state.latches))
+        assert self.held <= now
+        assert not now or self.fixture.verdict.twist.is_zero
+        self.held, self.was_neutral = now, self.was_neutral and not now
 
 
-def _renewed(act: str) -> bool:
-    """A cause that comes back has a new identity: the older occurrence is not reported."""
-    return act in ("estop", "driver", "contact")
+TestLatches = Latches.TestCase
+TestLatches.settings = settings(max_examples=30, stateful_step_count=30, deadline=None)
 
 
 @pytest.mark.parametrize("cause", ["estop", "driver_left"])
