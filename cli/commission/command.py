@@ -11,6 +11,7 @@ from cli.commission.operator import Step, prompt, show, sign, walk
 from cli.commission.report import Report, Row, render
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import STEPS
+from cli.inspect.diagnosis import NEEDED
 from cli.inspect.session import add_output
 from cli.settings import Everything
 from common import keys
@@ -20,7 +21,6 @@ from common.errors import ConfigError, RobotError
 
 NAMES = [step.name for step in STEPS]
 SECTIONS = {"bridge": ("wire", "board", "vehicle", "bridge"), "safety": ("safety",)}
-SERVICES = ("bridge", "safety", "odom")
 HEALTH_S = 3.0
 
 
@@ -110,7 +110,7 @@ def now() -> str:
 def versions(session: CheckoutSession) -> list[Row]:
     """Return the version of each service that publishes health."""
     health = session.of(keys.HEALTH)
-    session.until(lambda: {one.value.service for one in health} >= set(SERVICES), HEALTH_S)
+    session.until(lambda: {one.value.service for one in health} >= set(NEEDED), HEALTH_S)
     found = {one.value.service: one.value.version for one in health}
     return [(f"T2 of {service}", version) for service, version in sorted(found.items())]
 

@@ -1,7 +1,6 @@
 """Verdicts on the board's link: state, rates, ports, rejected frames, CRC. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from statistics import median
 
 from cli.commission.report import Verdict, judged
@@ -17,14 +16,6 @@ MOST_BAD = 0.5  # from this share on it is another CRC, not a bad cable
 BAD_CRC = "bad_crc"
 
 
-@dataclass(frozen=True, slots=True)
-class Ports:
-    """Our UDP ports, and how many datagrams the standby port received."""
-
-    numbers: tuple[int, ...]
-    standby: int | None  # None without two health messages of the bridge
-
-
 def expected_rates(settings: Mapping[str, float]) -> dict[str, float]:
     """Return the expected frames in Hz, from the bridge's settings."""
     return {
@@ -37,7 +28,7 @@ def expected_rates(settings: Mapping[str, float]) -> dict[str, float]:
 
 
 def judge_link(
-    links: Sequence[Link], switches: Switches | None, expected: Mapping[str, float], ports: Ports
+    links: Sequence[Link], switches: Switches | None, expected: Mapping[str, float]
 ) -> Verdict:
     """Return the verdict on consecutive link messages, at least one."""
     last = links[-1]
@@ -46,7 +37,7 @@ def judge_link(
         ("state", last.state),
         *((f"{name}, Hz", _rate(rates[name], expected[name], name)) for name in expected),
         ("switches echoed on", _switches(switches)),
-        ("ports", _ports(ports)),
+        ("received at port", _listed(last.ports)),
         ("relay", _relay(last.relay)),
         ("round trip", "unknown" if last.round_trip is None else f"{last.round_trip * 1e3:.1f} ms"),
         ("rejected since the bridge's start", _listed(last.rejected)),
@@ -142,15 +133,6 @@ def _relay(relay: Relay | None) -> str:
     if relay.state != "up":
         return "silent"
     return f"{relay.version}, {f'braking: {relay.braking}' if relay.braking else 'passing'}"
-
-
-def _ports(ports: Ports) -> str:
-    numbers = " and ".join(map(str, ports.numbers))
-    if len(ports.numbers) == 1:
-        return f"{numbers}, the only configured one"
-    if ports.standby is None:
-        return f"{numbers}; their traffic is unknown"
-    return f"{numbers}; {'both receive' if ports.standby else 'only one receives'} frames"
 
 
 def _listed(counts: Mapping[str, int]) -> str:

@@ -6,7 +6,6 @@ from cli.commission.latches import LatchTest, judge_latch
 from cli.commission.link import (
     CRC_FRAMES,
     NONZERO_FRAMES,
-    Ports,
     expected_rates,
     judge_crc,
     judge_link,
@@ -48,15 +47,9 @@ def link(session: CheckoutSession) -> Verdict:
     session.listen(LINK_S)
     if not (links := session.of(keys.LINK)):
         return failed(NO_LINK)
-    bridge = (one.value for one in session.of(keys.HEALTH) if one.value.service == "bridge")
-    standby = [health.counters.get("other_port", 0) for health in bridge]
-    ports = Ports(
-        tuple(settings["board.listen_ports"]),
-        standby[-1] - standby[0] if len(standby) > 1 else None,
-    )
     switches = session.of(keys.SWITCHES)
     newest = switches[-1].value if switches else None
-    return judge_link([one.value for one in links], newest, expected_rates(settings), ports)
+    return judge_link([one.value for one in links], newest, expected_rates(settings))
 
 
 def crc(session: CheckoutSession) -> Verdict:

@@ -126,7 +126,7 @@ def as_cells(result: Result, index: int) -> Sequence[str]:
         str(index + 1),
         f"{stop.kind.upper()} {stop.direction}" + ", then BRAKE" * stop.braked,
         f"{stop.speed:.3f}",
-        f"{stop.reaction:.3f}",
+        f"{stop.reaction:z.3f}",
         f"{stop.deceleration:.2f}",
         f"{stop.distance:.3f}",
         f"{result.needed(stop):.3f}",

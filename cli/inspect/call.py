@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "request", metavar="JSON", nargs="?", type=json_object, default={},
-        help="""a JSON object, such as '{"held": false}'; all defaults if omitted; an operator's
-        call takes `echo` and `causes` from safety's newest state if they are omitted""",
+        help="""a JSON object, such as '{"bumper_brake": true}'; all defaults if omitted; `echo`,
+        and the `causes` of a reset, are those of safety's newest state if omitted""",
     )  # fmt: skip
     parser.add_argument(
         "--timeout", type=positive, default=2.0, metavar="S",

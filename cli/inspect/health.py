@@ -13,16 +13,15 @@ import msgspec
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks, decode
+from cli.inspect.diagnosis import LATE_S, NEEDED
 from cli.inspect.session import BusSession, add_options, open_session, wants_json
 from common import keys
 from common.errors import MessageError
 from common.messages import Durations, Health
 
-NEEDED = ("bridge", "safety", "odom")
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
 LISTEN_S = 2.5  # two periods of the health messages, and a margin
 ANSWER_S = 2.0  # a loop with longer stalls is unhealthy
-LATE_S = 0.1  # loop lateness that is reported
 HEAD = ("robot", "service", "", "version", "up", "late ms", "fifo", "MB", "messages/s", "counters")
 REASONS = {
     "hangs": "is present and publishes no health: it hangs",

@@ -1,6 +1,5 @@
 """Link and CRC of a good board, a slow one, a silent one and another firmware."""
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -8,7 +7,6 @@ import pytest
 from cli.commission.link import (
     CRC_FRAMES,
     NONZERO_FRAMES,
-    Ports,
     expected_rates,
     judge_crc,
     judge_link,
@@ -27,30 +25,20 @@ SETTINGS = {
 }
 EXPECTED = expected_rates(SETTINGS)
 ON = Switches(ultrasonic_brake=True, bumper_brake=True)
-BOTH = Ports((4002, 4001), 200)
 
 
 def link(**fields: Any) -> Link:
     return factories.link(**({"rates": dict(EXPECTED), "round_trip": 0.002} | fields))
 
 
-@dataclass
-class LinkMessages:
-    """Five seconds of link messages; the last one differs in ``fields``."""
-
-    fields: dict[str, Any] = field(default_factory=dict)
-
-    def messages(self) -> list[Link]:
-        good = [link(mono_ns=round(i * 0.2 * NS_PER_S)) for i in range(25)]
-        return [*good, link(mono_ns=5 * NS_PER_S, **self.fields)]
-
-
-def judge(switches: Switches | None = ON, ports: Ports = BOTH, **last: Any) -> Verdict:
-    return judge_link(LinkMessages(last).messages(), switches, EXPECTED, ports)
+def judge(switches: Switches | None = ON, **last: Any) -> Verdict:
+    """Judge five seconds of link messages; the last one differs."""
+    good = [link(mono_ns=round(i * 0.2 * NS_PER_S)) for i in range(25)]
+    return judge_link([*good, link(mono_ns=5 * NS_PER_S, **last)], switches, EXPECTED)
 
 
 def test_a_good_link_passes_with_its_data() -> None:
-    verdict = judge(rejected={"bad_value": 1})
+    verdict = judge(rejected={"bad_value": 1}, ports={"BumperReport": 4001})
     assert (verdict.outcome, verdict.text) == ("passed", "The board's link is up.")
     data = dict(verdict.data)
     assert data["BumperReport, Hz"] == "50 (requested 50)"
@@ -58,6 +46,8 @@ def test_a_good_link_passes_with_its_data() -> None:
     assert data["DriverReport, Hz"] == "4 (requested 4)"
     assert data["round trip"] == "2.0 ms"
     assert data["rejected in this step"] == "bad_value 1"
+    assert data["received at port"] == "BumperReport 4001"
+    assert dict(judge(round_trip=None).data)["round trip"] == "unknown"
     assert data["waiting for"] == "nothing"
 
 
@@ -93,12 +83,12 @@ def test_the_emergency_brakes_must_be_confirmed(switches: Switches | None) -> No
 @pytest.mark.parametrize(("rate", "outcome"), [(14.0, "passed"), (13.9, "failed"), (0, "failed")])
 def test_lowest_allowed_rate(rate: float, outcome: str) -> None:
     links = [link(rates=EXPECTED | {"UltrasonicReport": rate})] * 5
-    assert judge_link(links, ON, EXPECTED, BOTH).outcome == outcome
+    assert judge_link(links, ON, EXPECTED).outcome == outcome
 
 
 def test_a_missing_report_is_named() -> None:
     rates = {name: rate for name, rate in EXPECTED.items() if name != "BumperReport"}
-    verdict = judge_link([link(rates=rates)], ON, EXPECTED, BOTH)
+    verdict = judge_link([link(rates=rates)], ON, EXPECTED)
     assert verdict.text == "BumperReport has 0 Hz, expected are 50 Hz."
 
 
@@ -110,22 +100,6 @@ def test_one_in_a_hundred_may_be_damaged(count: int, outcome: str) -> None:
 
 def test_bad_crcs_are_left_to_the_next_step() -> None:
     assert judge(rejected={"bad_crc": 500}).outcome == "passed"
-
-
-@pytest.mark.parametrize(
-    ("ports", "phrase"),
-    [
-        (BOTH, "4002 and 4001; both receive frames"),
-        (Ports((4002, 4001), 0), "4002 and 4001; only one receives frames"),
-        (Ports((4002, 4001), None), "4002 and 4001; their traffic is unknown"),
-        (Ports((4002,), 0), "4002, the only configured one"),
-    ],
-)
-def test_ports_with_traffic(ports: Ports, phrase: str) -> None:
-    verdict = judge(ports=ports, round_trip=None)
-    assert verdict.outcome == "passed"
-    assert dict(verdict.data)["ports"] == phrase
-    assert dict(verdict.data)["round trip"] == "unknown"
 
 
 def test_only_rejections_of_the_step_count() -> None:
