@@ -173,7 +173,7 @@ def test_an_unnamed_contact_excuses_nothing_that_is_named() -> None:
     assert set(latched(fixture.state.latches)) == {"contact", "estop", "driver_left"}
 
 
-STOPPED = stopped()
+STOPPED, LEASE_NS = stopped(), NS_PER_S * 3 // 10
 
 
 class Latches(RuleBasedStateMachine):
@@ -184,7 +184,7 @@ class Latches(RuleBasedStateMachine):
         self.fixture = copy.copy(STOPPED)
         self.seen = self.fixture.latched()
         self.held: set[str] = set()
-        self.asked = 0.3  # by the newest request
+        self.zero_ns = 0  # of the newest request, if it is neutral
         self.was_neutral = False  # since the last latch
 
     @rule(cause=st.sampled_from(["estop", "driver", "contact"]), ticks=st.integers(1, 4))
@@ -199,14 +199,15 @@ class Latches(RuleBasedStateMachine):
     def look(self) -> None:
         self.seen = self.fixture.latched()
 
-    @rule(linear=st.sampled_from([None, 0.0, 0.3]), ticks=st.integers(1, 10))
+    @rule(linear=st.sampled_from([None, 0.0, 0.3]), ticks=st.integers(1, 20))
     def wait(self, linear: float | None, ticks: int) -> None:
         for _ in range(ticks):
             self.fixture.tick()
-            self.was_neutral |= not self.held and 0.0 in (self.asked, linear)
+            is_zero = linear == 0.0 or self.fixture.now_ns - self.zero_ns <= LEASE_NS
+            self.was_neutral |= is_zero and not self.held
             if linear is not None:
                 self.fixture.request(linear)
-                self.asked = linear
+                self.zero_ns = 0 if linear else self.fixture.now_ns
             assert self.was_neutral or self.fixture.verdict.twist.is_zero
 
     @rule(name=st.sampled_from(["all", "seen", "first"]))
