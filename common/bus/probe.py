@@ -6,7 +6,7 @@ queue samples.
 
 import queue
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -100,31 +100,14 @@ class Probe:
 
     def has_reader(self, *of: str) -> bool:
         """Return whether another session subscribes to one of these keys; publishes nothing."""
-        declared = [self._publisher(key) for key in of]
-        try:
-            return _matches(*declared)
-        finally:
-            for each in declared:
-                each.undeclare()
-
-    def watch_readers(self, key: str) -> Callable[[], bool]:
-        """Return a function that returns whether another session subscribes to the key now."""
-        declared = self._publisher(key)
-        self._declared.append(declared)
-        _matches(declared)
-        return lambda: bool(declared.matching_status.matching)
+        elsewhere = zenoh.Locality.REMOTE  # subscriptions of this session do not count
+        return _matches(
+            *(self._session.declare_publisher(key, allowed_destination=elsewhere) for key in of)
+        )
 
     def has_server(self, key: str) -> bool:
         """Return whether a queryable matches the key; sends no query."""
-        declared = self._session.declare_querier(key)
-        try:
-            return _matches(declared)
-        finally:
-            declared.undeclare()
-
-    def _publisher(self, key: str) -> Any:
-        elsewhere = zenoh.Locality.REMOTE  # subscriptions of this session do not count
-        return self._session.declare_publisher(key, allowed_destination=elsewhere)
+        return _matches(self._session.declare_querier(key))
 
     def _queue(self, sample: zenoh.Sample) -> None:
         received_ns, wall_ns = clock.now_ns(), time.time_ns()
@@ -152,13 +135,17 @@ def probe(where: BusSettings) -> Iterator[Probe]:
 
 
 def _matches(*declared: Any) -> bool:
-    """Return whether a publisher or querier is matched within ``MATCH_TIMEOUT_S``."""
+    """Return whether one is matched within ``MATCH_TIMEOUT_S``, and undeclare all."""
     end_s = time.monotonic() + MATCH_TIMEOUT_S
-    while not any(each.matching_status.matching for each in declared):
-        if time.monotonic() > end_s:
-            return False
-        time.sleep(POLL_PERIOD_S)
-    return True
+    try:
+        while not any(each.matching_status.matching for each in declared):
+            if time.monotonic() > end_s:
+                return False
+            time.sleep(POLL_PERIOD_S)
+        return True
+    finally:
+        for each in declared:
+            each.undeclare()
 
 
 def valid(expression: str) -> bool:
