@@ -1,16 +1,15 @@
 """``python -m bench.client ENDPOINT reset | drive ROBOT [SETTING]...``: a robot's clients.
 
 ``reset`` is an operator that resets every latch. ``drive`` requests motion like teleop, with a
-speed that identifies the frame at the board that answers. It is a ``harness.child_process`` that
+speed that identifies the frame at the board that answers. It is a child process that
 also executes ``estop``, repeated until ``go``, which requests again.
 """
 
-import json
 import sys
-import threading
 from collections.abc import Sequence
 from functools import partial
 
+from bench.child_process import serve
 from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
@@ -99,23 +98,14 @@ def drive(endpoint: str, robot: str, sets: Sequence[str]) -> None:
     driver = Driver(loop, bus)
     bus.open()
 
-    def read() -> None:
-        calls = {"begin": driver.begin, "end": lambda: write(driver.requests)}
-        for line in sys.stdin:
-            word = line.strip()
-            loop.post(calls.get(word, partial(driver.execute, word)))
-        loop.stop()
-
-    threading.Thread(target=read, daemon=True).start()
-    write("ready")
+    serve(
+        driver.begin,
+        lambda: driver.requests,
+        loop.stop,
+        lambda word: loop.post(partial(driver.execute, word)),
+    )
     loop.run()
     bus.close()
-
-
-def write(what: object) -> None:
-    """Write a line to the parent."""
-    sys.stdout.write(f"{json.dumps(what)}\n")
-    sys.stdout.flush()
 
 
 def reset(endpoint: str) -> None:

@@ -23,16 +23,17 @@ from typing import Any
 import msgpack
 import zenoh
 
+from bench.child_process import ChildProcess, serve
 from bench.load import MARGIN
+from bench.processes import CpuShares
 from bench.series import CPU, MS, ONE, Column, Limits, Series, Unit
 from common import clock, keys
 from common.bus.session import client_config
 from common.freshness import NS_PER_S
 from sim.trace import Command
 from verification.harness.bus import at, router_process
-from verification.harness.child_process import ChildProcess, serve
 from verification.harness.ports import free_port
-from verification.harness.process_stats import CpuShares, memory
+from verification.harness.process_stats import stat
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower
 
@@ -99,7 +100,7 @@ def window(
     took: Sequence[int | None] = answers_ns(asked, frames.follow().commands)
     figures: dict[str, Sequence[float]] = {
         "site": [shares.ns["site"]],
-        "memory": [memory(pid)["rss"]], "arrived": [came["hz"]],
+        "memory": [stat(pid).rss], "arrived": [came["hz"]],
         "bytes": [came["bytes_per_s"] / int(name[0])], "age": came["ages_ns"],
         "request": [ns for ns in took if ns is not None], "unanswered": [took.count(None)],
     }  # fmt: skip

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import msgspec
 
+from bench.child_process import ChildProcess
 from bench.processes import MissingError, module
 from bench.series import MS, ONE, Column, Limits, Series, Unit
 from common import clock, keys
@@ -31,7 +32,6 @@ from verification.faults.remote_host import Address, net
 from verification.faults.stack_fixture import QUICK, QUICK_MOTORS
 from verification.harness.bus import bus_on, running
 from verification.harness.certificates import Site
-from verification.harness.child_process import ChildProcess
 from verification.harness.ports import free_port
 from verification.harness.stack import running_stack
 from verification.harness.trace import TraceFollower, moves
@@ -69,10 +69,7 @@ class Hosts:
 
     def send(self, line: str) -> None:
         """Send a line to the link or the client."""
-        pipe = self.laptop.process.stdin
-        assert pipe is not None
-        pipe.write(f"{line}\n")
-        pipe.flush()
+        self.laptop.send(line)
 
     def disturb(self, what: Wire | Address) -> None:
         """Set the faults of the link from now on, or the laptop's address."""

@@ -11,14 +11,14 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from bench.processes import module, one_pool, running
+from bench.child_process import ChildProcess
+from bench.processes import CpuShares, module, one_pool, running
 from bench.reaction import SEED
 from bench.series import CPU, ONE, US, Column, Limits, Series, Unit
 from common import keys
 from verification.harness.bus import router_process, set_options
-from verification.harness.child_process import ChildProcess
 from verification.harness.ports import free_port, udp_ports
-from verification.harness.process_stats import CpuShares, children
+from verification.harness.process_stats import children
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower, moves
 from verification.harness.waiting import wait_until

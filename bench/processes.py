@@ -1,13 +1,17 @@
-"""Processes that last as long as their context, and the programs and packages that they need."""
+"""Processes that last as long as their context, what they need, and the CPU that they take."""
 
 import contextlib
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Self
 
 from common.bus.session import ONE_POOL, RUNTIME_ENV
+from common.freshness import NS_PER_S
+from verification.harness.process_stats import GONE, stat
 
 Command = Sequence[str]
 
@@ -48,3 +52,33 @@ def compiled(name: str, folder: Path) -> str:
     source = Path(__file__).with_name(f"{name}.c")
     subprocess.run(["cc", "-O2", "-Wall", "-Werror", "-o", made, source], check=True)
     return made
+
+
+class CpuShares:
+    """CPU share of processes over the context: user and system, all threads.
+
+    ``ns`` has it in nanoseconds per second, without processes that ended meanwhile.
+    """
+
+    def __init__(self, pids: Mapping[str, int]) -> None:
+        self.ns: dict[str, int] = {}
+        self._pids = pids
+
+    def __enter__(self) -> Self:
+        self._before, self._since_s = self._read(), time.monotonic()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        past_s = time.monotonic() - self._since_s
+        after = self._read()
+        self.ns = {
+            name: round((now - self._before[name]) * NS_PER_S / past_s)
+            for name, now in after.items()
+        }
+
+    def _read(self) -> dict[str, float]:
+        found: dict[str, float] = {}
+        for name, pid in self._pids.items():
+            with contextlib.suppress(*GONE):
+                found[name] = stat(pid).cpu_s
+        return found

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from cli.demo import host_stalls
+from tests.teleop.terminal import PATIENT, Terminal, at_terminal
 from verification.harness.ports import free_port
-from verification.harness.teleop_terminal import PATIENT, Terminal, at_terminal
 from verification.harness.waiting import wait_until
 
 ROOT = Path(__file__).parents[1]

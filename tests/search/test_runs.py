@@ -192,8 +192,7 @@ def test_the_page_names_what_happened() -> None:
             result(8, finished=False, faulty=True, values={"sim.cable.to_pc.drop": 0.3}),
         ]
     )
-    assert "| `silent` | 1 | 1 | 5 |" in text
+    assert "| 5 | none | 3.0 s: An input is too old. |" in text
     assert "| 6 | none | safety: too fast |" in text
     assert "| 7 | none | the script was not finished, `bumper` for 80 s |" in text
     assert "| 8 | `sim.cable.to_pc.drop` 0.3 | the script was not finished |" in text
-    assert "| `sim.cable.to_pc.drop` | 1 | 1 | 8 |" in text

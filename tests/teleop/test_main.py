@@ -13,8 +13,8 @@ from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Drive, Event, Health
 from services.teleop import __main__ as teleop
+from tests.teleop.terminal import STRICT, TELEOP, Terminal, terminal
 from verification.harness.bus import bus_on, running
-from verification.harness.teleop_terminal import STRICT, TELEOP, Terminal, terminal
 from verification.harness.waiting import wait_until
 
 REPEAT_S = 0.033

@@ -19,6 +19,7 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
+from verification.harness.bus import set_options
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 
@@ -78,8 +79,7 @@ def dashboard(
     """Run a dashboard on a free port while the context lasts."""
     port = free_port()
     given = [f"bus.connect={endpoint}", f"dashboard.port={port}", "log.format=json", *sets]
-    options = [part for one in given for part in ("--set", one)]
-    command = [sys.executable, "-m", "services.dashboard", *options]
+    command = [sys.executable, "-m", "services.dashboard", *set_options(*given)]
     server = Server(command, port, folder / "dashboard.log", None, tls)  # type: ignore[arg-type]
     server.start()
     try:

@@ -2,14 +2,9 @@
 
 import contextlib
 import os
-import re
-import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
-
-from common.freshness import NS_PER_S
 
 PROC = Path("/proc")
 PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -51,40 +46,3 @@ def tree(name: str, pid: int) -> Iterator[tuple[str, int]]:
     yield name, pid
     for number, child in enumerate(children(pid), 1):
         yield from tree(f"{name}/{number}", child)
-
-
-def memory(pid: int) -> dict[str, int]:
-    """Return resident bytes: ``rss``, and ``pss``, where shared pages are divided."""
-    text = (PROC / str(pid) / "smaps_rollup").read_text(encoding="ascii")
-    found = re.findall(r"^(Rss|Pss): +(\d+)", text, re.MULTILINE)
-    return {name.lower(): 1024 * int(kb) for name, kb in found}
-
-
-class CpuShares:
-    """CPU share of processes over the context: user and system, all threads.
-
-    ``ns`` has it in nanoseconds per second, without processes that ended meanwhile.
-    """
-
-    def __init__(self, pids: Mapping[str, int]) -> None:
-        self.ns: dict[str, int] = {}
-        self._pids = pids
-
-    def __enter__(self) -> Self:
-        self._before, self._since_s = self._read(), time.monotonic()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        past_s = time.monotonic() - self._since_s
-        after = self._read()
-        self.ns = {
-            name: round((now - self._before[name]) * NS_PER_S / past_s)
-            for name, now in after.items()
-        }
-
-    def _read(self) -> dict[str, float]:
-        found: dict[str, float] = {}
-        for name, pid in self._pids.items():
-            with contextlib.suppress(*GONE):
-                found[name] = stat(pid).cpu_s
-        return found

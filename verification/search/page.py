@@ -1,7 +1,6 @@
 """The page of the campaign. Pure, but for the date and the name of the machine."""
 
 import platform
-from collections import Counter
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,57 +24,32 @@ def page(results: Sequence[Result]) -> str:
     return TEMPLATE.read_text(encoding="utf-8").format(
         date=datetime.now(UTC).date().isoformat(),
         runs=f"{len(results):,}",
-        hours=f"{_hours(results):.1f}",
+        hours=f"{sum(result.seconds for result in results) / 3600:.1f}",
         machine=description(),
         python=platform.python_version(),
         cpu=f"{median(result.cpu_s / result.seconds for result in results):.2f}",
         results=summary({"no fault": sound, "with faults": faulty}),
-        stops=stops(sound),
         worst=worst(results),
-        faults=by_fault(results),
         odometry=odometry(sound),
     )
 
 
-def _hours(results: Sequence[Result]) -> float:
-    return sum(result.seconds for result in results) / 3600
-
-
 def summary(kinds: dict[str, Sequence[Result]]) -> str:
     """Return the table of both kinds of runs."""
-    head = (
-        "", "runs", "driven", "contacts", "broke an invariant", "completed",
-        "hours between needless stops",
-    )  # fmt: skip
-    rows = []
-    for name, results in kinds.items():
-        hours, needless = _hours(results), sum(len(result.stops) for result in results)
-        between = f"{hours / needless:.2g}" if needless else f"none in {hours:.1f}"
-        row = (
+    rows = [
+        (
             name,
             f"{len(results):,}",
             f"{sum(result.metres for result in results) / 1000:.2f} km",
             f"{sum(result.contacts for result in results)}",
             f"{sum(bool(result.violations) for result in results)}",
+            f"{sum(len(result.stops) for result in results)}",
             f"{mean(result.completed for result in results):.2%}" if results else "",
-            between if name == "no fault" else "",
         )
-        rows.append(row)
+        for name, results in kinds.items()
+    ]
+    head = "", "runs", "driven", "contacts", "broke an invariant", "needless stops", "completed"
     return table(head, rows)
-
-
-def stops(sound: Sequence[Result]) -> str:
-    """Return the table of the causes of needless stops."""
-    counts = Counter(stop.cause for result in sound for stop in result.stops)
-    rows = []
-    for cause, count in counts.most_common():
-        seeds = [result.seed for result in sound if cause in {one.cause for one in result.stops}]
-        rows.append((f"`{cause}`", str(count), str(len(seeds)), _first(seeds)))
-    return table(("cause", "stops", "runs", "the first seeds"), rows) if rows else "None."
-
-
-def _first(seeds: Sequence[int]) -> str:
-    return ", ".join(map(str, seeds[:WORST]))
 
 
 def worst(results: Sequence[Result]) -> str:
@@ -104,17 +78,6 @@ def _why(result: Result) -> str:
 def _faults(result: Result) -> str:
     drawn = [f"`{name}` {result.values[name]}" for name in FAULTS if name in result.values]
     return ", ".join(drawn) or "none"
-
-
-def by_fault(results: Sequence[Result]) -> str:
-    """Return the table of runs by the fault that they have, alone or beside others."""
-    rows = []
-    for name in FAULTS:
-        with_it = [result for result in results if name in result.values]
-        seeds = [result.seed for result in with_it if not result.finished]
-        if with_it:
-            rows.append((f"`{name}`", str(len(with_it)), str(len(seeds)), _first(seeds)))
-    return table(("fault", "runs", "not finished", "the first seeds"), rows)
 
 
 def odometry(sound: Sequence[Result]) -> str:

@@ -1,7 +1,7 @@
 """A child process that counts between ``begin`` and ``end``, controlled by its standard streams.
 
-The child prints ``"ready"`` as JSON. On ``begin`` it resets its counts; on any other line it prints
-its counts as JSON. It ends with its standard input.
+The child prints ``"ready"`` as JSON. On ``begin`` it resets its counts, on ``end`` it prints them
+as JSON; it executes other lines. It ends with its standard input.
 """
 
 import json
@@ -34,17 +34,13 @@ class ChildProcess:
             self.process.kill()
             self.process.wait()
 
-    @property
-    def pid(self) -> int:
-        return self.process.pid
-
     def begin(self) -> None:
         """Reset the counts."""
-        self._send("begin")
+        self.send("begin")
 
     def end(self) -> Any:
         """Return the counts since ``begin``."""
-        self._send("end")
+        self.send("end")
         return json.loads(self._read_line())
 
     def _read_line(self) -> str:
@@ -53,21 +49,29 @@ class ChildProcess:
         assert line, f"{self.process.args!r} has ended"
         return line
 
-    def _send(self, line: str) -> None:
+    def send(self, line: str) -> None:
+        """Send a line."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
 
-def serve(begin: Callable[[], None], end: Callable[[], object], leave: Callable[[], None]) -> None:
+def serve(
+    begin: Callable[[], None],
+    end: Callable[[], object],
+    leave: Callable[[], None],
+    execute: Callable[[str], object] = lambda _: None,
+) -> None:
     """Serve the parent in a thread; ``leave`` is called when standard input ends."""
 
     def read_commands() -> None:
-        for line in sys.stdin:
-            if line.strip() == "begin":
+        for word in map(str.strip, sys.stdin):
+            if word == "begin":
                 begin()
-            else:
+            elif word == "end":
                 _write(end())
+            else:
+                execute(word)
         leave()
 
     threading.Thread(target=read_commands, daemon=True).start()
@@ -75,4 +79,5 @@ def serve(begin: Callable[[], None], end: Callable[[], object], leave: Callable[
 
 
 def _write(what: object) -> None:
-    print(json.dumps(what), flush=True)
+    sys.stdout.write(f"{json.dumps(what)}\n")
+    sys.stdout.flush()
