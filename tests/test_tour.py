@@ -114,9 +114,10 @@ def elsewhere() -> dict[str, str]:
     ]
     named = (one.split("=", 1) for one in settings)
     env = {f"T2__{path.upper().replace('.', '__')}": value for path, value in named}
-    # Keep the virtual environment: this test runs in it.
-    made = "--assume-old=.venv/.installed"
-    return {**env, "DASHBOARD": f"http://127.0.0.1:{page}/", "MAKEFLAGS": made}
+    stamp = ROOT / ".venv/.installed"
+    if stamp.exists():  # `make` must not rebuild the virtual environment that this test runs in
+        stamp.touch()
+    return {**env, "DASHBOARD": f"http://127.0.0.1:{page}/"}
 
 
 def test_the_tour(tmp_path: Path) -> None:
