@@ -1,6 +1,5 @@
 """The whole checkout against the real stack; the simulator replaces the operator's hand."""
 
-import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from common.cli_args import EXIT_LINK
-from common.errors import LinkError
 from common.messages import SONAR_NAMES
 from sim.requests import Bumper, Sonar
 from tests.cli.commission.operator_process import OperatorProcess, checkout
@@ -29,15 +27,6 @@ def stack(tmp_path: Path) -> Iterator[RunningStack]:
 
 def at(stack: RunningStack) -> list[str]:
     return ["--set", f"bus.connect={stack.endpoint}"]
-
-
-def answers(stack: RunningStack) -> bool:
-    """Return whether the simulator accepts requests."""
-    try:
-        stack.control.truth()
-    except LinkError:
-        return False
-    return True
 
 
 def passes(it: OperatorProcess) -> bool:
@@ -103,60 +92,6 @@ def test_a_complete_checkout(stack: RunningStack, tmp_path: Path) -> None:
     assert "T2 of bridge" in text
     assert text.rstrip().splitlines()[-1].startswith("Ada, ")
     wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
-
-
-def test_a_firmware_with_another_unit_and_a_dead_sonar_are_named(
-    stack: RunningStack, tmp_path: Path
-) -> None:
-    stack.kill("sim")
-    for direction in ("command", "feedback"):
-        stack.commands["sim"] += ["--set", f"wire.{direction}_angular_unit=milliradian"]
-    stack.start("sim")
-    wait_until(lambda: answers(stack), "the simulator's control socket")
-    stack.control.do(Sonar(name="rear", fault=True))
-    report = tmp_path / "report.md"
-    with checkout(report, *at(stack), "--only", "sonar", "--only", "turn") as it:
-        it.begin()
-        it.wait("] Sonars")
-        it.type("")
-        for name in SONAR_NAMES:
-            if name == "rear":
-                it.wait("The rear sonar is faulty.")
-                continue
-            # left and right are exchanged
-            other = name.replace("left", "?").replace("right", "left").replace("?", "right")
-            it.wait(f"NOW the {name.replace('_', ' ')} sonar")
-            stack.control.do(Sonar(name=other, range=0.3))  # type: ignore[arg-type]
-            it.wait("Take the hand away")
-            stack.control.do(Sonar(name=other))  # type: ignore[arg-type]
-        it.wait("failed:")
-        it.wait("left: the hand was detected by right.")
-        it.wait("any word to continue")
-        it.type("on")
-        it.wait("] Turn")
-        it.type("")
-        for _ in range(TRIES):
-            if it.wait(f'Type "{PHRASE}"', 'Type "reset"') == 'Type "reset"':
-                it.type("reset")  # stalls have caused a latch
-                it.wait(f'Type "{PHRASE}"')
-            it.type(PHRASE)
-            it.wait("failed:")
-            if it.wait("wire.command_angular_unit = ", "did not grant", "does not grant") == (
-                "wire.command_angular_unit = "
-            ):
-                break
-            it.wait("Press Enter to try again")
-            it.type("")
-        it.wait("any word to continue")
-        it.type("on")
-        assert it.sign() == 1
-    text = report.read_text(encoding="utf-8")
-    assert "**Not passed.** Partial checkout, left out: link, crc, bumper, estop, forward." in text
-    assert "rear is faulty: the board reports 0xFFFF." in text
-    ratio = re.search(r"counted / commanded \| ([0-9.]+) ", text)
-    assert ratio is not None
-    assert float(ratio[1]) == pytest.approx(0.573, rel=0.15)  # 1 mrad in units of 0.1 deg
-    assert 'wire.command_angular_unit = "milliradian".' in text
 
 
 def test_ctrl_c_while_the_wheels_turn_stops_them(stack: RunningStack, tmp_path: Path) -> None:

@@ -1,11 +1,8 @@
 """Short keys, whole keys and invalid keys."""
 
 import argparse
-import re
-from pathlib import Path
 
 import pytest
-import zenoh
 
 from cli.inspect.addressing import chunks, expression, parse_key, parse_one_key, short, topic_of
 from common import keys
@@ -62,22 +59,3 @@ def test_topic_of_a_key() -> None:
     assert topic_of("t2/v1/7/tel/mine/x/y") is None
     assert topic_of("t2/v1/7/tel/mine/temperature") is None
     assert topic_of("elsewhere") is None
-
-
-ROOT = Path(__file__).parents[3]
-NAMED = re.compile(r"t2 (?:echo|hz|ls) +'?([a-z@][\w/*@]*)")
-
-
-def test_documents_name_existing_keys() -> None:
-    texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("services/*/*.md"),
-             *ROOT.glob("deploy/**/*.md"), *ROOT.glob("deploy/**/*.yml")]  # fmt: skip
-    rows = [
-        zenoh.KeyExpr(re.sub(r"\{\w+\}", "*", f"{keys.ROOT}/7/{row.path}")) for row in keys.TOPICS
-    ]
-    named = {word for text in texts for word in NAMED.findall(text.read_text(encoding="utf-8"))}
-    unknown = [
-        word
-        for word in named
-        if not any(zenoh.KeyExpr(expression(word, "7")).intersects(row) for row in rows)
-    ]
-    assert (unknown, len(named) > 3) == ([], True)

@@ -62,14 +62,6 @@ def test_bash(
     assert offered(script("bash", capsys), *words) == expected
 
 
-@pytest.mark.skipif(not shutil.which("bash"), reason="bash is not installed")
-def test_bash_completes_the_part_of_a_key_after_a_word_break(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    shell_script = f"COMP_WORDBREAKS=$' \\t\\n@'\n{script('bash', capsys)}"
-    assert offered(shell_script, "echo", "@cmd/m") == {"cmd/motion"}
-
-
 @pytest.mark.parametrize(
     ("shell", "registration"),
     [("zsh", "compdef _python_argcomplete t2"), ("fish", "complete --command t2 -f -a")],

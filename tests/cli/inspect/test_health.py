@@ -1,7 +1,6 @@
 """``t2 health``: all services by their messages, one service by its answer."""
 
 import threading
-from collections.abc import Iterator
 from functools import partial
 
 import msgspec
@@ -87,55 +86,41 @@ def test_query_of_one_service(safety: Bus, tool: Tool) -> None:
     assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [tool.robot]
 
 
-def test_a_service_without_health_yet(
-    buses: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes]
+@pytest.mark.parametrize(
+    ("payload", "problem"),
+    [
+        (b"{}", ""),  # in its first second
+        (b"\xff", "answers with an invalid health message"),
+        (b"[]", "answers with an invalid health message"),
+        (b'{"KEY": {"service": 1}}', "answers with an invalid health message"),
+    ],
+)
+def test_an_answer_without_health(
+    payload: bytes, problem: str, safety: Bus, tool: Tool, answers: dict[str, bytes]
 ) -> None:
-    answers[buses.robot] = b"{}"
+    key = keys.HEALTH.on(tool.robot, service="safety")
+    answers[tool.robot] = payload.replace(b"KEY", key.encode())
     result = tool("health", "safety")
-    assert (result.code, result.lines[0]["alive"], result.lines[0]["told"]) == (0, True, False)
+    assert (result.code, result.lines[0]["alive"]) == (bool(problem), not problem)
+    assert not result.lines[0]["told"]
+    assert problem in result.err
 
 
-@pytest.mark.parametrize("nonsense", [b"\xff", b"[]", b'{"KEY": {"service": 1}}'])
-def test_an_invalid_answer(
-    buses: BusFixture, safety: Bus, tool: Tool, answers: dict[str, bytes], nonsense: bytes
+def test_an_absent_service_and_one_with_a_blocked_loop(
+    buses: BusFixture, safety: Bus, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    key = keys.HEALTH.on(buses.robot, service="safety")
-    answers[buses.robot] = nonsense.replace(b"KEY", key.encode())
-    result = tool("health", "safety")
-    assert (result.code, result.lines[0]["alive"]) == (1, False)
-    assert f"safety of robot {buses.robot} answers with an invalid health message" in result.err
-
-
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(command, "ANSWER_S", 0.3)
-
-
-def test_an_absent_service(tool: Tool, impatient: None) -> None:
-    result = tool("health", "odom")
-    assert (result.code, result.lines[0]["alive"]) == (1, False)
-    assert f"odom of robot {tool.robot} does not answer" in result.err
-
-
-@pytest.fixture
-def stalled(buses: BusFixture, safety: Bus) -> Iterator[None]:
-    """Block the loop of all services while the test runs."""
     end = threading.Event()
 
     def hang() -> None:
         end.wait(20.0)
 
     buses.loop.post(hang)
-    yield
+    for name in ("odom", "safety"):
+        result = tool("health", name)
+        assert (result.code, result.lines[0]["alive"]) == (1, False)
+        assert f"{name} of robot {tool.robot} does not answer" in result.err
     end.set()
-
-
-def test_a_service_with_a_blocked_loop_does_not_answer(
-    stalled: None, tool: Tool, impatient: None
-) -> None:
-    result = tool("health", "safety")
-    assert result.code == 1
-    assert "does not answer" in result.err
 
 
 def test_health_of_the_router(tool: Tool) -> None:
