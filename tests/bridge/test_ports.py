@@ -67,16 +67,6 @@ def test_before_any_answer_the_port_of_the_commands_comes_first() -> None:
     assert ports(count=1).to_ask(9 * NS_PER_S) == 0
 
 
-@pytest.mark.parametrize(
-    ("age", "received"), [(0, True), (NS_PER_S // 2, True), (NS_PER_S // 2 + 1, False)]
-)
-def test_a_frame_counts_as_received_for_half_a_second(age: int, received: bool) -> None:
-    made = ports()
-    assert not made.is_received(BumperReport, NS_PER_S)
-    made.takes(BumperReport, 0, NS_PER_S)
-    assert made.is_received(BumperReport, NS_PER_S + age) is received
-
-
 @given(st.lists(st.tuples(st.integers(1, 400), st.integers(-20, 20), st.booleans(), st.booleans())))
 def test_no_frame_is_taken_twice_none_after_a_newer_one_and_no_port_is_waited_for_too_long(
     frames: list[tuple[int, int, bool, bool]],

@@ -49,11 +49,6 @@ TICK_MAX_S = 0.02
 LINK_NS = NS_PER_S * 19 // 100  # half a tick less than 0.2 s: the tick that is due may come early
 PRESSED = reports.BumperReport(True)
 STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
-ASKED: dict[str, type[Frame]] = {
-    "bumper": reports.BumperReport,
-    "mileage": reports.DistanceReport,
-    "ultrasonic": reports.UltrasonicReport,
-}
 
 
 def queries(settings: Settings) -> list[tuple[str, Frame, float]]:
@@ -244,7 +239,7 @@ class Core:
             yield self._ask(frame, now_ns)
         yield from self.readiness.changes()
         yield from self.calls.on_tick(now_ns)
-        if self._link_state(now_ns) != self._linked or now_ns - self._linked_ns >= LINK_NS:
+        if self._link_state() != self._linked or now_ns - self._linked_ns >= LINK_NS:
             yield Publish("link", self.link(now_ns))
 
     def _ask(self, frame: Frame, now_ns: int) -> Send:
@@ -263,8 +258,8 @@ class Core:
 
     def link(self, now_ns: int) -> m.Link:
         """Return the link message: rates, rejected frames, and why a RUN would be refused."""
-        self._linked, self._linked_ns = self._link_state(now_ns), now_ns
-        waiting = self._waiting(now_ns)
+        self._linked, self._linked_ns = self._link_state(), now_ns
+        waiting = self._waiting()
         board, streams = self._config.board, self._ports.streams
         return m.Link(
             state=self.readiness.link,
@@ -282,13 +277,9 @@ class Core:
             estop=self.motions.lease.estop,
         )
 
-    def _link_state(self, now_ns: int) -> tuple[object, ...]:
-        return self.readiness.link, self.readiness.epoch, self._waiting(now_ns)
+    def _link_state(self) -> tuple[object, ...]:
+        return self.readiness.link, self.readiness.epoch, self._waiting()
 
-    def _waiting(self, now_ns: int) -> str:
-        """Describe why a RUN would be refused, and which queries get no answer."""
-        waiting = self.readiness.waiting() or self.motions.lease.waiting
-        if not waiting or self.readiness.link != "up":
-            return waiting
-        silent = [name for name, kind in ASKED.items() if not self._ports.is_received(kind, now_ns)]
-        return f"{waiting}; no answers to: {', '.join(silent)}" if silent else waiting
+    def _waiting(self) -> str:
+        """Describe why a RUN would be refused; empty when it would be obeyed."""
+        return self.readiness.waiting() or self.motions.lease.waiting

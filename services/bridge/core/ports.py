@@ -63,8 +63,3 @@ class Ports:
         stream = self.streams.get(BumperReport, Stream(self.main, self._began_ns))
         # 1 equivalent mutant: a nanosecond is no turn: both give the first port.
         return (stream.port + max(0, now_ns - stream.received_ns) // UNANSWERED_NS) % self._count
-
-    def is_received(self, kind: type[Frame], now_ns: int) -> bool:
-        """Return whether this kind of frame was received within the last half second."""
-        stream = self.streams.get(kind)
-        return stream is not None and now_ns - stream.received_ns <= UNANSWERED_NS
