@@ -38,8 +38,9 @@ class Bridge(settings.ProtectedSection, frozen=True, kw_only=True):
         "max_linear": (0.0, 1.5),
         "max_angular": (0.0, 2.0),
         "require_switches": (True, True),
-        # Lower rates delay the detection of a short hit, a near wall and a restarted board.
-        "bumper_rate": (20.0, 200.0),
+        # Lower rates delay the detection of a short hit, a near wall and a restarted board. Safety
+        # judges lost bumper polls by their number in 0.2 s.
+        "bumper_rate": (40.0, 200.0),
         "ultrasonic_rate": (10.0, 200.0),
         "mileage_rate": (10.0, 200.0),
     }
@@ -53,7 +54,7 @@ class Bridge(settings.ProtectedSection, frozen=True, kw_only=True):
     bumper_rate: Rate = 50.0  # Hz, of the queries
     ultrasonic_rate: Rate = 20.0  # Hz
     mileage_rate: Rate = 25.0  # Hz
-    driver_rate: Rate = 2.0  # Hz, for each side
+    driver_rate: Annotated[float, Meta(ge=1.0, le=200.0)] = 2.0  # Hz, for each side
 
     @property
     def times(self) -> "TimeLimits":

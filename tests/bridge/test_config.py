@@ -23,7 +23,7 @@ def test_the_file_holds_the_defaults() -> None:
         ("bridge.stall", 0.0, 0.01),
         ("bridge.max_linear", 1.5, 1.51),
         ("bridge.max_angular", 2.0, 2.01),
-        ("bridge.bumper_rate", 20.0, 19.9),
+        ("bridge.bumper_rate", 40.0, 39.9),
         ("bridge.ultrasonic_rate", 10.0, 9.9),
         ("bridge.mileage_rate", 10.0, 9.9),
         ("board.any_source_port", "false", "true"),

@@ -326,7 +326,7 @@ def test_the_link_message(bench: Bench) -> None:
 
 
 def test_each_query_finds_its_tick() -> None:
-    assert tick_s(Bridge()) == tick_s(Bridge(bumper_rate=20.0, mileage_rate=20.0)) == 0.02
+    assert tick_s(Bridge()) == tick_s(Bridge(bumper_rate=40.0, mileage_rate=20.0)) == 0.02
     assert tick_s(Bridge(bumper_rate=125.0)) == 0.008
     bench = Bench()
     assert bench.core.motions.lease.over_since_ns == NOW
@@ -362,6 +362,25 @@ def test_a_gap_before_the_last_sample_is_no_gap_behind_it(bench: Bench) -> None:
     bench.now_ns += 100 * MS
     bench.receive(STANDS)
     assert "board_restarted" in events(bench.answer(DistanceReport(100, 0)))
+
+
+def test_the_frame_that_ends_a_gap_may_be_the_one_that_shows_a_restart(bench: Bench) -> None:
+    bench.answer(DistanceReport(400, 0))
+    bench.now_ns += 60 * MS
+    assert "board_restarted" not in events(bench.answer(DistanceReport(60, 0))), "driven"
+    bench.answer(DistanceReport(400, 0))
+    bench.now_ns += 61 * MS
+    assert "board_restarted" in events(bench.answer(DistanceReport(60, 0)))
+
+
+def test_the_frame_that_ends_a_lost_link_is_judged_as_such(bench: Bench) -> None:
+    bench.answer(DistanceReport(400, 0))
+    link_lost(bench)
+    bench.now_ns += NS_PER_S
+    assert "board_restarted" not in events(bench.answer(DistanceReport(100, 0)))
+    link_lost(bench)
+    bench.now_ns += NS_PER_S
+    assert "board_restarted" in events(bench.answer(DistanceReport(3000, 0)))
 
 
 # --- motions --------------------------------------------------------------------------------------
@@ -434,6 +453,17 @@ def test_a_vehicle_that_goes_on_after_the_lease_is_braked(
     assert motions(bench.outputs)[-1] is kind
     link_lost(bench)
     assert motions(bench.tick(2 * NS_PER_S)) == [MotionKind.BREAK], "not known to stand"
+
+
+@pytest.mark.parametrize("command", [STOP, BRAKE])
+def test_a_vehicle_that_brake_holds_is_held_after_the_end(bench: Bench, command: Command) -> None:
+    bench.arm()
+    bench.move(command)
+    bench.carried_out(bench.core.motions.stop(bench.now_ns))
+    bench.now_ns += MS
+    bench.answer(VelocityReport(0, 0))
+    kind = MotionKind.BREAK if command is BRAKE else MotionKind.STOP
+    assert motions([bench.core.motions.on_exit(bench.now_ns)]) == [kind]
 
 
 @pytest.mark.parametrize("command", [STOP, BRAKE])

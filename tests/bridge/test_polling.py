@@ -64,6 +64,8 @@ def test_a_missed_answer_halves_the_rate_down_to_a_quarter_and_the_next_restores
     slow = Polling([("slow", BumperQuery(), 2.0)], 0.1)
     assert sent(slow, "slow", range(1000, 7000, 10)) == [1000, 1500, 2500, 4500, 6500]
     assert slow.missed() == {"slow": 5}
+    slow.answered("slow", 7000 * MS)
+    assert sent(slow, "slow", range(7010, 8500, 10)) == [7500, 8000]
 
 
 def test_an_answer_is_no_older_than_its_query_and_an_unsolicited_one_changes_nothing() -> None:

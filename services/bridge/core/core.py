@@ -91,7 +91,7 @@ class Core:
             queries(settings), settings.times.answer, steady=STEADY, tick_s=tick_s(settings)
         )
         self._bumper = BumperFilter()
-        self._bumper_seq = 0  # of the newest bumper message
+        self._bumper_seq = 0  # of the newest bumper message, as its publisher counts
         self._mileage: Latest[m.Mileage] | None = None
         self._faults: dict[Side, int] = {}
         self._frames: Counter[str] = Counter()  # since the last second
@@ -197,8 +197,8 @@ class Core:
             before.value,
             after,
             before.age_s(now_ns),
-            unbroken=self.readiness.up_ns <= before.received_ns,
-            silent=self.readiness.gap_ns > before.received_ns,
+            unbroken=self.readiness.unbroken_since(before.received_ns),
+            silent=self.readiness.was_silent_since(before.received_ns, now_ns),
         ):
             yield from self.readiness.on_restart(now_ns)
             self._bumper = BumperFilter()

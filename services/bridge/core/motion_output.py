@@ -157,8 +157,9 @@ class MotionOutput:
         return self._is_at_standstill(now_ns) or now_ns - since_ns > STOP_TIMEOUT_NS
 
     def on_exit(self, now_ns: int) -> Send:
-        """Return the last frame, on every exit: the board does not stop by itself."""
-        return self.order(STOP if self._is_at_standstill(now_ns) else BRAKE)
+        """Return the last frame, on every exit: STOP at standstill, unless BRAKE held it there."""
+        stands = self._is_at_standstill(now_ns) and not self.lease.braking
+        return self.order(STOP if stands else BRAKE)
 
     def order(self, order: Command, motion: Motion | None = None) -> Send:
         """Return the frame of an order, from the command port."""

@@ -126,10 +126,12 @@ class Polling:
     def answered(self, name: str, now_ns: int) -> int:
         """Record an answer; return the time of its query, which bounds its age.
 
-        An unsolicited answer changes nothing.
+        After an unsolicited answer this is the time of the answer.
         """
         query = self.queries[name]
-        query.slowdown = 1
+        if query.slowdown > 1:
+            query.slowdown = 1
+            query.due_ns = min(query.due_ns, now_ns + query.period_ns)
         if query.losses is not None:
             query.losses.on_answer(now_ns)
         if query.sent_ns is None:

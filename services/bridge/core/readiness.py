@@ -172,6 +172,18 @@ class Readiness:
             for brake in self._brakes:
                 brake.send_at_once()
 
+    def unbroken_since(self, since_ns: int) -> bool:
+        """Return whether the link has been up since then."""
+        return self.link == "up" and self.up_ns <= since_ns
+
+    def was_silent_since(self, since_ns: int, now_ns: int) -> bool:
+        """Return whether the board was silent for a moment since then, without a lost link.
+
+        ``now_ns`` is the time of the frame that is being processed: a silence may end with it.
+        """
+        ends_now = self.link == "up" and now_ns - self._received_ns > GAP_NS
+        return ends_now or self.gap_ns > since_ns
+
     def on_restart(self, now_ns: int) -> Outputs:
         """Process a restart of the board."""
         self.epoch += 1

@@ -9,7 +9,7 @@ import math
 
 from common.errors import WireError
 from common.messages import Driver, Mileage, Motion, RangeStatus, Ultrasonic, Velocity
-from common.motion import BRAKE, RUN, STOP, Command, clamp
+from common.motion import BRAKE, RUN, STOP, Command, Twist, clamp
 from common.settings import Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import MAGNITUDE_MAX
@@ -40,7 +40,7 @@ FAST_MPS, FAST_RADPS, STEP = 5.0, 5.0, 1.0
 DRIVEN_MPS, TURNED_RADPS, STEP_TO_ZERO = 1.5, 2.0, 0.02
 ZERO_M = 0.005
 ZERO_RAD = math.radians(0.5)
-GAP_MAX_S = 0.2  # used of a gap with a lost link: the board may have been off
+GAP_MAX_S = 0.2  # of a gap with a lost link no more counts as driving: the board may have been off
 
 
 class Translator:
@@ -55,12 +55,12 @@ class Translator:
         self._max_angular = max_angular
 
     def command(self, order: Command, motion: Motion | None = None) -> MotionCommand:
-        """Return the frame for an order; a RUN carries the motion, clamped to the limits."""
+        """Return the frame for an order; a RUN carries the motion, slowed on its curve to the limits."""
         if order is not RUN or motion is None:
             return MotionCommand(KINDS[order])
-        linear = clamp(motion.linear, self._max_linear) * MM
-        angular = clamp(motion.angular, self._max_angular) * self._commanded_per_radian
-        return MotionCommand(MotionKind.RUN, round(linear), round(clamp(angular, MAGNITUDE_MAX)))
+        twist = Twist(motion.linear, motion.angular).within(self._max_linear, self._max_angular)
+        angular = clamp(twist.angular * self._commanded_per_radian, MAGNITUDE_MAX)
+        return MotionCommand(MotionKind.RUN, round(twist.linear * MM), round(angular))
 
     def velocity(self, frame: VelocityReport) -> Velocity:
         """Return the measured velocity in m/s and rad/s (manual 2.2)."""
