@@ -93,7 +93,8 @@ def connect(endpoint: str, bus: BusSettings) -> Finding:
     address = rest.partition("?")[0].partition("#")[0]
     trouble, todo, took_s = "", remedies.KEYS, 0.0
     if protocol == "unixsock-stream":
-        trouble, todo = "" if Path(address).exists() else "the file is missing", remedies.NO_SOCKET
+        trouble = "" if Path(address).exists() else "the socket file is missing"
+        todo = remedies.NO_SOCKET
     elif protocol not in STREAMS:
         return Finding("network", "unknown", f"{endpoint} cannot be tested by itself")
     else:

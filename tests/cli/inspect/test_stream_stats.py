@@ -1,8 +1,10 @@
 """Statistics of streams."""
 
+import msgspec
 import pytest
 
-from cli.inspect.stream_stats import StreamSample, StreamStats, quantile
+from cli.inspect.stream_stats import StreamSample, StreamStats, quantile, stream_sample
+from common.codec import Sample
 from common.freshness import NS_PER_S
 
 
@@ -57,3 +59,22 @@ def test_quantiles() -> None:
     assert quantile([], 0.5) is None
     assert quantile([1.0], 0.99) == 1.0
     assert quantile([1.0, 2.0, 3.0, 4.0], 0.5) == 3.0
+
+
+@pytest.mark.parametrize(
+    ("message", "host", "delay", "clock"),
+    [
+        ({"mono_ns": 5, "t_ns": 7, "host": 3, "seq": 2, "boot": 4}, 3, 10, "host"),
+        ({"mono_ns": 5, "t_ns": 7, "host": 3, "seq": 2, "boot": 4}, 9, 13, "wall"),
+        ({"mono_ns": 5, "t_ns": 7, "host": 0, "seq": 2, "boot": 4}, 0, 13, "wall"),
+        ({"seq": 2, "boot": 4}, 3, None, ""),
+        ([2], 3, None, ""),
+    ],
+)
+def test_the_clock_of_a_delay(message: object, host: int, delay: int | None, clock: str) -> None:
+    payload = msgspec.msgpack.encode(message)
+    sample = Sample("t2/v1/001/tel/x", payload, "", False, b"raw", 15, 20)
+    measured = stream_sample(sample, host)
+    assert measured.delay_s == (None if delay is None else delay / NS_PER_S)
+    assert (measured.clock, measured.size) == (clock, len(payload) + 3)
+    assert (measured.seq, measured.boot) == ((2, 4) if isinstance(message, dict) else (None, None))
