@@ -96,6 +96,7 @@ class SafetyClient:
 
     def stop(self, robots: Iterable[str]) -> set[str]:
         """Repeat an emergency stop until all have latched it; return the robots that have."""
+        self.states.clear()  # only a state from now on confirms it
         self._stops = {robot: EstopRepetition() for robot in robots}
         for stop in self._stops.values():
             stop.start()
