@@ -39,6 +39,11 @@ def test_a_single_velocity_of_zero_is_no_standstill() -> None:
     assert stop.distance > 0.7
 
 
+def test_a_vehicle_that_still_turns_does_not_stand() -> None:
+    turns = changed(streams(), lambda v, now: replace(v, angular=0.2) if now > 1.0 else v)
+    assert left(turns) == "the recording ends before standstill"
+
+
 def test_a_pressed_bumper() -> None:
     assert left(streams(at(Bumper(pressed=True), 0.0))) == "the bumper was pressed"
     assert left(streams(at(Bumper(pressed=True), 1.685))) == "the bumper was pressed"
