@@ -1,0 +1,54 @@
+"""zenoh-cli with T2's codec publishes and queries keys, as ``docs/inspect.md`` shows."""
+
+import json
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import msgpack
+
+from common import keys
+from common.messages import Done
+from tests.cli.inspect.tool import pretend
+from tests.cli.processes import PATIENCE_S
+from tests.common.bus_fixture import BusFixture
+from verification.harness.waiting import wait_until
+
+PAGE = Path(__file__).parents[3] / "docs" / "inspect.md"
+
+
+def ran(word: str, buses: BusFixture) -> str:
+    """Run the line ``z WORD`` of the page on this bus; return its output."""
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    alias = next(line for line in lines if line.startswith("alias z='zenoh "))
+    line = next(line for line in lines if line.startswith(f"z {word} "))
+    words = shlex.split(alias.partition("'")[2].rstrip("'")) + shlex.split(line)[1:]
+    words = [
+        each.replace("tcp/127.0.0.1:7447", buses.endpoint).replace("/001/", f"/{buses.robot}/")
+        for each in words
+    ]
+    words[0] = str(Path(sys.executable).parent / words[0])
+    done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def test_put(buses: BusFixture) -> None:
+    received: list[bytes] = []
+    subscriber = buses.session().declare_subscriber(
+        f"t2/v1/{buses.robot}/tel/mine/*", lambda s: received.append(s.payload.to_bytes())
+    )
+    ran("put", buses)
+    wait_until(lambda: received, "the message")
+    message = msgpack.unpackb(received[0])
+    assert (message["celsius"], message["seq"]) == (21.5, 1)
+    subscriber.undeclare()
+
+
+def test_get(buses: BusFixture) -> None:
+    pretend(
+        buses, "bridge", {},
+        lambda bus: bus.serve(keys.SET_LED, lambda _, caller: caller.reply(Done(text="lit"))),
+    )  # fmt: skip
+    assert json.loads(ran("get", buses)) == {"text": "lit", "boot": 0}
