@@ -143,7 +143,7 @@ def stop_and_reset(robot: Robot) -> str:
     """Call the emergency stop and the reset."""
     (stopped,) = robot.node("call", "/hardware/e_stop_trigger")
     assert stopped["success"], stopped
-    assert "estop" in robot.client.latched, robot.client.state
+    wait_until(lambda: "estop" in robot.client.latched, "the latch")
     assert robot.last("/hardware/e_stop", "std_msgs/msg/Bool")["data"]
     (cleared,) = robot.node("call", "/hardware/e_stop_reset")
     assert cleared["success"], cleared
