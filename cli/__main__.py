@@ -38,7 +38,10 @@ GROUPS = {
         "call": ("cli.inspect.call", "call a service, such as safety/reset"),
     },
     "Record": {
-        "record": ("cli.recordings.record", "record everything on the bus to files, until Ctrl-C"),
+        "record": (
+            "services.recorder.__main__",
+            "record everything on the bus to files, until Ctrl-C",
+        ),
         "info": ("cli.recordings.info", "show the content of a recording"),
         "replay": (
             "cli.recordings.replay",

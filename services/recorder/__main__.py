@@ -1,4 +1,4 @@
-"""Entry point of the recorder: ``python -m services.recorder``."""
+"""Entry point of the recorder: ``python -m services.recorder``, and ``t2 record``."""
 
 import argparse
 import sys
@@ -19,15 +19,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Record until SIGINT or SIGTERM; return the exit code."""
+    """Record continuously, for ``t2 record``; remove no recordings unless an option says so."""
+    options.sets = ["recorder.make_room=false", *options.sets, "recorder.everything=true"]
+    return serve(options)
+
+
+def serve(options: argparse.Namespace) -> int:
+    """Run the black box until SIGINT or SIGTERM; return the exit code."""
     return run_optional_service(
         "recorder", RecorderConfig, _recorder, sources(options), extra="record"
     )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run with these arguments; return the exit code."""
-    return run_program("recorder", add_arguments, run, argv)
+    """Run the service with these arguments; return the exit code."""
+    return run_program("recorder", add_arguments, serve, argv)
 
 
 def _recorder() -> Callable[[Node[RecorderConfig]], object]:
