@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from cli.run import ports
-from cli.run.ports import Port, check_free, routers, wanted
+from cli.run.ports import Port, claimed, routers, wanted
 from cli.settings import Everything
 from common import settings
 from common.bus.session import router
@@ -20,6 +20,7 @@ from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
 from tests.cli.stack import ports as own_ports
 from tests.cli.stack import starts
 from verification.harness.bus import listening
+from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 ALL = ("router", "sim", "bridge", "safety", "odom", "recorder")
@@ -76,11 +77,11 @@ def test_a_taken_port_is_named_with_advice(
     with held(kind) as number:
         port = of(number)
         with pytest.raises(LinkError) as raised:
-            check_free([port], 0.0)
+            claimed([port], 0.0)
     message = str(raised.value)
     assert f"127.0.0.1:{number} ({port.setting}): used by another program" in message
     assert "is a stack already running?" in message
-    check_free([port], 0.0)
+    claimed([port], 0.0).close()  # free again
 
 
 def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
@@ -90,10 +91,17 @@ def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
         router(listening(f"unixsock-stream/{path}")),
         pytest.raises(LinkError, match="used by another"),
     ):
-        check_free([port], 0.0)
+        claimed([port], 0.0)
     with socket.socket(socket.AF_UNIX) as stale:
         stale.bind(f"{path}.2")
-    check_free([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0)
+    with claimed([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0):
+        pass
+
+
+def test_of_two_concurrent_starts_one_continues() -> None:
+    port = udp(free_port(socket.SOCK_DGRAM))
+    with claimed([port], 0.0), pytest.raises(LinkError, match="used by another program"):
+        claimed([port], 0.0)
 
 
 def test_ports_of_a_killed_stack_are_awaited() -> None:
@@ -101,7 +109,7 @@ def test_ports_of_a_killed_stack_are_awaited() -> None:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
         threading.Timer(3 * ports.LOOK_S, leaving.close).start()
         began_s = time.monotonic()
-        check_free([udp(number)])
+        claimed([udp(number)]).close()
         assert time.monotonic() - began_s >= 2 * ports.LOOK_S
 
 
@@ -113,7 +121,7 @@ def test_a_second_stack_starts_nothing(tmp_path: Path) -> None:
     words = sets(*words, f"recorder.folder={tmp_path}")
     with running(t2("up", *words), log):
         wait_until(lambda: starts(log, "bridge") and starts(log, "safety"), "a stack", PATIENCE_S)
-        for more in ([], ["--no-router"]):
+        for more in ([], ["--no-sim"], ["--no-router"]):
             second = ran("up", *words, *more)
             assert second.returncode == EXIT_LINK
             assert "used by another program; is a stack already running?" in second.stderr
