@@ -60,7 +60,8 @@ class Storage:
         enough = self.has_room or bool(removed)
         self.has_room = left >= self._free_min * (1.0 if enough else HYSTERESIS)
         if not self.has_room:
-            self.problem = f"{left / MB:.0f} MB are left, recorder.free is {self._free_min / MB:g}"
+            wanted = self._free_min / MB
+            self.problem = f"{left / MB:.0f} MB are left, recorder.free is {wanted:.0f}"
         return removed
 
     def on_error(self, error: OSError, now_ns: int) -> None:

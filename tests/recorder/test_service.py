@@ -165,7 +165,7 @@ def test_without_room_nothing_is_written(buses: BusFixture, tmp_path: Path) -> N
     assert list(tmp_path.iterdir()) == []
     (full,) = (each for each in events if each.name == "disk_full")
     assert full.level == "error"
-    assert "recorder.free is 1e+06" in full.text
+    assert "recorder.free is 1000000" in full.text
 
 
 def test_an_incident_replaces_old_recordings_on_a_full_disk(

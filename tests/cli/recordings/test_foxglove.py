@@ -5,7 +5,6 @@ import struct
 import threading
 from typing import Any
 
-import pytest
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
@@ -66,26 +65,17 @@ class Viewer(threading.Thread):
         socket.send(json.dumps({"op": "subscribe", "subscriptions": [subscription]}))
 
 
-@pytest.mark.parametrize(
-    ("topic", "schema", "field"),
-    [
-        ("foxglove/pose", "foxglove.PoseInFrame", "pose"),
-        ("t2/v1/{robot}/tel/odom/odometry", "t2.v1.Odometry", "residual"),
-    ],
-)
-def test_a_viewer_receives_live_messages(
-    buses: BusFixture, tool: Tool, topic: str, schema: str, field: str
-) -> None:
+def test_a_viewer_receives_live_messages(buses: BusFixture, tool: Tool) -> None:
     port = free_port()
     pretend(buses, "odom", {keys.ODOMETRY: samples.odometry})
-    viewer = Viewer(port, topic.format(robot=buses.robot))
+    viewer = Viewer(port, f"t2/v1/{buses.robot}/tel/odom/odometry")
     result = tool("foxglove", "--port", str(port), "--duration", "6")
     viewer.join(PATIENCE_S)
     assert (result.code, result.err) == (0, "")
     assert f"ws://127.0.0.1:{port}" in result.out
-    assert (viewer.channel["schemaName"], viewer.channel["encoding"]) == (schema, "json")
-    assert field in viewer.message
-    assert field in json.loads(viewer.channel["schema"])["properties"]
+    assert (viewer.channel["schemaName"], viewer.channel["encoding"]) == ("t2.v1.Odometry", "json")
+    assert "residual" in viewer.message
+    assert "residual" in json.loads(viewer.channel["schema"])["properties"]
 
 
 def test_a_taken_port_is_an_error(tool: Tool) -> None:
