@@ -103,6 +103,11 @@ def test_every_key_is_recorded_with_raw_frames(buses: BusFixture, tmp_path: Path
     stranger = buses.session()
     root = f"t2/v1/{buses.robot}"
     with recorder(buses, tmp_path, "recorder.everything=true"):
+        until_received(
+            lambda: stranger.put(f"{root}/@cmd/first", b""),
+            lambda: "@cmd/first" in paths(read(tmp_path)),
+            "the subscriptions",
+        )
         stranger.put(f"{root}/estop", b"")
         stranger.put(f"{root}/@cmd/motion", b"\x80", encoding="x/y")
         stranger.put(f"{root}/tel/bridge/velocity", b"\x80", attachment=b"frame")
