@@ -197,12 +197,6 @@ def test_while_the_lease_is_valid_safety_supervises_the_vehicle() -> None:
 # --- readiness, hits and emergency stops ----------------------------------------------------------
 
 
-@pytest.mark.parametrize("neutral", [stop(), brake(), run(0.0, 0.0)])
-def test_neutral_counts_only_while_ready(neutral: Motion) -> None:
-    assert obey(NOT_NEUTRAL, neutral)[0].neutral
-    assert not obey(replace(NOT_NEUTRAL, ready=False), neutral)[0].neutral
-
-
 def test_losing_readiness_takes_the_neutral_and_stops_at_once() -> None:
     lost = on_ready(replace(ARMED, sent_ns=NOW), False)
     assert lost == replace(ARMED, ready=False, neutral=False, sent_ns=leases.AT_ONCE)
@@ -319,13 +313,6 @@ def test_what_is_due(given: Lease, age: int, standing: bool, order: Command | No
     after, sent = on_tick(given, NOW + age, LEASE, COAST, standing)
     assert sent is order
     assert after.sent_ns == (NOW + age if order else NOW)
-
-
-def test_a_message_ends_the_stopping_of_a_lease_that_was_over() -> None:
-    over, _ = on_tick(ARMED, NOW + LEASE + 1, LEASE, COAST, True)
-    alive, _, _ = obey(over, stop(), NOW + NS_PER_S)
-    assert (alive.renewed_ns, alive.over_since_ns, alive.neutral) == (NOW + NS_PER_S, None, True)
-    assert on_tick(alive, NOW + NS_PER_S + LEASE, LEASE, COAST, True) == (alive, None)
 
 
 # --- in any order ---------------------------------------------------------------------------------

@@ -97,9 +97,9 @@ def test_without_a_velocity_it_is_taken_to_stand(output: Output) -> None:
 
 
 def test_a_hit_counts_for_the_period_of_stop(output: Output) -> None:
-    list(output.made.on_hit(1, NOW))
-    assert output.tick(NOW + 30 * MS - 1) == []
-    assert output.tick(NOW + 30 * MS) == [BRAKE]
+    list(output.made.on_hit(1, NOW + 9 * MS))
+    assert output.tick(NOW + 39 * MS - 1) == []
+    assert output.tick(NOW + 39 * MS) == [BRAKE]
 
 
 @pytest.mark.parametrize("order", [STOP, BRAKE])

@@ -162,6 +162,15 @@ def test_an_answer_after_a_loss_may_be_that_of_the_poll_before() -> None:
     assert polled.answered("bumper", NS_PER_S + 162 * MS) == NS_PER_S + 140 * MS, late
 
 
+def test_a_steady_query_takes_back_a_loss_for_a_late_answer() -> None:
+    polled = steady()
+    for tick in (1000, 1020, 1040):
+        polled.due(tick * MS)
+    for tick in (1045, 1055):
+        polled.answered("bumper", tick * MS)
+    assert polled.lost("bumper", 1055 * MS) == 1
+
+
 # --- losses ---------------------------------------------------------------------------------------
 
 

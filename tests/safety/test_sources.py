@@ -283,6 +283,12 @@ def test_the_best_fresh_source_drives(asked: list[tuple[str, int, float]]) -> No
             assert arbiter.channels[best].requested == Twist(last[best][1], 0.0)
 
 
+def test_a_release_requests_no_other_motion() -> None:
+    arbiter, _ = request(DRIVES, linear=0.5, release="forward")
+    assert arbiter.channels["teleop"].requested == STILL
+    assert arbiter.requests_motion(0)
+
+
 # --- speed limits ---------------------------------------------------------------------------
 
 
