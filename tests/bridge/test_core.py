@@ -218,6 +218,14 @@ def test_the_settings_choose_what_the_crc_covers() -> None:
     assert len(published(bench.receive(made), "velocity")) == 1
 
 
+def test_clear_samples_count_across_ticks(bench: Bench) -> None:
+    found = []
+    for _ in range(3):
+        found += pressed(bench.receive(CLEAR))
+        bench.tick(20 * MS)
+    assert found == [False]
+
+
 def link_lost(bench: Bench) -> None:
     assert "link_lost" in events(bench.tick(NS_PER_S))
 

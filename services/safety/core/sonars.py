@@ -180,7 +180,7 @@ def _span(sonar: Sonar, along: float) -> tuple[float, float]:
     """Return how much nearer the vehicle came, and its travel along the axis."""
     nearer = sonar.nearer + along
     farther = max(0.0, -nearer)  # beyond the farthest place so far
-    return nearer + farther, max(sonar.travel + farther, nearer + farther)
+    return nearer + farther, max(sonar.travel + farther, nearer)
 
 
 SILENT = (Sonar(),) * len(SONAR_NAMES)
