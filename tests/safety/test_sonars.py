@@ -230,6 +230,11 @@ def after_samples(count: int, front: float | None = None, linear: float = 0.0) -
     return array
 
 
+def test_the_corners_swing_out_to_the_flanks_only() -> None:
+    swings = {name: axis.swing for name, axis in zip(SONAR_NAMES, FILTER.axes, strict=True)}
+    assert swings == dict.fromkeys(SONAR_NAMES, 0.0) | dict.fromkeys(("left", "right"), 0.55)
+
+
 def test_three_samples_open_all_sectors() -> None:
     assert doubts(after_samples(2)) == "all silent"
     assert doubts(after_samples(3)) == ""

@@ -230,9 +230,7 @@ class SonarOverrides(Struct, frozen=True):
         since = {sonar: self.since.get(sonar, now_ns) for sonar in unseen}
         shown = frozenset(sonar for sonar, at_ns in since.items() if now_ns - at_ns >= SHOWN_NS)
         acknowledged = {name: sonars & since.keys() for name, sonars in self.acknowledged.items()}
-        for source in neutral:
-            acknowledged[source] = acknowledged.get(source, frozenset()) | shown
-        return SonarOverrides(since, acknowledged)
+        return SonarOverrides(since, acknowledged | dict.fromkeys(neutral, shown))
 
     def acknowledged_by(self, source: str | None) -> frozenset[int]:
         """Return the sonars toward which this source may creep without a reading."""
