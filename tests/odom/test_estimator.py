@@ -227,7 +227,8 @@ def test_a_pose_set_while_driving_is_followed_exactly(
     odom.board.linear, odom.board.angular = linear, angular
     odom.drive(20)
     odom.board.tick(ticks)
-    odom.estimator.place(pose, odom.board.now_ns)
+    for _ in range(2):
+        odom.estimator.place(pose, odom.board.now_ns)
     odom.board.truth = pose
     assert odom.off() == EXACT
     assert odom.odometry().pose_covariance == START.rows()
@@ -235,7 +236,7 @@ def test_a_pose_set_while_driving_is_followed_exactly(
     assert odom.update() is False
     odom.drive(20)
     assert odom.off() == EXACT
-    assert odom.odometry().epoch == 1
+    assert odom.odometry().epoch == 2
 
 
 # --- slip -----------------------------------------------------------------------------------
@@ -260,13 +261,14 @@ def compared(ticks: int, counted: ArcSegment, integrated: ArcSegment) -> SlipDet
     [(0.011, 0.0, True), (0.009, 0.0, False), (0.0, 0.021, True), (0.0, 0.019, False)],
 )
 def test_slip_by_distance_or_by_turn(sign: int, counted: float, turned: float, slip: bool) -> None:
-    detector = compared(10, arc(0.5 + sign * counted, sign * turned), arc(0.5))
+    detector = compared(10, arc(0.5 + sign * counted, 0.3 + sign * turned), arc(0.5, 0.3))
     assert detector.slip is slip
     assert detector.residual == pytest.approx(10 * sign * counted)
 
 
 def test_the_limits_of_slip_are_exclusive() -> None:
     detector = SlipDetector(Odom(slip_distance=0.125, slip_turn=0.25))
+    assert (detector.residual, detector.slip) == (None, False)
     detector.add(0, arc(0.125, 0.25), arc(0.0))
     detector.update(0)
     assert not detector.slip
@@ -279,15 +281,16 @@ def test_only_the_last_second_is_compared() -> None:
     assert detector.residual is None
 
 
-def test_slip_falls_at_half_of_its_limit() -> None:
-    detector, slips = SlipDetector(Odom(slip_distance=0.125)), []
+@pytest.mark.parametrize("counted", [arc(1 / 64), arc(0.0, 1 / 64)])
+def test_slip_falls_at_half_of_its_limit(counted: ArcSegment) -> None:
+    detector, slips = SlipDetector(Odom(slip_distance=0.125, slip_turn=0.125)), []
     for tick in range(1, 10):
-        detector.add(tick * TICK_NS, arc(1 / 64), arc(0.0))
+        detector.add(tick * TICK_NS, counted, arc(0.0))
     for samples_left in (9, 5, 4):
         detector.update((10 - samples_left) * TICK_NS + NS_PER_S)
         slips.append(detector.slip)
     assert slips == [True, True, False]
-    assert detector.residual == 1 / 16
+    assert detector.residual == 4 * counted.distance
 
 
 def test_a_motion_without_velocities_and_the_next_one_are_not_compared() -> None:
@@ -298,3 +301,17 @@ def test_a_motion_without_velocities_and_the_next_one_are_not_compared() -> None
     detector.add(12 * TICK_NS, arc(0.02), arc(0.01))
     detector.update(12 * TICK_NS)
     assert detector.residual == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(("linear", "angular"), [(0.8, 0.0), (0.0, 0.8)])
+def test_counters_that_do_not_follow_the_velocities_are_published_as_slip(
+    linear: float, angular: float
+) -> None:
+    odom = started(linear=linear, angular=angular)
+    odom.drive(100)
+    assert odom.odometry().slip is False
+    for _ in range(20):
+        odom.board.now_ns += TICK_NS  # the wheels turn, the counters do not
+        odom.update()
+    assert odom.odometry().slip is True
+    assert odom.odometry().residual == pytest.approx(-linear * 0.4, abs=0.03)
