@@ -51,6 +51,18 @@ def test_the_age_of_a_press() -> None:
     assert Press("w", at(10)).age_s(at(12.5)) == 2.5
 
 
+def test_a_deadman_counts_after_it_was_up() -> None:
+    deadman = Deadman(2.0)
+    held = [deadman.is_held]
+    for down in (True, True, False, True, None, True, False, True):
+        if down is None:
+            deadman.drop()
+        else:
+            deadman.update(down, 0, at(10))
+        held.append(deadman.is_held)
+    assert held == [False, False, False, False, True, False, False, False, True]
+
+
 @pytest.mark.parametrize(
     ("quiet_s", "due", "silent"),
     [(0.0, False, False), (1.0, False, False), (1.05, True, False), (2.0, True, False),
