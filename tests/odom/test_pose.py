@@ -93,7 +93,7 @@ def test_covariance_follows_the_derivatives(
     heading: float, distance: float, turn: float, noise: ProcessNoise
 ) -> None:
     start = Pose(2.0, 3.0, heading)
-    before = CERTAIN.plus(0.3, 1.0, 0.2, 0.1).plus(0.2, -0.3, 1.0, 0.5).plus(0.1, 0.0, 0.0, 1.0)
+    before = CERTAIN.plus(0.3, 1.0, 0.2, 0.1).plus(0.2, -0.3, 1.0, -0.5).plus(0.1, 0.0, 0.0, 1.0)
     after = PoseEstimate(start, before).moved(distance, turn, noise)
     whole = np.zeros((5, 5))
     whole[:3, :3] = np.reshape(before.rows(), (3, 3))
@@ -153,7 +153,8 @@ def test_near_points_are_left_out_and_the_oldest_are_dropped() -> None:
     for x in (0.0, 0.05, 0.099, 0.1, 0.15, 0.25):
         trajectory.add(Pose(x, 0.0, 0.5))
     assert trajectory.points() == [(0.0, 0.0, 0.5), (0.1, 0.0, 0.5), (0.25, 0.0, 0.5)]
-    trajectory.add(Pose(0.25, 1.0, 0.5))
+    for y in (1.0, 1.05):
+        trajectory.add(Pose(0.25, y, 0.5))
     assert [y for _, y, _ in trajectory.points()] == [0.0, 0.0, 1.0]
     trajectory.clear()
     assert trajectory.points() == []
