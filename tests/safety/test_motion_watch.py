@@ -167,12 +167,15 @@ def test_late_from_the_first_moment_after_the_limit() -> None:
     assert not replace(state, displacement=Displacement(steady=STILL)).is_late(101)
 
 
-def test_an_unknown_velocity_counts_as_the_fastest() -> None:
-    board = Board(replace(SETTINGS, max_linear=0.7, max_angular=0.4))
+@pytest.mark.parametrize(("linear", "angular", "stop_s"), [(0.7, 0.4, 0.7 / 0.6), (0.1, 0.9, 0.9)])
+def test_an_unknown_velocity_counts_as_the_fastest(
+    linear: float, angular: float, stop_s: float
+) -> None:
+    board = Board(replace(SETTINGS, max_linear=linear, max_angular=angular))
     board.step(None, moves=True)
     board.step(None)
-    assert board.state.due_ns == board.now_ns + round(0.7 / 0.6 * NS_PER_S) + GRACE_NS
-    board.run(0.7 / 0.6 + 0.5, None)
+    assert board.state.due_ns == board.now_ns + round(stop_s * NS_PER_S) + GRACE_NS
+    board.run(stop_s + 0.5, None)
     assert not board.late()
     board.run(2 * TICK_S, None)
     assert board.late()
