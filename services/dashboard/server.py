@@ -14,7 +14,8 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
-from starlette.routing import Route, WebSocketRoute
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from common.errors import LinkError
@@ -29,7 +30,6 @@ from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub
 
 SHUTDOWN_S = 1  # for browsers to disconnect
 STATIC = Path(__file__).parent / "static"
-MEDIA_TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 HEADER_MAX = 16_384  # bytes
 ROBOT_ID = "{the robot}"
 # Documentation addresses (RFC 5737, RFC 3849), which route to the default gateway.
@@ -82,18 +82,13 @@ def _application(
     settings: Dashboard, robot: str, hub: WebSocketHub, listener: Listener
 ) -> Starlette:
     """Return the application behind the authentication."""
-    template, files = page(settings), assets()
+    template = page(settings)
 
     async def index(request: Request) -> Response:
         shown = request.query_params.get("robot", robot)
         if not re.match(ROBOT, shown):
             return PlainTextResponse("not the id of a robot\n", status_code=404)
         return HTMLResponse(template.replace(ROBOT_ID, shown))
-
-    async def file(request: Request) -> Response:
-        if (found := files.get(request.path_params["name"])) is None:
-            return PlainTextResponse("file not found\n", status_code=404)
-        return Response(found[0], media_type=found[1])
 
     # Besides the WebSocket: a stop must arrive when that is congested or closed.
     async def stop(request: Request) -> Response:
@@ -112,7 +107,7 @@ def _application(
     return Starlette(
         routes=[
             Route("/", index),
-            Route("/t2/{name}", file),
+            Mount("/t2", StaticFiles(directory=STATIC)),
             Route("/estop/{robot}", stop, methods=["POST"]),
             *(recordings.routes(Path(settings.recordings)) if settings.recordings else ()),
             WebSocketRoute("/live", live),
@@ -132,15 +127,6 @@ def page(settings: Dashboard) -> str:
         robot=ROBOT_ID, texts=_script(table()), phrases=_script(phrases()),
         camera=html.escape(settings.camera), recordings="yes" if settings.recordings else "",
     )  # fmt: skip
-
-
-def assets() -> dict[str, tuple[bytes, str]]:
-    """Return content and media type of the page's files, by name; requests read no disk."""
-    return {
-        path.name: (path.read_bytes(), MEDIA_TYPES[path.suffix])
-        for path in STATIC.iterdir()
-        if path.suffix in MEDIA_TYPES
-    }
 
 
 def listen(settings: Dashboard, counters: Counter[str]) -> Listener:
