@@ -1,4 +1,4 @@
-"""Call servers of safety and bridge with configured answers."""
+"""A safety that answers resets as configured, at a contact."""
 
 import contextlib
 from collections.abc import Iterator
@@ -13,8 +13,6 @@ from common.messages import (
     Release,
     ResetDone,
     ResetRequest,
-    Switches,
-    SwitchesRequest,
 )
 from tests.dashboard.bus_fixture import Peer
 from verification.harness.bus import bus_on, running
@@ -26,17 +24,15 @@ FREE = Release(believed_free="backward", travelled=0.4, age=2.0, forbidden=(), l
 
 @dataclass
 class CallServers:
-    """Call servers of safety and bridge: received requests and configured answers."""
+    """The received resets and the configured answers."""
 
     peer: Peer
     resets: list[ResetRequest] = field(default_factory=list)
-    switches: list[SwitchesRequest] = field(default_factory=list)
     boot: int = 0
     is_effective: bool = True
 
     def declare(self, bus: Bus) -> None:
         bus.serve(keys.RESET, self.reset)
-        bus.serve(keys.SET_SWITCHES, self.switch)
 
     def releases(self) -> set[Direction]:
         """Return the releases that the dashboard has requested."""
@@ -50,10 +46,6 @@ class CallServers:
             text="Reset.", boot=self.boot, heartbeat=clock.now_ns(), cleared=request.causes
         )
         caller.reply(done)
-
-    def switch(self, request: SwitchesRequest, caller: Caller[Switches]) -> None:
-        self.switches.append(request)
-        caller.reply(Switches())
 
 
 @contextlib.contextmanager

@@ -1,9 +1,7 @@
 """The page in a real browser at a simulated safety: release, roles, what is not there."""
 
 import contextlib
-import threading
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import msgspec
@@ -153,49 +151,6 @@ def test_a_viewer_is_offered_no_stick(page: Page, view_only: Server) -> None:
     page.keyboard.down("w")
     page.wait_for_timeout(500)
     assert "You drive" not in text(page, "#driver")
-
-
-IMAGE = (
-    b'<svg xmlns="http://www.w3.org/2000/svg" width="64" height="36">'
-    b'<rect width="64" height="36"/></svg>'
-)
-
-
-class Camera(BaseHTTPRequestHandler):
-    """A camera of robot 001."""
-
-    def do_GET(self) -> None:
-        """Serve an image."""
-        is_found = self.path == "/001/stream"
-        self.send_response(200 if is_found else 404)
-        self.send_header("content-type", "image/svg+xml")
-        self.end_headers()
-        self.wfile.write(IMAGE if is_found else b"")
-
-    def log_message(self, *_: object) -> None:
-        """Print nothing."""
-
-
-@pytest.fixture
-def camera() -> Iterator[str]:
-    with ThreadingHTTPServer(("127.0.0.1", 0), Camera) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-
-
-def test_camera_and_recordings(page: Page, endpoint: str, camera: str, tmp_path: Path) -> None:
-    (tmp_path / "001-20260315-081530.mcap").write_bytes(bytes(10))
-    sets = (f"dashboard.recordings={tmp_path}", f"dashboard.camera={camera}/{{robot}}/stream")
-    with dashboard(endpoint, tmp_path, *sets) as server:
-        page.goto(server.url)
-        width = "document.querySelector('#camera img').naturalWidth"
-        wait_until(lambda: page.evaluate(width) == 64, "the camera's image")
-        page.click("#recordings summary")
-        wait_for_text(page, "#recordings", "001-20260315-081530.mcap")
-        wait_for_text(page, "#recordings", "t2 report 001-20260315-081530.mcap")
-        page.evaluate(f"document.querySelector('#camera img').src = '{camera}/none'")
-        wait_for_text(page, "#camera", "The camera does not answer.")
 
 
 WHY = "No connection to the router"

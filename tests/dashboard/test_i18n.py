@@ -8,7 +8,6 @@ import pytest
 
 from common.messages import Direction, FaultName, LinkState, Verdict
 from services.dashboard import server
-from services.dashboard.auth import token_page
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.i18n import LANGUAGES, PHRASES, PLACEHOLDER, TEXTS, table
 from services.safety.core.causes import RULES
@@ -33,20 +32,10 @@ def used_keys() -> set[str]:
     return found
 
 
-def test_the_search_finds_known_keys() -> None:
-    assert {
-        "estop",
-        "follow",
-        "also_latched",
-        "take_first",
-        "theme",
-        "too_late",
-        "reset_unconfirmed",
-    } <= used_keys()
-
-
 def test_every_used_key_has_a_text() -> None:
-    assert used_keys() <= set(TEXTS)
+    used = used_keys()
+    assert {"estop", "too_late", "release_due"} <= used  # of the page, a script, the server
+    assert used <= set(TEXTS)
 
 
 @pytest.mark.parametrize(
@@ -119,48 +108,8 @@ def test_the_table_has_the_texts_by_language() -> None:
     assert (both["en"]["estop"], both["zh"]["estop"]) == TEXTS["estop"]
 
 
-def test_the_token_page_has_both_languages() -> None:
-    for text in TEXTS["token_ask"]:
-        assert text in token_page(wrong=False)
-    for text in TEXTS["token_wrong"]:
-        assert text in token_page(wrong=True)
-
-
-def source_text() -> str:
-    """Return the code of all services with the parts of each string joined."""
-    files = [*Path(CODE).parent.rglob("*.py"), *(Path(CODE).parents[1] / "common").rglob("*.py")]
-    code = "\n".join(file.read_text(encoding="utf-8") for file in files)
-    return re.sub(r'"\s*\n\s*f?"', "", code)
-
-
-def test_every_phrase_is_one_of_a_service() -> None:
-    code = source_text()
-    sentences = [english for english in PHRASES if " " in english and english[-1] in ".:}"]
-    assert len(sentences) > 40
-    for english in sentences:
-        for part in english.split(PLACEHOLDER):
-            # A figure with its unit, or a sentence after another one.
-            assert part.strip(" .,:()m/s") in code, english
-
-
-def test_every_text_of_the_recorders_events_is_translated() -> None:
-    code = (CODE.parent / "recorder" / "recorder.py").read_text(encoding="utf-8")
-    texts = re.findall(r'(?:text = f?|"(?:info|warning|error)", f?)"([^"]+)"', code)
-    found = {re.sub(r"{[^}]*}", PLACEHOLDER, text) for text in texts} - {"{}: {}"}
-    assert "black box written to {}" in found
-    assert [text for text in found if not any(it.startswith(text) for it in PHRASES)] == []
-
-
 @pytest.mark.parametrize("english", PHRASES)
 def test_a_phrase_has_the_same_placeholders_in_both_languages(english: str) -> None:
     chinese = PHRASES[english]
     assert HAN.search(chinese)
     assert chinese.count(PLACEHOLDER) == english.count(PLACEHOLDER)
-
-
-def test_units_are_the_same_in_both_languages() -> None:
-    units = re.compile(r"\d ?(m|s|ms|rad|Hz|%)(?![a-z])|\b(m/s|rad/s)")
-    for english, chinese in [*TEXTS.values(), *PHRASES.items()]:
-        assert not re.search(r"\d ?[秒米]|米/秒|弧度/秒|赫兹", chinese)
-        assert not re.search(r"\d(m|s|ms|rad|Hz)\b", english + chinese)  # a space before a unit
-        assert bool(units.search(english)) == bool(units.search(chinese)), english

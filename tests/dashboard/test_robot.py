@@ -1,11 +1,13 @@
 """The driver of one robot on the dashboard: overruled by another source, or without permission."""
 
+from typing import Any
+
 import pytest
 
 from common import keys
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER, ESTOP_TICKS, OVERRULED_TICKS
-from common.messages import Direction, Drive
+from common.messages import Cause, Direction, Drive, ResetDone, ResetRequest
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
 from services.dashboard.robot import Robot
@@ -152,3 +154,51 @@ def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.Monke
     fixture.robot.estop("a test")
     fixture.ticks(ESTOP_TICKS, None)
     assert fixture.notices[1:] == [("error", "estop_denied", "")]
+
+
+CONTACT = Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=11)
+NEWER = Cause(name="contact", action="brake", age=0.1, text="The bumper was hit.", id=12)
+
+
+@pytest.fixture
+def reset(fixture: RobotFixture) -> RobotFixture:
+    """A driver who has reset a contact, after which safety published a newer one."""
+    for heartbeat, cause in ((1, CONTACT), (2, NEWER)):
+        state = safety_state(heartbeat=heartbeat, latched=("contact",), causes=(cause,))
+        fixture.bus.deliver(keys.SAFETY, state, 0)
+    fixture.robot.reset(1, lambda *words: fixture.notices.append(words))
+    return fixture
+
+
+def answer(fixture: RobotFixture, **fields: int) -> None:
+    done: dict[str, Any] = {"text": "Reset.", "boot": 0, "heartbeat": 3, "cleared": (CONTACT.id,)}
+    fixture.bus.answers[-1][0](ResetDone(**done | fields))
+
+
+def test_a_reset_names_what_the_screen_showed(reset: RobotFixture) -> None:
+    assert reset.bus.asked == [(keys.RESET.path, ResetRequest(echo=1, causes=(CONTACT.id,)))]
+
+
+@pytest.mark.parametrize(
+    ("latched", "notice"),
+    [((), ("info", "Reset.", "reset_done")), (("estop",), ("warning", "Reset.", "reset_partial"))],
+)
+def test_a_reset_is_confirmed_by_the_state_of_safety(
+    reset: RobotFixture, latched: tuple[str, ...], notice: tuple[str, str, str]
+) -> None:
+    answer(reset)
+    assert reset.notices == []
+    reset.latched = latched
+    reset.ticks(1, "web")
+    assert reset.notices == [notice]
+
+
+def test_an_answer_that_is_not_safetys_is_not_confirmed(reset: RobotFixture) -> None:
+    answer(reset, boot=1)
+    reset.ticks(40, "web")
+    assert reset.notices == [("error", "reset_unconfirmed", "")]
+
+
+def test_a_refusal_is_reported(reset: RobotFixture) -> None:
+    reset.bus.answers[-1][1]("The call is 1.4 s old.")
+    assert reset.notices == [("warning", "The call is 1.4 s old.", "reset_refused")]

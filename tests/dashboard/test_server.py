@@ -103,12 +103,6 @@ def post_stop(server: Server, robot: str) -> None:
         assert answer.status == 200
 
 
-def test_a_refusal_is_reported(ada: Client) -> None:
-    ada.take_control()
-    ada.send("reset", echo=echo_of(ada.next_snapshot()))
-    assert "safety does not answer" in ada.wait_for("notice")["text"]
-
-
 def test_each_robot_has_a_page(server: Server, ada: Client) -> None:
     wait_until(lambda: "002" in ada.wait_for("slow")["robots"], "the other robot")
     with connected(server, "002") as it:
