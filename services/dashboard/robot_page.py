@@ -99,7 +99,7 @@ class RobotPage:
         )
         self._send(self.viewers, fast, replaces=True)
         if self._ticks % SLOW_TICKS == 0:
-            slow = slow_snapshot(robot.telemetry, robots, names, robot.protection, now_ns)
+            slow = slow_snapshot(robot.telemetry, robots, names, now_ns)
             self._send(self.viewers, slow, replaces=True)
         if self._ticks % SLOW_TICKS == 1:
             self._send_events()

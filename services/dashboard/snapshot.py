@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from common import keys
 from common.codec import finite
-from common.messages import Driver, Health, Link, SafetyState, Switches
+from common.messages import Driver, Health, SafetyState, Switches
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.sectors import Protection, Tone, tones
 from services.dashboard.telemetry_cache import TelemetryCache
@@ -57,8 +57,6 @@ class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
     left: Driver | None
     right: Driver | None
     switches: Switches | None
-    link: Link | None
-    protection: Protection
 
 
 def fast_snapshot(
@@ -104,7 +102,6 @@ def slow_snapshot(
     telemetry: TelemetryCache,
     robots: Mapping[str, bool],
     names: Mapping[str, str],
-    protection: Protection,
     now_ns: int,
 ) -> SlowSnapshot:
     """Return the slow snapshot at this time."""
@@ -118,8 +115,6 @@ def slow_snapshot(
         left=telemetry.newest(keys.DRIVER, now_ns, side="left"),
         right=telemetry.newest(keys.DRIVER, now_ns, side="right"),
         switches=telemetry.newest(keys.SWITCHES, now_ns),
-        link=telemetry.newest(keys.LINK, now_ns),
-        protection=protection,
     )
 
 

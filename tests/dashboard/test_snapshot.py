@@ -132,7 +132,7 @@ def test_without_a_driving_source_there_is_no_request() -> None:
 
 
 def test_the_slow_snapshot() -> None:
-    seen = snapshot.slow_snapshot(full(), {"001": True}, {"1": "Ada"}, Protection(), AT)
+    seen = snapshot.slow_snapshot(full(), {"001": True}, {"1": "Ada"}, AT)
     assert seen.instances == {"odom": 1, "safety": 0}
     assert seen.health == {"safety": full().newest(keys.HEALTH, AT, service="safety")}
     assert seen.left is not None

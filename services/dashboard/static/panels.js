@@ -1,4 +1,4 @@
-// The panels of text: causes, limits, drivers, switches, services, streams, events.
+// The panels of text: causes, limits, drivers, switches, services, events.
 import { translated } from "./phrases.js";
 
 const $ = (id) => document.getElementById(id);
