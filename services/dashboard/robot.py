@@ -3,7 +3,7 @@
 Each robot has a bus session of its own, which opens with the first viewer of its page.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import msgspec
@@ -97,15 +97,11 @@ class Robot:
         """Whether the router passes our requests on, as far as is known."""
         return not self._source.denied
 
-    def driver_state(self, names: Mapping[str, str]) -> DriverState:
-        """Return the viewer with the driver lock and the state of its hold.
-
-        ``names`` maps the ids of viewers to their names.
-        """
+    def driver_state(self) -> DriverState:
+        """Return the viewer with the driver lock and the state of its hold."""
         lock = self.driver_lock
         return DriverState(
             id=lock.driver,
-            name=names.get(lock.driver or "", ""),
             hold=lock.state,
             gear=lock.gear,
             other=self._contest.other,

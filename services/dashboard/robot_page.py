@@ -30,7 +30,6 @@ class Viewer:
 
     name: str
     has_path: bool = False  # that odometry has stored
-    events_sent: int = -1  # the robot's event count when they were last sent; -1: none were
 
 
 def notice(level: Level, text: str, about: str = "") -> bytes:
@@ -50,7 +49,8 @@ class RobotPage:
         self._ticks = 0
 
     def join(self, viewer: str) -> None:
-        """Add a browser."""
+        """Add a browser; it gets all events, and later new ones."""
+        self._send_events()
         self.viewers[viewer] = Viewer(viewer)
         hello = {
             "k": "hello",
@@ -60,6 +60,7 @@ class RobotPage:
             "keepalive": bool(self._config.dashboard.estop_keepalive),
         }
         self._send([viewer], hello)
+        self._send([viewer], {"k": "events", "lines": list(self.robot.telemetry.events)})
 
     def leave(self, viewer: str) -> None:
         """Remove a browser and free its driver lock."""
@@ -87,11 +88,10 @@ class RobotPage:
         if not self.viewers:
             return
         self.used_ns, self._ticks = now_ns, self._ticks + 1
-        names = {key: viewer.name for key, viewer in self.viewers.items()}
         robot = self.robot
         fast = fast_snapshot(
             robot.telemetry,
-            robot.driver_state(names),
+            robot.driver_state(),
             now_ns,
             connected=robot.bus.connected,
             protection=robot.protection,
@@ -99,6 +99,7 @@ class RobotPage:
         )
         self._send(self.viewers, fast, replaces=True)
         if self._ticks % SLOW_TICKS == 0:
+            names = {key: viewer.name for key, viewer in self.viewers.items()}
             slow = slow_snapshot(robot.telemetry, robots, names, now_ns)
             self._send(self.viewers, slow, replaces=True)
         if self._ticks % SLOW_TICKS == 1:
@@ -111,8 +112,7 @@ class RobotPage:
         if not self.robot.may_drive:
             self._notify(viewer, "error", "barred")
         elif not lock.take(viewer, force):
-            name = self.viewers[before].name if before in self.viewers else ""
-            self._send([viewer], {"k": "taken", "by": name})
+            self._send([viewer], {"k": "taken"})
         elif before not in (None, viewer):
             self._notify(str(before), "warning", "taken_over")
 
@@ -143,14 +143,10 @@ class RobotPage:
             self._notify(viewer, level, text, about)
 
     def _send_events(self) -> None:
-        telemetry = self.robot.telemetry
-        count = telemetry.event_count
-        for sent in {viewer.events_sent for viewer in self.viewers.values()} - {count}:
-            lines = [line for line in telemetry.events if line.n > sent]
-            late = [key for key, viewer in self.viewers.items() if viewer.events_sent == sent]
-            self._send(late, {"k": "events", "lines": lines, "all": sent < 0})
-            for key in late:
-                self.viewers[key].events_sent = count
+        new = self.robot.telemetry.new_events
+        if new:
+            self._send(self.viewers, {"k": "events", "lines": list(new)})
+            new.clear()
 
     def _send_paths(self, now_ns: int) -> None:
         """Query the path that odometry has stored, for viewers without it."""

@@ -21,7 +21,6 @@ class DriverState(Struct, frozen=True):
     """The viewer with the driver lock, its hold, and whether this dashboard may drive at all."""
 
     id: str | None
-    name: str
     hold: HoldState
     gear: int
     other: str | None  # another source that drives

@@ -29,7 +29,6 @@ MIN_AGE_S, MAX_AGE_S = 0.5, 3.0
 class EventLine(Struct, frozen=True):
     """An event as the browsers show it."""
 
-    n: int  # rises with each event that was received
     t: float  # s, the sender's wall clock
     service: str
     name: str
@@ -48,7 +47,7 @@ class TelemetryCache:
 
     alive: dict[str, set[str]] = field(default_factory=dict)  # instances by service
     events: deque[EventLine] = field(default_factory=lambda: deque(maxlen=EVENTS_MAX))
-    event_count: int = 0  # events so far
+    new_events: deque[EventLine] = field(default_factory=lambda: deque(maxlen=EVENTS_MAX))
     _states: deque[Latest[SafetyState]] = field(default_factory=lambda: deque(maxlen=STATES_MAX))
     _latest: dict[str, Latest[Message]] = field(default_factory=dict)
 
@@ -74,9 +73,9 @@ class TelemetryCache:
 
     def add_event(self, service: str, event: Event) -> None:
         """Store an event, sorted by the sender's time."""
-        self.event_count += 1
         t, text = event.t_ns / 1e9, printable(event.text)
-        line = EventLine(self.event_count, t, service, event.name, event.level, text)
+        line = EventLine(t, service, event.name, event.level, text)
+        self.new_events.append(line)
         ordered = sorted([*self.events, line], key=lambda line: line.t)
         self.events.clear()
         self.events.extend(ordered)

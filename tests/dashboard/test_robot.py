@@ -53,7 +53,7 @@ class RobotFixture:
         return self.robot.driver_lock.state is HoldState.HELD
 
     def overruled_by(self) -> str | None:
-        driver = self.robot.driver_state({})
+        driver = self.robot.driver_state()
         return driver.other if driver.overruled else None
 
 
@@ -64,8 +64,8 @@ def fixture() -> RobotFixture:
 
 def test_who_drives(fixture: RobotFixture) -> None:
     fixture.ticks(40, "web")
-    driver = fixture.robot.driver_state({"1": "Ada"})
-    assert (driver.id, driver.name, driver.other, driver.may) == ("1", "Ada", None, True)
+    driver = fixture.robot.driver_state()
+    assert (driver.id, driver.other, driver.may) == ("1", None, True)
     assert driver.hold is HoldState.HELD
 
 
@@ -94,7 +94,7 @@ def test_a_driver_who_takes_over_is_not_overruled(fixture: RobotFixture) -> None
 def test_nobody_is_overruled_who_holds_no_control(fixture: RobotFixture) -> None:
     fixture.ticks(20, "nav", held=False)
     assert fixture.overruled_by() is None
-    assert fixture.robot.driver_state({}).other == "nav"
+    assert fixture.robot.driver_state().other == "nav"
 
 
 def test_a_request_echoes_what_the_driver_was_shown_and_a_zero_the_newest(
@@ -148,7 +148,7 @@ def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.Monke
     assert fixture.robot.may_drive
     monkeypatch.setattr(Publisher, "passed_on", False)
     fixture.ticks(DENIED_AFTER, None)
-    driver = fixture.robot.driver_state({})
+    driver = fixture.robot.driver_state()
     assert (driver.may, driver.id) == (False, None)
     assert fixture.notices == [("error", "barred", "")]
     fixture.robot.estop("a test")

@@ -73,7 +73,7 @@ def full() -> TelemetryCache:
     return telemetry
 
 
-NOBODY = snapshot.DriverState(None, "", HoldState.FREE, 1, None, overruled=False, may=True)
+NOBODY = snapshot.DriverState(None, HoldState.FREE, 1, None, overruled=False, may=True)
 
 
 def fast(telemetry: TelemetryCache, at: int = AT) -> snapshot.FastSnapshot:

@@ -69,7 +69,7 @@ def test_events_are_sorted_by_the_senders_time_and_bounded() -> None:
         telemetry.add_event("bridge", event(number))
     assert len(telemetry.events) == EVENTS_MAX
     assert telemetry.events[0].text == "4"
-    assert telemetry.event_count == EVENTS_MAX + 3
+    assert len(telemetry.new_events) == EVENTS_MAX
 
 
 def test_services_by_token_or_by_health() -> None:

@@ -71,6 +71,7 @@ const sendName = () => send({ k: "name", name: stored("name", "") });
 const HANDLERS = {
   hello(message) {
     hello = message;
+    events = [];
     sonarView.build(message.vehicle);
     trail.size(message.vehicle);
   },
@@ -94,12 +95,12 @@ const HANDLERS = {
     showRobots();
   },
   events(message) {
-    events = [...(message.all ? [] : events), ...message.lines].sort((a, b) => a.t - b.t).slice(-EVENTS_MAX);
+    events = [...events, ...message.lines].sort((a, b) => a.t - b.t).slice(-EVENTS_MAX);
     panels.showEvents(events, t, language);
   },
   path: trail.begin,
   notice: (message) => toast(message.text, message.level, message.about),
-  taken: (message) => confirm("take_over", `${stateBar.viewerName(message.by, t)} ${t("take_over_from")}`,
+  taken: () => confirm("take_over", `${stateBar.driverName(view())} ${t("take_over_from")}`,
     () => send({ k: "take", force: true })),
 };
 const handle = (message) => HANDLERS[message.k]?.(message);
@@ -111,7 +112,7 @@ const newest = () => (lost() ? null : fast);
 /** What the state bar and the header show; `fast` is null without a connection. */
 const view = () => ({
   fast: newest(), t, language, robot, isDriver: isDriver(), viewer: hello?.id,
-  keepsAlive: !!hello?.keepalive, watching: Object.keys(slow?.viewers ?? {}).length,
+  keepsAlive: !!hello?.keepalive, names: slow?.viewers ?? {},
 });
 
 function draw() {

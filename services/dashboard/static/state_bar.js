@@ -78,7 +78,8 @@ function sentence({ fast, t, language }, worst) {
 }
 
 function showHead(view) {
-  const { fast, t, isDriver, viewer, keepsAlive, watching } = view;
+  const { fast, t, isDriver, viewer, keepsAlive } = view;
+  const watching = Object.keys(view.names).length;
   const off = !fast?.connected; // without a router all values are old
   chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
   chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
@@ -88,15 +89,19 @@ function showHead(view) {
   chip("watching", off || !watching ? "" : `${watching} ${t("watching")}`);
 }
 
-// A viewer without a name has a number.
-export const viewerName = (name, t) => (/^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name);
+/** The viewer that has control; one without a name has a number. */
+export function driverName({ fast, t, names }) {
+  const name = names[fast?.driver.id] ?? "";
+  return /^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name;
+}
 
-function driver({ fast, t, isDriver }) {
-  const { id, name, may, other, overruled } = fast.driver;
+function driver(view) {
+  const { fast, t, isDriver } = view;
+  const { id, may, other, overruled } = fast.driver;
   if (!may) return t("view_only");
   if (isDriver && overruled) return `${t("overruled_by")} ${other}`;
   if (isDriver) return other ? `${other} ${t("drives")}` : t("you_drive");
-  if (id) return `${viewerName(name, t)} ${t("drives")}`;
+  if (id) return `${driverName(view)} ${t("drives")}`;
   const source = fast.safety?.source;
   return source ? `${source} ${t("drives")}` : t("nobody_drives");
 }
