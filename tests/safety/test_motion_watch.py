@@ -212,8 +212,19 @@ def test_a_motion_of_half_a_second_renews_the_limit(ticks: int, renewed: bool) -
         board.step(0.9, moves=True)
     after_ns = board.step(0.9).due_ns
     assert after_ns is not None
+    assert board.state.phase is Phase.STOPPING
     assert (after_ns - board.now_ns == round(0.9 / 0.6 * NS_PER_S) + GRACE_NS) == renewed
     assert (after_ns == due_ns + ticks * TICK_NS) != renewed
+
+
+def test_a_commanded_motion_begins_the_confirmation_anew() -> None:
+    board = Board()
+    board.run(0.1)
+    board.step(0.0, moves=True)
+    board.run(0.18)
+    assert board.state.phase is Phase.STOPPING
+    board.run(0.04)
+    assert board.state.phase is Phase.STANDING
 
 
 def test_a_vehicle_that_stood_has_a_new_limit() -> None:

@@ -55,7 +55,7 @@ class Translator:
         self._max_angular = max_angular
 
     def command(self, order: Command, motion: Motion | None = None) -> MotionCommand:
-        """Return the frame for an order; a RUN carries the motion, slowed on its curve to the limits."""
+        """Return the frame for an order; a RUN carries the motion, slowed on its curve."""
         if order is not RUN or motion is None:
             return MotionCommand(KINDS[order])
         twist = Twist(motion.linear, motion.angular).within(self._max_linear, self._max_angular)
