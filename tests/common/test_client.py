@@ -18,6 +18,7 @@ from common.client import (
     Phase,
     ResetCheck,
     confirms,
+    request,
     reset_request,
 )
 from common.freshness import NS_PER_S
@@ -68,7 +69,8 @@ def test_the_table_of_drive_requests(
 
 
 def test_a_neutral_request_asks_for_nothing() -> None:
-    assert (NEUTRAL.linear, NEUTRAL.angular, NEUTRAL.release) == (0.0, 0.0, "none")
+    assert request() == NEUTRAL == Drive(linear=0.0, angular=0.0, release="none", echo=0)
+    assert request(0.2, 0.1, "forward") == structs.replace(GO, release="forward")
     assert [phase.value for phase in Phase] == ["silent", "driving", "releasing"]
 
 
@@ -119,6 +121,7 @@ def test_a_client_is_denied_once_its_messages_reach_nobody_for_ten_states(
     assert access.received(SEEN, passed_on) is denied
     assert access.echo == SEEN.heartbeat
     assert access.is_denied is (passed_on is False and unmatched >= 9)
+    assert access.unmatched == (unmatched + 1 if passed_on is False else 0)
     assert Access() == Access(echo=0, unmatched=0)
 
 

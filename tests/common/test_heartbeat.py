@@ -22,8 +22,13 @@ def test_an_echo_counts_up_to_its_limit() -> None:
 def test_an_unknown_or_missing_echo_is_refused() -> None:
     heartbeat = START.beat(5 * NS_PER_S)
     assert heartbeat.is_late(1000, 5 * NS_PER_S, NS_PER_S)
-    assert "unknown heartbeat" in heartbeat.refusal(1000, 5 * NS_PER_S, NS_PER_S)
-    assert "no echo" in heartbeat.refusal(None, 5 * NS_PER_S, NS_PER_S)
+    assert heartbeat.refusal(1000, 5 * NS_PER_S, NS_PER_S) == (
+        "The call echoes an unknown heartbeat of safety: look again, then repeat it."
+    )
+    assert heartbeat.refusal(None, 5 * NS_PER_S, NS_PER_S) == (
+        "The call carries no echo of safety's heartbeat: send the newest SafetyState.heartbeat "
+        "as `echo`."
+    )
 
 
 def test_a_receiver_notes_the_numbers_that_it_saw() -> None:
