@@ -221,10 +221,11 @@ def test_a_commanded_motion_begins_the_confirmation_anew() -> None:
     board = Board()
     board.run(0.1)
     board.step(0.0, moves=True)
-    board.run(0.18)
-    assert board.state.phase is Phase.STOPPING
-    board.run(0.04)
-    assert board.state.phase is Phase.STANDING
+    phases = []
+    for seconds in (0.2, 0.04):
+        board.run(seconds)
+        phases.append(board.state.phase)
+    assert phases == [Phase.STOPPING, Phase.STANDING]
 
 
 def test_a_vehicle_that_stood_has_a_new_limit() -> None:
