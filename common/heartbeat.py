@@ -1,9 +1,9 @@
 """Age of a request without synchronized clocks, by the heartbeat number that it echoes.
 
 Safety puts a rising number into each ``SafetyState``. A program that requests motion or makes an
-operator's call echoes the newest number that it saw. A program that sent or
-received that number knows the time by its own clock, and so the maximum age of the request. Numbers
-start at random, so that echoes of an earlier start are unknown.
+operator's call echoes the newest number that it received. Whoever sent or received that number
+knows the time by its own clock, and so the maximum age of the request. Numbers start at random, so
+that echoes of an earlier start are unknown.
 """
 
 from msgspec import Struct

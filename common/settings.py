@@ -205,7 +205,7 @@ class Board(ProtectedSection, frozen=True, kw_only=True):
     address: str = "127.0.0.1"  # 10.7.5.224 on the vehicle
     port: Port = 4003  # 4002 on the vehicle; on one host it must differ from ours
     listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
-    # the board sends to both; the first is preferred
+    # the board sends to both; commands leave from the port that receives the velocity
     listen_ports: Annotated[tuple[Port, ...], Meta(min_length=1, max_length=2)] = (4002, 4001)
     any_source_port: bool = False  # accept frames from every port of the board's address
     # UDP port at ``address`` that a relay reports from, 4010; 0: no relay (docs/relay.md).

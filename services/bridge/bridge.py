@@ -22,7 +22,7 @@ from common.service import Node, run
 from services.bridge.config import BridgeConfig
 from services.bridge.core.core import Core, tick_s
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
-from services.bridge.guard import NAME, Heartbeat
+from services.bridge.guard import DESCRIPTORS_ENV, Heartbeat
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 MOTIONS = 8  # queue length
@@ -33,13 +33,13 @@ BOUNDS_NS = tuple(round(10_000 * 10 ** (step / 4)) for step in range(21))
 
 def main() -> int:
     """Run the bridge until a signal, or until its guard has died."""
-    if NAME not in os.environ:
+    if DESCRIPTORS_ENV not in os.environ:
         print("bridge: start it by `python -m services.bridge`", file=sys.stderr)  # noqa: T201
         return 2
     # systemd sends these to guard and bridge alike; the guard passes them on.
     for number in (signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
-    *sockets, pipe = map(int, os.environ[NAME].split(","))
+    *sockets, pipe = map(int, os.environ[DESCRIPTORS_ENV].split(","))
     # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
     return run("bridge", BridgeConfig, lambda node: Bridge(node, sockets, pipe), priority=ahead)

@@ -50,7 +50,7 @@ NOT_STARTED = 1  # exit code when the bridge could not be started
 STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
 # Environment variable: the descriptors of the sockets, in the order of ``board.listen_ports``, and
 # of the write end of the pipe.
-NAME = "T2_BRIDGE_HANDOVER"
+DESCRIPTORS_ENV = "T2_BRIDGE_DESCRIPTORS"
 
 
 class Heartbeat:
@@ -133,7 +133,7 @@ class Guard:
             # guard's session spares the bridge, which stops the vehicle.
             self._child = subprocess.Popen(
                 self._command,
-                env=child_process.environ() | {NAME: ",".join(map(str, given))},
+                env=child_process.environ() | {DESCRIPTORS_ENV: ",".join(map(str, given))},
                 pass_fds=given,
                 start_new_session=True,
             )

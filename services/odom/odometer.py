@@ -95,7 +95,7 @@ class Odometer:
         self._trajectory.add(Pose(odometry.x, odometry.y, odometry.heading))
         if self._silent:
             self._silent = False
-            self._node.event("heard", "info", "velocities are received")
+            self._node.event("velocity_back", "info", "velocities are received")
         self._report_slip(odometry)
 
     def _check_silence(self, now_ns: int) -> None:

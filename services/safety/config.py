@@ -12,7 +12,7 @@ from common.settings import SourceName
 
 Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
-Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``verdict.Text``
+Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``messages.Text``
 
 # Programs that stop requesting when the operator releases the controls. For any other source,
 # ``sources.NAME.operator`` needs an override.

@@ -157,7 +157,7 @@ def test_a_hopeless_end_is_passed_on_and_braked_for(made: Board) -> None:
 
 BEAT = """
 import os, signal, sys, time
-*_, pipe = map(int, os.environ["T2_BRIDGE_HANDOVER"].split(","))
+*_, pipe = map(int, os.environ["T2_BRIDGE_DESCRIPTORS"].split(","))
 os.write(pipe, bytes((1,)))
 """
 
@@ -258,7 +258,7 @@ def test_a_wrong_setting_ends_it_before_anything_opens(capsys: pytest.CaptureFix
 def test_the_bridge_alone_says_how_it_is_started(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.delenv("T2_BRIDGE_HANDOVER", raising=False)
+    monkeypatch.delenv("T2_BRIDGE_DESCRIPTORS", raising=False)
     assert child.main() == 2
     assert "python -m services.bridge" in capsys.readouterr().err
 

@@ -13,10 +13,10 @@ from verification.harness.waiting import wait_until
 SPIN = """
 import os
 from common import realtime
-from services.bridge.guard import NAME
+from services.bridge.guard import DESCRIPTORS_ENV
 realtime.request(realtime.BRIDGE)
 realtime.limit()
-os.write(int(os.environ[NAME].split(",")[-1]), b"\\0")
+os.write(int(os.environ[DESCRIPTORS_ENV].split(",")[-1]), b"\\0")
 while True:
     pass
 """

@@ -113,18 +113,18 @@ def test_silence_is_reported_once_and_ends(odometry: Odometry) -> None:
     for after_s in (0.4, 0.6, 0.9):
         odometry.odometer._check_silence(odometry.now_ns + round(after_s * NS_PER_S))
     odometry.samples()
-    assert odometry.node.events == ["heard", "silent", "heard"]
+    assert odometry.node.events == ["velocity_back", "silent", "velocity_back"]
 
 
 def test_a_restart_and_slip_are_reported(odometry: Odometry) -> None:
     for _ in range(3):
         odometry.samples()
     odometry.samples(epoch=1, distance=0.0)
-    assert odometry.node.events == ["heard", "reanchored"]
+    assert odometry.node.events == ["velocity_back", "reanchored"]
     odometry.distance = 0.0
     for slip in [3.0] * 10 + [0.0] * 60:
         odometry.samples(slip=slip, epoch=1)
-    assert odometry.node.events == ["heard", "reanchored", "slip", "slip_over"]
+    assert odometry.node.events == ["velocity_back", "reanchored", "slip", "slip_over"]
 
 
 @pytest.mark.parametrize("bad", [BAD, math.inf, -math.inf])

@@ -37,7 +37,7 @@ class Event(Struct, frozen=True):
 class Reply(Struct, frozen=True):
     """The answer to a call."""
 
-    caller: Any  # a ``common.bus.calls.Caller``
+    caller: Any  # a ``common.bus.bus.Caller``
     reply: Struct
 
 

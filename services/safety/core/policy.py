@@ -178,6 +178,7 @@ class Policy:
         held = observe(state.latches, seen, now_ns, decision=state.decision)
         worst = _worst(held.keys() - ignored)
         command = COMMANDS[worst]
+        # The verdict's name stays "stop": the cause of it only stops, and the vehicle rolls.
         if command is STOP and state.motion.standstill.rolls:
             command = BRAKE
         source = requested.source if requested else None

@@ -6,7 +6,7 @@ A key counts by its age, and by the round trip of the terminal:
 key        older than ``MAX_PRESS_AGE_S`` ``round_trip`` slow  otherwise
 ========== ============================== ==================== =============
 E, space   accepted                       accepted             accepted
-R          LATE                           SLOW                 RESET
+R          LATE                           SLOW, rule           RESET
 motion     LATE                           SLOW, rule           accepted
 others     LATE                           accepted             accepted
 ========== ============================== ==================== =============
