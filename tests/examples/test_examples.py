@@ -166,6 +166,7 @@ def test_the_web_hook_gets_each_latch_once(robot: t2.Robot, stack: RunningStack)
     assert [body["causes"] for body in bodies] == [["contact"], ["contact"]]
 
 
+@pytest.mark.campaign
 def test_the_wall_follower_approaches_the_wall(robot: t2.Robot) -> None:
     with example("examples/wall_follower.py", robot.endpoint):
         start = robot.odometry.latest()

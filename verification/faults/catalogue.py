@@ -206,7 +206,7 @@ INDEPENDENT_BOARD = needing("independent board",
     Fault("independent board: contact 0x80 on the second port", board_line(b"press 128 1"),
           RESET, within(0.1)),
     # Driven into it, the bumper would latch.
-    Fault("independent board: a wall 2 m ahead", board_line(b"wall 2"), ITSELF, hold_s=6.0),
+    Fault("independent board: a wall 2 m ahead", board_line(b"wall 2"), ITSELF, hold_s=9.0),
     # 0.05 m at 0.1 m/s, the way to this speed, and the reaction.
     Fault("independent board: rolls away, safety killed",
           steps(request(0.0), pause(1.5), kill("safety"), pause(1.5), board_line(b"roll 0.1")),

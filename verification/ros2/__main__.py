@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 
 from verification.harness.results import table
-from verification.harness.trace import last_move_s
+from verification.harness.trace import last_move_s, moves
 from verification.ros2 import hiroz, plain_peer
 from verification.ros2.hiroz import Robot, robot_with_gateway
 
@@ -65,7 +65,8 @@ def exercised(robot: Robot, python: Path) -> str:
     moved = robot.distance()
     assert moved > 0.1, "no motion"
     commands = robot.stack.trace().commands
-    brake_ns = next(each.mono_ns for each in commands if each.kind == "brake")
+    moving = next(index for index, each in enumerate(commands) if moves(each))
+    brake_ns = next(each.mono_ns for each in commands[moving:] if each.kind == "brake")
     assert last_move_s(commands, brake_ns) == 0, "motion after the stop"
     return f"Zenoh {found['zenoh']}: {moved:.2f} m, stop, no motion while latched, reset"
 
