@@ -87,7 +87,7 @@ def selected(available: Commands, only: str | None) -> Commands:
 def commands(options: argparse.Namespace) -> Commands:
     """Return the commands by name: later processes depend on earlier ones."""
     passed = passed_on(options)
-    # Demo, soak and tests create their own options, and always need a router.
+    # Demo and tests create their own options, and always need a router.
     modules = {} if vars(options).get("no_router") else {"router": ["cli", "router"]}
     if not options.no_sim:
         world = ["--world", options.world] if options.world else []

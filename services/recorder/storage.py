@@ -1,6 +1,7 @@
 """The recordings folder: file names, free space, and removal of old recordings."""
 
 import contextlib
+import fcntl
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +18,16 @@ RETRY_NS = 10 * NS_PER_S  # after a disk error
 def free_bytes(folder: Path) -> int:
     """Return the free space on the folder's disk."""
     return shutil.disk_usage(folder).free
+
+
+def in_use(path: Path) -> bool:
+    """Return whether a process writes the file: its writer holds a lock."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
 
 
 class Storage:
@@ -93,5 +104,5 @@ class Storage:
         for path in self.folder.glob("*.mcap"):
             with contextlib.suppress(OSError):  # removed meanwhile, or not readable
                 marked = path.with_name(path.name + KEEP).exists()
-                kept = marked or path in self._latest.values()
+                kept = marked or path in self._latest.values() or in_use(path)
                 yield StoredFile(path.name, path.stat().st_size, kept)

@@ -4,6 +4,8 @@ Messages go into compressed chunks. ``flush`` ends a chunk and hands it to the o
 Everything up to the last flush stays readable, even after ``kill -9``.
 """
 
+import contextlib
+import fcntl
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -30,6 +32,8 @@ class RecordingWriter:
         self._ids: dict[Channel, int] = {}
         self._schemas: dict[str, int] = {}
         self._file = path.open("xb")
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # other recorders leave the file
         self._writer = Writer(self._file)
         self._writer.start(library="t2")
         self._writer.add_metadata(ABOUT, dict(about))

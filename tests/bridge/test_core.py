@@ -389,6 +389,11 @@ def test_the_frame_that_ends_a_lost_link_is_judged_as_such(bench: Bench) -> None
     link_lost(bench)
     bench.now_ns += NS_PER_S
     assert "board_restarted" in events(bench.answer(DistanceReport(3000, 0)))
+    for first in ((), (VelocityReport(0, 0),)):
+        bench.answer(DistanceReport(100, 0))
+        link_lost(bench)
+        bench.now_ns += NS_PER_S
+        assert "board_restarted" in events(bench.answer(*first, DistanceReport(3000, 0)))
 
 
 # --- motions --------------------------------------------------------------------------------------

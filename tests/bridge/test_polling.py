@@ -68,6 +68,23 @@ def test_a_missed_answer_halves_the_rate_down_to_a_quarter_and_the_next_restores
     assert sent(slow, "slow", range(7010, 8500, 10)) == [7500, 8000]
 
 
+def test_after_one_missed_answer_the_next_answer_restores_the_rate() -> None:
+    slow = Polling([("slow", BumperQuery(), 2.0)], 0.1)
+    assert sent(slow, "slow", range(1000, 1550, 10)) == [1000, 1500]
+    slow.answered("slow", 1550 * MS)
+    assert sent(slow, "slow", range(1560, 2600, 10)) == [2050, 2550]
+
+
+def test_an_early_answer_leaves_the_rate() -> None:
+    slow = Polling([("slow", BumperQuery(), 2.0)], 0.1, tick_s=0.02)
+    times = []
+    for tick in range(1000, 3000, 10):
+        if slow.due(tick * MS):
+            times.append(tick)
+            slow.answered("slow", tick * MS + 1)
+    assert times == [1000, 1490, 1990, 2490, 2990]
+
+
 def test_an_answer_is_no_older_than_its_query_and_an_unsolicited_one_changes_nothing() -> None:
     polled = polling()
     assert polled.answered("bumper", NS_PER_S) == NS_PER_S

@@ -57,10 +57,12 @@ def run(linear: float, angular: float) -> Motion:
         (run(-0.0, -0.0), 0, 0),
         (run(9.0, 9.0), 1000, 573),
         (run(-9.0, -9.0), -1000, -573),
+        (run(2.0, 0.5), 1000, 143),  # on the same curve
+        (run(0.5, 2.0), 250, 573),
         (run(0.0004, 0.0), 0, 0),
     ],
 )
-def test_run_carries_the_motion_clamped(
+def test_run_carries_the_motion_slowed_to_the_limits(
     by_manual: Translator, motion: Motion, linear_mmps: int, angular_raw: int
 ) -> None:
     frame = by_manual.command(Command.RUN, motion)

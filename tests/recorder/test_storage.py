@@ -2,7 +2,12 @@
 
 from pathlib import Path
 
+import pytest
+
+from common.settings import Vehicle
+from services.recorder.mcap_codec import Encoder
 from services.recorder.storage import MB, RETRY_NS, Storage
+from services.recorder.writer import RecordingWriter
 from tests.recorder.files_fixture import CONTINUOUS, INCIDENTS, names
 from tests.recorder.samples import BEGIN_NS
 
@@ -87,3 +92,32 @@ def test_the_latest_file_of_this_process_stays_whatever_its_clock(tmp_path: Path
     storage.check(0)
     assert began.exists()
     assert disk.names() == sorted([began.name, INCIDENTS[2]])
+
+
+def test_a_file_that_any_process_writes_stays(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS[1:])
+    writing = RecordingWriter(tmp_path / CONTINUOUS[0], Encoder(Vehicle()), {})
+    Storage(tmp_path, 10.5 * MB, disk.free, robot="001").check(0)
+    assert disk.names() == [CONTINUOUS[0], CONTINUOUS[2]]
+    writing.close()
+
+
+def test_without_a_robot_nothing_is_removed(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 15 * MB, *CONTINUOUS, *INCIDENTS)
+    storage = Storage(tmp_path, 10 * MB, disk.free)
+    assert storage.check(0) == []
+    assert not storage.has_room
+
+
+def test_no_room_if_files_cannot_be_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = Disk(tmp_path, 12 * MB, *CONTINUOUS)
+
+    def refuse(_: Path, *, missing_ok: bool) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    storage = Storage(tmp_path, 10 * MB, disk.free, robot="001")
+    assert storage.check(0) == []
+    assert not storage.has_room

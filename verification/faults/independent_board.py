@@ -7,7 +7,7 @@ the simulator's place in a stack: it writes the motion commands that it receives
 lines on its standard input change it:
 
 - ``press BYTE PORT``: report this bumper byte at one of the host's ports, 0 or 1
-- ``wall METRES``: an obstacle ahead, seen by the front sonar; whoever drives into it is hit
+- ``wall METRES``: an obstacle ahead; the front sonar measures it, and contact presses the bumper
 - ``roll SPEED``: roll at this speed while STOP is commanded
 - ``normal``: none of these
 

@@ -34,7 +34,6 @@ class Board:
         self.speed_mmps: int | None = 0  # None: no velocity reports
         self.echo = True
         self.led_done: bool | None = True
-        self.switch_asks = 0
         self._framing = Framing()
         self._ended = threading.Event()
 
@@ -102,7 +101,6 @@ class Board:
         elif isinstance(frame, commands.DriverQuery):
             yield reports.DriverReport(frame.side, 0)
         elif isinstance(frame, commands.UltrasonicBrakeSet):
-            self.switch_asks += 1
             if self.echo:
                 yield reports.UltrasonicBrakeReport(frame.on)
         elif isinstance(frame, commands.BumperBrakeSet) and self.echo:

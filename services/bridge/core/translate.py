@@ -40,7 +40,7 @@ FAST_MPS, FAST_RADPS, STEP = 5.0, 5.0, 1.0
 DRIVEN_MPS, TURNED_RADPS, STEP_TO_ZERO = 1.5, 2.0, 0.02
 ZERO_M = 0.005
 ZERO_RAD = math.radians(0.5)
-GAP_MAX_S = 0.2  # of a gap with a lost link no more counts as driving: the board may have been off
+GAP_MAX_S = 0.2  # of a gap with a lost link that counts as driving: the board may have been off
 
 
 class Translator:

@@ -16,6 +16,7 @@ const { toast, confirm } = notices;
 const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
 const CONGESTED = 2048; // bytes that wait in the browser
+const INVALID_MESSAGE = 1003; // close code: the server refused a message of this page
 const $ = (id) => document.getElementById(id);
 const stored = (key, otherwise) => localStorage.getItem(`t2.${key}`) ?? otherwise;
 
@@ -50,7 +51,8 @@ function connect() {
   const opened = (socket = new WebSocket(address));
   opened.onopen = sendName;
   opened.onmessage = (event) => handle(JSON.parse(event.data));
-  opened.onclose = () => {
+  opened.onclose = (event) => {
+    if (event.code === INVALID_MESSAGE) localStorage.removeItem("t2.name");
     if (opened !== socket) return;
     driving.letGo();
     fastAt = -Infinity;

@@ -120,11 +120,14 @@ class Deadman:
     """A gamepad's button that enables motion while it is down, and the events of its stick."""
 
     def __init__(self, silence_s: float) -> None:
-        self.is_held = self._seen_up = False
+        self.is_held = False
+        # 1 equivalent mutant: None is as false as False.
+        self._seen_up = False
         self._silence_s = silence_s
         # 1 equivalent mutant: any value that is no number of events.
         self._events: int | None = None
-        self._event_ns: int  # the last event, from the first ``update`` on
+        # 2 equivalent mutants: the first ``update`` sets it.
+        self._event_ns = 0  # the last event
 
     def update(self, down: bool, events: int, now_ns: int) -> None:
         """Process the button and the number of events since the gamepad was found."""
