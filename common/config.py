@@ -19,7 +19,6 @@ import msgspec
 from msgspec import Struct
 
 from common.errors import ConfigError
-from common.removed_settings import REMOVED
 
 C = TypeVar("C", bound=Struct)
 
@@ -215,10 +214,6 @@ def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) ->
     values = {}
     for name, value in table.items():
         at = f"{path}.{name}" if path else name
-        if at in REMOVED:
-            if all(leaf == {} for _, leaf in flatten(value)):  # an empty table sets nothing
-                continue
-            raise ConfigError(f"{_origin(at, given)}: {at}: {REMOVED[at]}")
         if name not in types:
             unknown = f"unknown{_suggestion(name, types)}"
             raise ConfigError(f"{_origin(at, given)}: {at}: {unknown}")

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import median
 
 from cli.commission.report import Verdict, judged
+from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Link, Relay, Switches
 
@@ -14,28 +15,22 @@ CRC_FRAMES = 1000  # required without one bad CRC
 NONZERO_FRAMES = 50  # of these; a payload of zeros has CRC 0 with nearly every CRC
 MOST_BAD = 0.5  # from this share on it is another CRC, not a bad cable
 BAD_CRC = "bad_crc"
+EXPECTED_HZ = {
+    "VelocityReport": VELOCITY_HZ,
+    "BumperReport": keys.BUMPER.rate_hz,
+    "DistanceReport": keys.MILEAGE.rate_hz,
+    "UltrasonicReport": keys.ULTRASONIC.rate_hz,
+    "DriverReport": 2 * keys.DRIVER.rate_hz,
+}
 
 
-def expected_rates(settings: Mapping[str, float]) -> dict[str, float]:
-    """Return the expected frames in Hz, from the bridge's settings."""
-    return {
-        "VelocityReport": VELOCITY_HZ,
-        "BumperReport": settings["bridge.bumper_rate"],
-        "DistanceReport": settings["bridge.mileage_rate"],
-        "UltrasonicReport": settings["bridge.ultrasonic_rate"],
-        "DriverReport": 2 * settings["bridge.driver_rate"],
-    }
-
-
-def judge_link(
-    links: Sequence[Link], switches: Switches | None, expected: Mapping[str, float]
-) -> Verdict:
+def judge_link(links: Sequence[Link], switches: Switches | None) -> Verdict:
     """Return the verdict on consecutive link messages, at least one."""
     last = links[-1]
-    rates = {name: median(link.rates.get(name, 0.0) for link in links) for name in expected}
+    rates = {name: median(link.rates.get(name, 0.0) for link in links) for name in EXPECTED_HZ}
     data = [
         ("state", last.state),
-        *((f"{name}, Hz", _rate(rates[name], expected[name], name)) for name in expected),
+        *((f"{name}, Hz", _rate(rates[name], name)) for name in rates),
         ("switches echoed on", _switches(switches)),
         ("received at port", _listed(last.ports)),
         ("relay", _relay(last.relay)),
@@ -44,7 +39,7 @@ def judge_link(
         ("rejected in this step", _listed(rejected(links))),
         ("waiting for", last.waiting or "nothing"),
     ]
-    return judged(_link_problems(links, switches, rates, expected), "The board's link is up.", data)
+    return judged(_link_problems(links, switches, rates), "The board's link is up.", data)
 
 
 def judge_crc(links: Sequence[Link], frames: int, nonzero: int) -> Verdict:
@@ -70,10 +65,7 @@ def rejected(links: Sequence[Link]) -> dict[str, int]:
 
 
 def _link_problems(
-    links: Sequence[Link],
-    switches: Switches | None,
-    rates: Mapping[str, float],
-    expected: Mapping[str, float],
+    links: Sequence[Link], switches: Switches | None, rates: Mapping[str, float]
 ) -> Iterator[str]:
     if any(link.state != "up" for link in links):
         yield (
@@ -85,8 +77,8 @@ def _link_problems(
     if links[0].epoch != links[-1].epoch:
         yield "The board restarted during this step: check its power."
     for name, rate in rates.items():
-        if rate < ENOUGH * expected[name]:
-            yield f"{name} has {rate:.0f} Hz, expected are {expected[name]:.0f} Hz."
+        if rate < ENOUGH * EXPECTED_HZ[name]:
+            yield f"{name} has {rate:.0f} Hz, expected are {EXPECTED_HZ[name]:.0f} Hz."
     if switches is None or not (switches.ultrasonic_brake and switches.bumper_brake):
         yield "The board has not confirmed that both its emergency brakes are on."
     seconds = (links[-1].mono_ns - links[0].mono_ns) / NS_PER_S
@@ -111,9 +103,9 @@ def _crc_problems(bad: int, frames: int, nonzero: int) -> Iterator[str]:
         )
 
 
-def _rate(rate: float, expected: float, name: str) -> str:
+def _rate(rate: float, name: str) -> str:
     least = "at least" if name == "VelocityReport" else "requested"
-    return f"{rate:.0f} ({least} {expected:.0f})"
+    return f"{rate:.0f} ({least} {EXPECTED_HZ[name]:.0f})"
 
 
 def _switches(switches: Switches | None) -> str:

@@ -12,13 +12,13 @@ from cli.inspect import output
 from cli.inspect.session import wants_json
 from cli.recordings.info import open_recording
 from cli.settings import Everything
+from common import keys
 from common.errors import ConfigError, RobotError
-from common.keys import ROOT
 from services.safety.config import Safety
 from services.safety.core.release import stopping_distance
 
 # A reading is up to one period of the sonars old, and up to one period of the bridge's queries.
-READING_PERIODS = 2
+SENSING_S = 2 / keys.ULTRASONIC.rate_hz
 KINDS = {"Motion", "Velocity", "Mileage", "Bumper"}  # the messages that ``Streams`` takes
 HEAD = ("stop", "command", "speed m/s", "reaction s", "deceleration m/s2", "distance m",
         "needed m", "reckoned m", "recording")  # fmt: skip
@@ -72,8 +72,7 @@ def run(options: argparse.Namespace, config: Everything) -> int:
         raise ConfigError(
             "stop: name at least one recording: start `t2 record` on the robot, drive and stop"
         )
-    sensing_s = READING_PERIODS / config.bridge.ultrasonic_rate
-    result = Result(*read(options.files), config.safety, sensing_s)
+    result = Result(*read(options.files), config.safety, SENSING_S)
     if wants_json(options):
         output.line(as_json(result))
     else:
@@ -111,7 +110,7 @@ def read_streams(file: Path) -> Streams:
         for entry in reader:
             if entry.kind in KINDS and (message := entry.message) is not None:
                 streams.add(message)
-                robots.add(entry.key.removeprefix(f"{ROOT}/").split("/")[0])
+                robots.add(entry.key.removeprefix(f"{keys.ROOT}/").split("/")[0])
     if len(robots) > 1:
         raise RobotError(f"{file}: has several robots ({', '.join(sorted(robots))}): record one")
     if streams.problem:

@@ -20,12 +20,13 @@ from common.freshness import NS_PER_S
 from common.motion import BRAKE, STOP
 from common.service import Node, run
 from services.bridge.config import BridgeConfig
-from services.bridge.core.core import Core, tick_s
+from services.bridge.core.core import TICK_S, Core
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
 from services.bridge.guard import DESCRIPTORS_ENV, Heartbeat
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 MOTIONS = 8  # queue length
+LATE_NS = round(1.5 * TICK_S * NS_PER_S)  # of a tick after a stall
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 # Bounds of the histograms: 10 us to 1 s, four a decade.
 BOUNDS_NS = tuple(round(10_000 * 10 ** (step / 4)) for step in range(21))
@@ -105,9 +106,7 @@ class Bridge:
         loop = self._node.loop
         for port, sock in enumerate(self._sockets.sockets):
             loop.watch(sock, partial(self._on_readable, port))
-        period_s = tick_s(self._node.config.bridge)
-        self._late_ns = round(1.5 * period_s * NS_PER_S)
-        loop.every(period_s, self._on_tick)
+        loop.every(TICK_S, self._on_tick)
         loop.every(1.0, self._on_second)
         self._node.reactions = lambda: {n: one.message() for n, one in self._reactions.items()}
         self._node.is_stopped = self._is_stopped
@@ -140,7 +139,7 @@ class Bridge:
         self._do(self._core.calls.on_led(request, caller, clock.now_ns()))
 
     def _on_tick(self, now_ns: int) -> None:
-        if now_ns - self._ticked_ns > self._late_ns:
+        if now_ns - self._ticked_ns > LATE_NS:
             # Read the sockets first: after a stall of this loop, queued datagrams are not yet
             # counted, and the board would seem silent.
             self._read(*range(len(self._sockets.sockets)))

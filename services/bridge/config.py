@@ -7,7 +7,6 @@ from msgspec import Meta, Struct
 
 from common import settings
 
-Rate = Annotated[float, Meta(ge=0.2, le=200.0)]  # Hz
 Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 
 
@@ -38,11 +37,6 @@ class Bridge(settings.ProtectedSection, frozen=True, kw_only=True):
         "max_linear": (0.0, 1.5),
         "max_angular": (0.0, 2.0),
         "require_switches": (True, True),
-        # Lower rates delay the detection of a short hit, a near wall and a restarted board. Safety
-        # judges lost bumper polls by their number in 0.2 s.
-        "bumper_rate": (40.0, 200.0),
-        "ultrasonic_rate": (10.0, 200.0),
-        "mileage_rate": (10.0, 200.0),
     }
     # s that processes of this computer stall: every time limit is longer
     stall: settings.Stall = 0.0
@@ -51,10 +45,6 @@ class Bridge(settings.ProtectedSection, frozen=True, kw_only=True):
     max_linear: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # m/s
     max_angular: Annotated[float, Meta(ge=0.05, le=3.0)] = 1.0  # rad/s
     require_switches: bool = True  # the board must echo that its emergency brakes are on
-    bumper_rate: Rate = 50.0  # Hz, of the queries
-    ultrasonic_rate: Rate = 20.0  # Hz
-    mileage_rate: Rate = 25.0  # Hz
-    driver_rate: Annotated[float, Meta(ge=1.0, le=200.0)] = 2.0  # Hz, for each side
 
     @property
     def times(self) -> "TimeLimits":

@@ -14,8 +14,6 @@ from common.wire.commands import MotionKind
 from common.wire.frame import HEADER, Frame, Side
 from common.wire.framing import Framing, crc_function
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
-from services.bridge.config import Bridge
-from services.bridge.core.core import tick_s
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Send
 from tests.bridge.core_fixture import (
     BOOT,
@@ -334,8 +332,6 @@ def test_the_link_message(bench: Bench) -> None:
 
 
 def test_each_query_finds_its_tick() -> None:
-    assert tick_s(Bridge()) == tick_s(Bridge(bumper_rate=40.0, mileage_rate=20.0)) == 0.02
-    assert tick_s(Bridge(bumper_rate=125.0)) == 0.008
     bench = Bench()
     assert bench.core.motions.lease.over_since_ns == NOW
     out = bench.tick()

@@ -159,9 +159,7 @@ def test_a_table_adds_to_what_was_given_before(settings_dir: SettingsFixture) ->
     assert loaded.settings["safety.sources.new.lease"].origin.startswith("--set safety.sources=")
 
 
-@pytest.mark.parametrize(
-    "empty", ["[board]", "board = {}", "[safety.sources]", "", "[sim.drive]", "[sim.cable.to_pc]"]
-)
+@pytest.mark.parametrize("empty", ["[board]", "board = {}", "[safety.sources]", ""])
 def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty: str) -> None:
     loaded = settings_dir.load("[board]\nport = 5000", empty)
     assert loaded.config.board.port == 5000
@@ -175,17 +173,7 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
     ("text", "sentence"),
     [
         ("[bord]\nport = 1", "over0.toml: bord.port: no section 'bord'; did you mean 'board'?"),
-        (
-            "[wire]\nangular_unit = 'milliradian'",
-            "over0.toml: wire.angular_unit: was replaced by wire.command_angular_unit and "
-            "wire.feedback_angular_unit",
-        ),
-        (
-            "[ros2]\nodom_rate = 10.0",
-            "over0.toml: ros2.odom_rate: is no setting any more, always 25 Hz",
-        ),
         ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
-        ("[sim.drive]\ncoast = 1", "over0.toml: sim.drive: is no setting any more; a profile"),
         ("[sim]\nzzz = 1", "over0.toml: sim.zzz: unknown; there are control_port, seed, world"),
         ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),
         ("[board]\nport = 70000", "port = 70000: Expected `int` <= 65535; allowed is 1..65535"),

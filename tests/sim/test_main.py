@@ -159,7 +159,6 @@ def test_a_taken_port_ends_it_with_a_clear_sentence(
     [
         (["--world", "moon"], "sim.world = 'moon'"),
         (["--profile", "moon"], "--profile moon: no such file"),
-        (["--set", "sim.drive.coast=0"], "sim.drive: is no setting any more"),
         (["--set", "sim.sed=1"], "did you mean 'seed'"),
         (["--trace", "nowhere/trace.jsonl"], "--trace nowhere/trace.jsonl: cannot be written"),
     ],

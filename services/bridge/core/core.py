@@ -26,13 +26,13 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+from common import keys
 from common import messages as m
 from common.errors import WireError
 from common.freshness import NS_PER_S, Latest
 from common.wire import commands, reports
 from common.wire.frame import Frame, Side
 from common.wire.framing import Framing, Received, Rejected
-from services.bridge.config import Bridge as Settings
 from services.bridge.config import BridgeConfig
 from services.bridge.core.calls import Calls
 from services.bridge.core.motion_output import MotionOutput
@@ -44,27 +44,18 @@ from services.bridge.core.translate import BumperFilter, Translator, driver, res
 
 Handler = Callable[[Any, bytes, int], Outputs]  # frame, raw bytes, receive time
 
-# The lease, the silence of the board and the guard's patience are ten ticks each.
-TICK_MAX_S = 0.02
+TICK_S = 0.02  # the lease, the silence of the board and the guard's patience are ten ticks each
 LINK_NS = NS_PER_S * 19 // 100  # half a tick less than 0.2 s: the tick that is due may come early
 PRESSED = reports.BumperReport(True)
+# Lower rates would delay the detection of a short hit, a near wall and a restarted board.
+QUERIES: tuple[tuple[str, Frame, float], ...] = (
+    ("bumper", commands.BumperQuery(), keys.BUMPER.rate_hz),
+    ("mileage", commands.DistanceQuery(), keys.MILEAGE.rate_hz),
+    ("ultrasonic", commands.UltrasonicQuery(), keys.ULTRASONIC.rate_hz),
+    ("driver_left", commands.DriverQuery(Side.LEFT), keys.DRIVER.rate_hz),
+    ("driver_right", commands.DriverQuery(Side.RIGHT), keys.DRIVER.rate_hz),
+)
 STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
-
-
-def queries(settings: Settings) -> list[tuple[str, Frame, float]]:
-    """Return the queries to the board: name, frame, rate in Hz."""
-    return [
-        ("bumper", commands.BumperQuery(), settings.bumper_rate),
-        ("mileage", commands.DistanceQuery(), settings.mileage_rate),
-        ("ultrasonic", commands.UltrasonicQuery(), settings.ultrasonic_rate),
-        ("driver_left", commands.DriverQuery(Side.LEFT), settings.driver_rate),
-        ("driver_right", commands.DriverQuery(Side.RIGHT), settings.driver_rate),
-    ]
-
-
-def tick_s(settings: Settings) -> float:
-    """Return the period of the tick in seconds: each query finds its tick."""
-    return min(TICK_MAX_S, *(1 / rate_hz for _, _, rate_hz in queries(settings)))
 
 
 class Core:
@@ -87,9 +78,7 @@ class Core:
         self.calls = Calls(readiness, settings.times.echo, self._ask)
         failover_ns = round(settings.times.failover * NS_PER_S)
         self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
-        self._polling = Polling(
-            queries(settings), settings.times.answer, steady=STEADY, tick_s=tick_s(settings)
-        )
+        self._polling = Polling(QUERIES, settings.times.answer, steady=STEADY, tick_s=TICK_S)
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message, as its publisher counts
         self._mileage: Latest[m.Mileage] | None = None
