@@ -5,7 +5,7 @@ Keys have the form ``t2/v1/{robot}/{class}/...``. ``@cmd`` is a verbatim chunk o
 stops a fleet.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any, Generic, Literal, TypeVar
 
 import msgspec
@@ -15,9 +15,7 @@ from common import messages as m
 
 ROOT = "t2/v1"
 
-# Known values of a ``{name}`` in a path; those of sources are in the settings.
 SERVICES = ("bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2")
-KNOWN: Mapping[str, Collection[str]] = {"service": SERVICES, "side": ("left", "right")}
 
 MessageT = TypeVar("MessageT", bound=m.Message)
 RequestT = TypeVar("RequestT", bound=Struct)
@@ -64,15 +62,6 @@ class Topic(Struct, Generic[MessageT], frozen=True):
     def on(self, robot: str, **names: str) -> str:
         """Return the full key for one robot, or a key expression for ``*``."""
         return f"{ROOT}/{robot}/{self.path.format(**names)}"
-
-    def known(self, robot: str, names: Mapping[str, str], known: Collection[str]) -> frozenset[str]:
-        """Return the known keys in an expression: of ``known``, otherwise of ``KNOWN``."""
-        return frozenset(
-            self.on(robot, **{**names, name: each})
-            for name in names
-            if names[name] == "*"
-            for each in known or KNOWN.get(name, ())
-        )
 
 
 class Call(Struct, Generic[RequestT, ReplyT], frozen=True):

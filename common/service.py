@@ -2,8 +2,8 @@
 
 ``run`` reads the settings (exit code 78 names the invalid one, before anything opens), builds the
 service around a ``Node``, and runs it until SIGINT or SIGTERM. The first signal lets the service
-stop in order; a second one ends the process at once. The exit actions run once on every exit path:
-a signal that arrives while they run changes nothing.
+stop in order; a second one ends the process at once. The exit actions run once on every exit path,
+and signals are ignored while they run.
 """
 
 import os
@@ -199,7 +199,7 @@ def run_optional_service(
 
 def serve(node: Node[C]) -> int:
     """Run the loop until a signal, stop the service in order, and exit."""
-    end = Exit(node)
+    stop_on_signals(node)
     systemd = Systemd()
     if systemd.enabled:
         node.loop.every(CHECK_PERIOD_S, systemd.ready)
@@ -211,7 +211,7 @@ def serve(node: Node[C]) -> int:
         systemd.stopping()
         _await_stop(node)
     finally:
-        end.run_actions()
+        run_exit_actions(node)
         # Also after a crash: an open session keeps a failed process from ending.
         node.close()
     node.log.info("stopped")
@@ -238,39 +238,31 @@ def resident_bytes() -> int:
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-class Exit:
-    """End of a service: the first signal stops its loop, the second one ends the process.
+def stop_on_signals(node: Node[C]) -> None:
+    """Stop the loop at the first SIGINT or SIGTERM; at the second one run the actions and exit."""
 
-    The exit actions run once, whatever ends it.
-    """
-
-    def __init__(self, node: Node[C]) -> None:
-        self._node = node
-        self._begun = self._over = False
-        self._on_signals(self._stop)
-
-    def run_actions(self) -> None:
-        """Run the exit actions, once."""
-        if self._begun:
-            return
-        self._begun = True
+    def leave(number: int, _: FrameType | None) -> None:
         try:
-            self._node.on_exit()
-        finally:
-            self._over = True
-
-    def _on_signals(self, handler: Callable[[int, FrameType | None], None]) -> None:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, handler)
-
-    def _stop(self, _: int, __: FrameType | None) -> None:
-        self._on_signals(self._leave)
-        self._node.loop.stop()
-
-    def _leave(self, number: int, _: FrameType | None) -> None:
-        if self._begun and not self._over:
-            return  # the interrupted call ends the process
-        try:
-            self.run_actions()
+            run_exit_actions(node)
         finally:
             os._exit(128 + number)
+
+    def stop(_: int, __: FrameType | None) -> None:
+        _on_signals(leave)
+        node.loop.stop()
+
+    _on_signals(stop)
+
+
+def run_exit_actions(node: Node[C]) -> None:
+    """Run the exit actions; a signal changes nothing meanwhile, and ends the process afterwards."""
+    _on_signals(signal.SIG_IGN)
+    try:
+        node.on_exit()
+    finally:
+        _on_signals(signal.SIG_DFL)
+
+
+def _on_signals(handler: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)

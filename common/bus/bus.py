@@ -4,7 +4,7 @@ import contextlib
 import os
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -151,24 +151,22 @@ class Bus:
         *,
         depth: int = 1,
         refused: Callable[[str, MessageError], None] | None = None,
-        known: Collection[str] = (),
         session: Session | None = None,
         **names: str,
     ) -> None:
         """Call the handler for each message, with a queue of ``depth``.
 
         When the queue is full, the oldest message is dropped. ``refused`` gets key and error of an
-        undecodable message; it is counted in any case. Where a name is ``*``, the ``known`` ones
-        are counted one by one and all others together, because any client can invent names.
+        undecodable message; it is counted in any case. Where a name is ``*``, all keys are counted
+        together, because any client can invent names.
         """
         expression = topic.on(self.robot, **names)
         only = "" if "*" in expression else expression  # reading the key of a sample takes time
-        single = topic.known(self.robot, names, known) | {expression}
 
         def take(stamped: Stamped) -> None:
             sample, received_ns = stamped
             key = only or str(sample.key_expr)
-            self.counts[key if key in single else expression] += 1
+            self.counts[expression] += 1
             try:
                 message = codec.decode(sample.payload.to_bytes(), topic.message)
             except MessageError as error:

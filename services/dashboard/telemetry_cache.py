@@ -22,7 +22,6 @@ STATES_MAX = 64  # of safety: 3 s, more than any limit on an answer to one
 MISSED = 4.0  # samples that may be missing before the last one is too old to show
 # Names of sources and services come from the bus, where any client can invent them.
 INVENTED_MAX = 30
-WILDCARDS = {"service": "*", "side": "*", "source": "*"}
 MIN_AGE_S, MAX_AGE_S = 0.5, 3.0
 
 
@@ -97,4 +96,9 @@ def path_of(key: str) -> str:
     return key.removeprefix(f"{keys.ROOT}/").partition("/")[2]
 
 
-FIXED = frozenset(path_of(key) for topic in keys.TOPICS for key in topic.known("", WILDCARDS, ()))
+FIXED = frozenset(
+    topic.path.format(service=service, side=side, source="")
+    for topic in keys.TOPICS
+    for service in keys.SERVICES
+    for side in ("left", "right")
+)

@@ -100,7 +100,6 @@ class SafetyService:
             accept,
             depth=DRIVE_DEPTH,
             refused=lambda key, _: self._decide(request(source_of(key), None, 0)),
-            known=known,
             source="*",
         )
         for source in known:

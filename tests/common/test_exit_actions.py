@@ -49,35 +49,3 @@ def test_signals_while_it_leaves_do_not_begin_its_exit_anew(
         serve(node)
     assert said == ["begun", "over"]
     assert ended == []
-
-
-@pytest.mark.usefixtures("_signals")
-def test_a_second_signal_says_the_last_words_once_and_a_third_changes_nothing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    said: list[str] = []
-    sets = ["bus.connect=tcp/127.0.0.1:1"]
-    node = Node("teleop", load(Shared, Sources(environ={}, sets=sets)))
-
-    class Ended(BaseException):
-        pass
-
-    def end(code: int) -> None:
-        raise Ended(code)
-
-    def on_exit() -> None:
-        said.append("begun")
-        signal.raise_signal(signal.SIGINT)
-        said.append("over")
-
-    def begin(_: int) -> None:
-        for _ in range(2):
-            signal.raise_signal(signal.SIGTERM)
-
-    monkeypatch.setattr(os, "_exit", end)
-    node.on_exit = on_exit
-    node.loop.every(1.0, begin)
-    with pytest.raises(Ended) as ended:
-        serve(node)
-    assert ended.value.args == (128 + signal.SIGTERM,)
-    assert said == ["begun", "over"]

@@ -91,14 +91,6 @@ def test_events_alone_have_a_history() -> None:
     assert {topic.path for topic in TOPICS if topic.service.history} == {"evt/{service}"}
 
 
-def test_known_names_of_an_expression_are_whole_keys() -> None:
-    events = keys.EVENTS.known("001", {"service": "*"}, ())
-    assert events == {f"t2/v1/001/evt/{service}" for service in keys.SERVICES}
-    assert keys.DRIVE.known("001", {"source": "*"}, ["nav"]) == {"t2/v1/001/@cmd/drive/nav"}
-    assert keys.DRIVE.known("001", {"source": "*"}, ()) == frozenset()
-    assert keys.DRIVE.known("001", {"source": "nav"}, ()) == frozenset()
-
-
 def test_schemas_are_by_path_and_in_its_order() -> None:
     by_path = {topic.path: topic for topic in TOPICS}
     made = keys.schemas([by_path["tel/bridge/link"], by_path["tel/bridge/bumper"]])
