@@ -172,7 +172,7 @@ class Release(Struct, frozen=True, kw_only=True):
     """State of moving off a pressed bumper; the operator chooses the direction."""
 
     believed_free: Direction | None  # opposite of the last motion; None when none is known
-    travelled: float  # m, net travel by the counters over the last metre before the contact
+    travelled: float  # m, travel by the counters since the last reversal before the contact
     age: float | None  # s since that motion; None when none is known
     forbidden: Annotated[tuple[Direction, ...], Few]  # until a reset: it was pressed that way
     left: float  # m that may still be travelled until a reset

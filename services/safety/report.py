@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.messages import SONAR_NAMES, Cause, Level, Limits, Release, SafetyState
+from common.messages import SONAR_NAMES, Cause, Direction, Level, Limits, Release, SafetyState
 from common.motion import RUN, Twist
 from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched, ordered
 from services.safety.core.inputs import Event as Trigger
@@ -14,9 +14,9 @@ from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, s
 from services.safety.core.policy import Policy
 from services.safety.core.sonars import Sonar
 from services.safety.core.state import State
-from services.safety.trajectory import OPPOSITE, Approach
 
 MOVING = ("run", "slow")
+OPPOSITE: dict[Direction | None, Direction] = {"forward": "backward", "backward": "forward"}
 # Event names that differ from the cause's name.
 EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
 # What the operator does about a latched cause that is still present, before a reset.
@@ -37,7 +37,7 @@ class Transition(Struct, frozen=True):
     about: dict[str, str | None]
 
 
-def state_message(policy: Policy, state: State, approach: Approach, now_ns: int) -> SafetyState:
+def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
     """Return the published state, with the heartbeat of ``state``."""
     causes = tuple(
         Cause(
@@ -57,7 +57,7 @@ def state_message(policy: Policy, state: State, approach: Approach, now_ns: int)
         limits=_limits(policy, state, now_ns),
         heartbeat=state.heartbeat.number,
         text=sentence(state, by_hand=bool(spent(state, policy.settings))),
-        release=_release(policy, state, approach, now_ns) if "contact" in state.latches else None,
+        release=_release(policy, state, now_ns) if "contact" in state.latches else None,
         release_refusal=state.release.refusal,
         estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
@@ -209,14 +209,13 @@ def _source_text(source: str | None) -> str:
     return f"{source} is in control." if source else "No source is in control."
 
 
-def _release(policy: Policy, state: State, approach: Approach, now_ns: int) -> Release:
+def _release(policy: Policy, state: State, now_ns: int) -> Release:
     """Return the published state of the release, with the way that is believed free, and why."""
-    release, came, free = state.release, approach.before, None
-    if came.direction is not None and OPPOSITE[came.direction] not in release.forbidden:
-        free = OPPOSITE[came.direction]
+    release, came = state.release, state.release.came
+    free = OPPOSITE.get(came.direction)
     return Release(
-        believed_free=free,
-        travelled=came.net,
+        believed_free=None if free in release.forbidden else free,
+        travelled=came.travelled,
         age=None if came.ended_ns is None else (now_ns - came.ended_ns) / NS_PER_S,
         forbidden=tuple(sorted(release.forbidden)),
         left=room(state, policy.settings),

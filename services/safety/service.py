@@ -36,7 +36,6 @@ from services.safety.core.inputs import (
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, State
 from services.safety.report import signature, state_message, transitions
-from services.safety.trajectory import Approach
 
 M = TypeVar("M", bound=Message)
 
@@ -59,7 +58,6 @@ class SafetyService:
         start = node.bus.boot % 2**31
         self._state = replace(self._policy.start(), heartbeat=Heartbeat(start), decision=start)
         self._inputs = Inputs(boot=node.bus.boot)
-        self._approach = Approach()
         self._motion_publisher = node.open_drive(listens=False).publisher(keys.MOTION)
         self._state_publisher = node.bus.publisher(keys.SAFETY)
         self._subscribe()
@@ -162,19 +160,13 @@ class SafetyService:
     ) -> None:
         now_ns = clock.now_ns()
         self._decision_timer.defer(now_ns)
-        inputs = replace(
-            self._inputs,
-            estop_connection=self._estop_bus.connection,
-            event=event,
-            drove=self._approach.before.direction,
-        )
+        inputs = replace(self._inputs, estop_connection=self._estop_bus.connection, event=event)
         before = self._state
         for output in self._policy.decide(before, inputs, now_ns):
             if isinstance(output, Motion):
                 self._motion_publisher.put(output)
             else:
                 self._state = output
-        self._approach = self._approach.follow(inputs.counters, self._state.latches.get("contact"))
         self._report(before, event, answer, now_ns)
 
     def _report(
@@ -196,7 +188,7 @@ class SafetyService:
 
     def _publish_state(self, now_ns: int) -> None:
         self._state = replace(self._state, heartbeat=self._state.heartbeat.beat(now_ns))
-        self._state_publisher.put(state_message(self._policy, self._state, self._approach, now_ns))
+        self._state_publisher.put(state_message(self._policy, self._state, now_ns))
 
     def _is_stopped(self) -> bool:
         """Stop the vehicle before shutdown; do not wait for an unknown velocity."""

@@ -40,7 +40,6 @@ from services.safety.core.inputs import (
 from services.safety.core.policy import Policy
 from services.safety.core.state import Verdict
 from services.safety.report import state_message, text
-from services.safety.trajectory import Approach
 
 TICK_S = 0.02
 FREE: tuple[float | None, ...] = (None,) * 8
@@ -76,7 +75,6 @@ class PolicyFixture:
         self.now_ns = 10 * NS_PER_S
         self.inputs = Inputs()
         self.verdict = Verdict()
-        self.approach = Approach()
         self.motions: list[Motion] = []
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
@@ -98,14 +96,12 @@ class PolicyFixture:
 
     def decide(self, event: Event | None = None) -> Verdict:
         inputs = replace(self.inputs, estop_connection=self.estop_connection, event=event)
-        inputs = replace(inputs, drove=self.approach.before.direction)
         self.motions = []
         for output in self.policy.decide(self.state, inputs, self.now_ns):
             if isinstance(output, Motion):
                 self.motions.append(output)
             else:
                 self.state = output
-        self.approach = self.approach.follow(inputs.counters, self.state.latches.get("contact"))
         self.verdict = self.state.verdict
         return self.verdict
 
@@ -253,7 +249,7 @@ class PolicyFixture:
 
     def published(self) -> SafetyState:
         """Return the published state."""
-        return state_message(self.policy, self.state, self.approach, self.now_ns)
+        return state_message(self.policy, self.state, self.now_ns)
 
     def text(self, name: str) -> str:
         """Return the published text of a held cause."""

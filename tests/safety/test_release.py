@@ -425,7 +425,7 @@ def test_a_second_contact_looks_at_the_travel_between() -> None:
     fixture = hit()
     fixture.hold("backward", 20)
     fixture.pressed = False
-    fixture.tick(10)
+    fixture.tick(60)
     fixture.linear = -0.5  # pushed by hand
     fixture.tick(100)
     fixture.linear = None
@@ -434,4 +434,4 @@ def test_a_second_contact_looks_at_the_travel_between() -> None:
     release = fixture.published().release
     assert release is not None
     assert release.believed_free == "forward"
-    assert release.travelled == pytest.approx(-1.0)
+    assert release.travelled == pytest.approx(-1.03, abs=0.01)

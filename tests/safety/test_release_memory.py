@@ -3,10 +3,11 @@
 import pytest
 from msgspec.structs import replace
 
+from common.freshness import Latest
 from common.messages import Mileage
 from common.motion import STILL, Twist
 from services.safety.core.causes import Held
-from services.safety.core.release import COAST_NS, Release, sweep
+from services.safety.core.release import COAST_NS, Leg, Release, sweep
 
 REACH = 0.65
 BACK = Twist(-0.1)
@@ -14,8 +15,11 @@ BACKWARD = Release(direction="backward")
 TOUCHED = Held(1, 1, 0, (1, 1), "hit", 40)
 
 
-def at(distance: float, epoch: int = 0) -> Mileage:
-    return Mileage(distance=distance, heading=0.0, epoch=epoch, boot=7)
+def at(distance: float, epoch: int = 0, heading: float = 0.0, boot: int = 7) -> Mileage:
+    return Mileage(distance=distance, heading=heading, epoch=epoch, boot=boot)
+
+
+LEG = Leg(at(1.0), at(0.0), 5)
 
 
 def moving(
@@ -55,10 +59,10 @@ def test_the_counters_count_when_they_show_more() -> None:
     release = moving(Release(), counter=at(1.0))
     release = moving(release, counter=at(0.9), dt_s=0.5)
     assert release.travelled == pytest.approx(0.1)
-    assert release.left(0.15) == pytest.approx(0.05)
+    assert release.remaining(0.15) == pytest.approx(0.05)
     release = moving(release, counter=at(0.95))  # back and forth is travel
     assert release.travelled == pytest.approx(0.15)
-    assert moving(release, counter=at(0.8)).left(0.15) == 0.0
+    assert moving(release, counter=at(0.8)).remaining(0.15) == 0.0
 
 
 def test_counters_that_cannot_be_compared_count_nothing() -> None:
@@ -92,7 +96,7 @@ def test_coasting_ends_at_standstill(known: Twist | None, moves: bool) -> None:
 
 def test_a_new_contact_has_everything_anew() -> None:
     used = Release(integrated=0.1, forbidden=frozenset({"forward"}), direction="backward")
-    assert used.after(None, TOUCHED, 9) == Release(barred_ns=9)
+    assert used.after(None, TOUCHED, LEG, 9) == Release(barred_ns=9, came=LEG)
 
 
 def held(good: int, occurrence: int = 40) -> Held:
@@ -101,9 +105,9 @@ def held(good: int, occurrence: int = 40) -> Held:
 
 def test_the_same_press_and_a_clear_bumper_change_nothing() -> None:
     used = moving(BACKWARD)
-    assert used.after(held(0), TOUCHED, 9) is used
-    assert used.after(held(0), held(1), 9) is used
-    assert used.after(held(1), held(2), 9) is used
+    assert used.after(held(0), TOUCHED, LEG, 9) is used
+    assert used.after(held(0), held(1), LEG, 9) is used
+    assert used.after(held(1), held(2), LEG, 9) is used
 
 
 @pytest.mark.parametrize(
@@ -111,23 +115,74 @@ def test_the_same_press_and_a_clear_bumper_change_nothing() -> None:
 )
 def test_a_press_during_a_release_forbids_its_direction(later_ns: int, forbidden: set[str]) -> None:
     used = moving(BACKWARD)
-    after = used.after(held(1), TOUCHED, later_ns)
+    after = used.after(held(1), TOUCHED, LEG, later_ns)
     assert after.forbidden == forbidden
     assert (after.direction, after.barred_ns) == (None, later_ns)
     assert after.travelled == used.travelled
+    assert after.came == (used.came if forbidden else LEG)
 
 
 def test_a_press_without_any_release_forbids_nothing() -> None:
-    assert Release().after(held(1), TOUCHED, 0).forbidden == frozenset()
+    assert Release().after(held(1), TOUCHED, LEG, 0).forbidden == frozenset()
     never_chosen = Release(moved_ns=0)
-    assert never_chosen.after(held(1), TOUCHED, 0).forbidden == frozenset()
+    assert never_chosen.after(held(1), TOUCHED, LEG, 0).forbidden == frozenset()
 
 
 def test_the_direction_that_moved_is_forbidden() -> None:
     moved = replace(moving(BACKWARD), direction="forward")
     still = moving(moved, sent=None)
-    assert still.after(held(1), TOUCHED, 0).forbidden == {"backward"}
+    assert still.after(held(1), TOUCHED, LEG, 0).forbidden == {"backward"}
     ramp = moving(moved, sent=STILL)  # a RUN of zero has not moved it forward
-    assert ramp.after(held(1), TOUCHED, 0).forbidden == {"backward"}
+    assert ramp.after(held(1), TOUCHED, LEG, 0).forbidden == {"backward"}
     forward = moving(moved, sent=Twist(0.01))
-    assert forward.after(held(1), TOUCHED, 0).forbidden == {"forward"}
+    assert forward.after(held(1), TOUCHED, LEG, 0).forbidden == {"forward"}
+
+
+# --- the direction that is believed free -----------------------------------------------------
+
+
+def travel(*distances: float) -> Leg:
+    """Follow counters that read these distances, one nanosecond apart."""
+    leg = Leg()
+    for now_ns, distance in enumerate(distances):
+        leg = leg.follow(Latest(at(distance), now_ns))
+    return leg
+
+
+@pytest.mark.parametrize(
+    ("distances", "travelled", "direction"),
+    [
+        ((), 0.0, None),
+        ((3.0,), 0.0, None),
+        ((0.0, 0.004), 0.0, None),  # noise
+        ((0.0, 0.004, 0.008), 0.008, None),  # small steps add up
+        ((0.0, 0.049), 0.049, None),  # too short
+        ((0.0, 0.05), 0.05, "forward"),
+        ((0.0, -0.2, -0.5), -0.5, "backward"),
+        ((0.0, 0.5, 0.451), 0.5, "forward"),  # a rebound
+        ((0.0, 0.5, 0.47, 0.44), -0.06, "backward"),
+        ((0.0, 0.5, 0.3), -0.2, "backward"),
+        ((0.0, 0.03, -0.04), -0.07, "backward"),
+    ],
+)
+def test_the_direction_of_the_newest_leg(
+    distances: tuple[float, ...], travelled: float, direction: str | None
+) -> None:
+    leg = travel(*distances)
+    assert leg.travelled == pytest.approx(travelled)
+    assert leg.direction == direction
+
+
+@pytest.mark.parametrize(
+    ("reading", "anew"),
+    [
+        (at(0.5, boot=8), True), (at(0.5, epoch=1), True),  # another bridge, a restarted board
+        (at(0.5, heading=0.36), True), (at(0.5, heading=-0.36), True),  # a turn on the spot
+        (at(0.5, heading=0.35), False), (at(0.504), False),
+    ],
+)  # fmt: skip
+def test_a_restart_and_a_turn_on_the_spot_begin_a_leg(reading: Mileage, anew: bool) -> None:
+    leg = travel(0.0, 0.5)
+    assert leg.ended_ns == 1
+    assert leg.follow(Latest(reading, 9)) == (Leg(reading, reading) if anew else leg)
+    assert leg.follow(Latest(at(0.505), 9)).ended_ns == 9

@@ -6,7 +6,6 @@ from common import codec
 from common.freshness import Latest, fresh
 from common.messages import (
     Bumper,
-    Direction,
     Drive,
     Driver,
     EstopKeepalive,
@@ -76,8 +75,6 @@ class Inputs(Struct, frozen=True):
     leaving: bool = False  # whether this service is shutting down
     event: Event | None = None
     boot: int = 0  # this service's own
-    # In which the vehicle drove into the newest contact, for the operator; None when unknown.
-    drove: Direction | None = None
 
     def known_velocity(self, now_ns: int, age_s: float) -> Latest[Twist] | None:
         """Return the measured velocity; None when not finite or older than ``age_s``."""

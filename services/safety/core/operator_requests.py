@@ -44,7 +44,7 @@ def handle(
 def room(state: State, settings: Safety) -> float:
     """Return the remaining travel of a release in metres, less the stopping distance."""
     stopping = stopping_distance(settings.release_speed, settings.reaction, settings.deceleration)
-    return state.release.left(settings.release_distance - stopping)
+    return state.release.remaining(settings.release_distance - stopping)
 
 
 def _reset(
@@ -111,18 +111,18 @@ def _remaining(state: State, inputs: Inputs, settings: Safety) -> str:
 
 def _pressed(state: State, inputs: Inputs, settings: Safety) -> str:
     """Return the text of a pressed bumper with the remedy."""
-    what = _no_release(state, inputs, settings) or _way_off(state.release, inputs.drove)
+    what = _no_release(state, inputs, settings) or _way_off(state.release)
     return f"{state.latches['contact'].text} {what}"
 
 
-def _way_off(release: Release, drove: Direction | None) -> str:
+def _way_off(release: Release) -> str:
     """Return the remedy, by the directions that are not forbidden."""
     free = SIGN.keys() - release.forbidden
     if len(free) == len(SIGN):
         return "Hold release to move off, forward or backward."
     (only,) = free
     advice = f"Hold release {only} to move off."
-    if only != drove:
+    if only != release.came.direction:
         return advice
     return f"{advice} The vehicle drove {only} into the contact: check that direction first."
 

@@ -138,6 +138,7 @@ class Policy:
             motion=self._supervisor.follow(
                 state.motion, sent.twist, velocity, counters, step_s=step_s, now_ns=now_ns
             ),
+            leg=state.leg.follow(counters) if counters else state.leg,
             release=release,
         )
 
@@ -150,7 +151,9 @@ class Policy:
         held = observe(held, [flapping], now_ns, decision=state.decision)
         release = state.release
         if "contact" in held:
-            release = release.after(state.latches.get("contact"), held["contact"], now_ns)
+            release = release.after(
+                state.latches.get("contact"), held["contact"], state.leg, now_ns
+            )
             release = replace(release, unknown=release.unknown or "predecessor" in held)
         return replace(state, latches=held, fault_budget=budget, release=release)
 

@@ -12,12 +12,17 @@ after three clear answers of the board, so a short gap within one press is not a
 
 A release begins as every drive does: with a neutral request, after the press and after the last
 refusal. So a key that was held before moves nothing.
+
+``Leg`` informs the operator which direction is believed free, and why. It decides nothing. One
+velocity is not evidence of a direction, because a vehicle rebounds from a hit.
 """
+
+import math
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest
 from common.messages import Direction, Mileage
 from common.motion import STILL, Twist
 from common.standstill import comparable
@@ -27,6 +32,41 @@ COAST_NS = (
     NS_PER_S // 2
 )  # after the last motion; a press and counted travel still belong to the release
 SIGN: dict[Direction, float] = {"forward": 1.0, "backward": -1.0}
+STEP_M = 0.005  # smaller changes are resolution or noise of the counter
+LEG_M = 0.05  # a shorter motion may be a rebound
+TURN_RAD = 0.35  # a larger turn on the spot invalidates earlier travel
+
+
+class Leg(Struct, frozen=True):
+    """The newest motion in one direction, by the board's counters."""
+
+    start: Mileage | None = None
+    end: Mileage | None = None  # the farthest reading from there
+    ended_ns: int | None = None  # time of that
+
+    @property
+    def travelled(self) -> float:
+        """The travel in metres, forward positive."""
+        return self.end.distance - self.start.distance if self.start and self.end else 0.0
+
+    @property
+    def direction(self) -> Direction | None:
+        """Direction of travel; None when it is too short to show one."""
+        if abs(self.travelled) < LEG_M:
+            return None
+        return "forward" if self.travelled > 0 else "backward"
+
+    def follow(self, counters: Latest[Mileage]) -> "Leg":
+        """Return the leg after a reading of the counters."""
+        reading = counters.value
+        if self.end is None or not comparable(self.end, reading):
+            return Leg(reading, reading)
+        step = reading.distance - self.end.distance
+        reverses = step * self.travelled < 0
+        if abs(step) >= (LEG_M if reverses else STEP_M):
+            return Leg(self.end if reverses else self.start, reading, counters.received_ns)
+        turned = math.remainder(reading.heading - self.end.heading, math.tau)
+        return Leg(reading, reading) if abs(turned) > TURN_RAD else self
 
 
 class Release(Struct, frozen=True):
@@ -43,13 +83,14 @@ class Release(Struct, frozen=True):
     unknown: bool = False  # whether releases before a restart of safety may have moved the vehicle
     barred_ns: int = 0  # a release begins only with a newer neutral request
     refusal: str = ""  # why a requested release does not move the vehicle
+    came: Leg = Leg()  # the leg that led to the newest press outside a release
 
     @property
     def travelled(self) -> float:
         """Travel of all releases of this contact, in metres."""
         return max(self.integrated, self.counted)
 
-    def left(self, distance: float) -> float:
+    def remaining(self, distance: float) -> float:
         """Return the remaining travel in metres, of ``distance`` for each contact."""
         return 0.0 if self.unknown else max(0.0, distance - self.travelled)
 
@@ -80,16 +121,16 @@ class Release(Struct, frozen=True):
             moved_ns=now_ns if moves else self.moved_ns,
         )
 
-    def after(self, old: Held | None, contact: Held, now_ns: int) -> "Release":
+    def after(self, old: Held | None, contact: Held, came: Leg, now_ns: int) -> "Release":
         """Return the release after a bumper sample: ``contact`` as held now, ``old`` before."""
         if old is None:
-            return Release(barred_ns=now_ns)
+            return Release(barred_ns=now_ns, came=came)
         if contact.good or not old.good:
             return self  # a clear bumper, or the same press
         forbidden = self.forbidden
         if self.moved is not None and self._is_coasting(now_ns):
-            forbidden = forbidden | {self.moved}
-        return replace(self, forbidden=forbidden, direction=None, barred_ns=now_ns)
+            forbidden, came = forbidden | {self.moved}, self.came
+        return replace(self, forbidden=forbidden, direction=None, barred_ns=now_ns, came=came)
 
     def _is_coasting(self, now_ns: int) -> bool:
         return self.moved_ns is not None and now_ns - self.moved_ns <= COAST_NS

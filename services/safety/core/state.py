@@ -7,7 +7,7 @@ from common.messages import Verdict as VerdictName
 from common.motion import STILL, STOP, Command, Twist
 from services.safety.core.causes import FaultBudget, Latches, Token
 from services.safety.core.motion_watch import MotionWatch
-from services.safety.core.release import Release
+from services.safety.core.release import Leg, Release
 from services.safety.core.sonars import SonarArray, SonarOverrides
 from services.safety.core.sources import Arbiter, Keepalives, SpeedLimits
 
@@ -48,6 +48,7 @@ class State(Struct, frozen=True):
     overrides: SonarOverrides = SonarOverrides()
     motion: MotionWatch = MotionWatch()
     fault_budget: FaultBudget = FaultBudget()
+    leg: Leg = Leg()
     release: Release = Release()
     decision: int = 0  # number of the newest decision; starts at random, see ``Held.id``
     estop_connection: int = 0  # the newest one
