@@ -32,7 +32,7 @@ GROUPS = {
         "doctor": ("cli.inspect.doctor", "diagnose the path from this laptop to the wheels"),
         "robots": ("cli.inspect.robots", "the robots on the bus: verdict, speed, driver"),
         "health": ("cli.inspect.health", "service health"),
-        "ls": ("cli.inspect.ls", "the active keys: type, rate, publishers, readers"),
+        "ls": ("cli.inspect.ls", "the active keys with type and rate; the services"),
         "echo": ("cli.inspect.echo", "print messages received on a key"),
         "hz": ("cli.inspect.hz", "rate, gaps, losses, bandwidth and delay of keys"),
         "call": ("cli.inspect.call", "call a service, such as safety/reset"),
@@ -65,26 +65,15 @@ GROUPS = {
         "config": ("cli.settings", "show the effective configuration and the source of each value"),
         "install": ("cli.run.install", "install the services as systemd units on this computer"),
         "keys": ("cli.keys.command", "create, renew, revoke and list certificates"),
-        "completion": (
-            "cli.inspect.completion",
-            "print the shell completion for bash, zsh or fish",
-        ),
     },
 }
 COMMANDS = {name: text for group in GROUPS.values() for name, (_, text) in group.items()}
 PLACES = {name: place for group in GROUPS.values() for name, (place, _) in group.items()}
-REMOVED = {
-    "list": '"t2 ls"', "topic": '"t2 ls", "t2 echo" or "t2 hz"', "services": '"t2 ls --services"',
-    "delay": '"t2 hz"', "bw": '"t2 hz"', "latency": '"t2 health"', "schema": "docs/bus.md",
-    "pub": "zenoh-cli (docs/inspect.md)",
-}  # fmt: skip
 EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand and return its exit code."""
-    if "_ARGCOMPLETE" in os.environ:  # the shell asks for completions
-        complete()
     words = list(sys.argv[1:] if argv is None else argv) or ["--help"]
     options = parsed(words)
     try:
@@ -104,20 +93,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def parsed(words: Sequence[str]) -> argparse.Namespace:
     """Return the parsed options; exit with usage and code 2 if they are invalid."""
-    parser, subparsers = parsers()
-    named = words[0]
-    if named not in COMMANDS:
-        refuse(parser, words)
-    subparser = subparsers.add_parser(named, description=COMMANDS[named])
-    module(named).add_arguments(subparser)
-    options, unknown = parser.parse_known_args(words)
-    if unknown:
-        subparser.error(f"unrecognized arguments: {' '.join(unknown)}")
-    return options
-
-
-def parsers() -> "tuple[argparse.ArgumentParser, argparse._SubParsersAction[Any]]":
-    """Return the parser of ``t2``, and the action that its subcommands are added to."""
     parser = argparse.ArgumentParser(
         prog="t2",
         usage="t2 COMMAND [OPTIONS]",
@@ -130,20 +105,15 @@ def parsers() -> "tuple[argparse.ArgumentParser, argparse._SubParsersAction[Any]
     subparsers = parser.add_subparsers(
         prog="t2", dest="command", metavar="COMMAND", help=argparse.SUPPRESS
     )
-    return parser, subparsers
-
-
-def complete() -> None:
-    """Print the completions of the line in the shell, and end the process."""
-    from cli.inspect import completion
-
-    parser, subparsers = parsers()
-    typed = completion.typed_command()
-    for name, text in COMMANDS.items():
-        subparser = subparsers.add_parser(name, help=text)
-        if name == typed:
-            module(name).add_arguments(subparser)
-    completion.complete(parser)
+    named = words[0]
+    if named not in COMMANDS:
+        refuse(parser, words)
+    subparser = subparsers.add_parser(named, description=COMMANDS[named])
+    module(named).add_arguments(subparser)
+    options, unknown = parser.parse_known_args(words)
+    if unknown:
+        subparser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    return options
 
 
 def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:
@@ -153,8 +123,6 @@ def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:
         parser.parse_args(words[:1])
     if first.startswith("-"):
         parser.error(f"{first}: options follow the command, as in: t2 COMMAND {first}")
-    if first in REMOVED:
-        parser.error(f"no command {first!r} any more; use {REMOVED[first]}")
     near = get_close_matches(first, COMMANDS, n=1)
     hint = f'did you mean "t2 {near[0]}"?' if near else '"t2 --help" lists the commands'
     parser.error(f"unknown command {first!r}; {hint}")

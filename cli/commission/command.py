@@ -12,7 +12,6 @@ from cli.commission.report import Report, Row, render
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import STEPS
 from cli.inspect.diagnosis import NEEDED
-from cli.inspect.session import add_output
 from cli.settings import Everything
 from common import keys
 from common.cli_args import VERSION, add_sources, sources
@@ -43,7 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", type=Path, metavar="FILE", help="out/checkout-ROBOT-DATE.md by default"
     )
-    add_output(parser)
     add_sources(parser)
 
 
@@ -52,10 +50,8 @@ def run(options: argparse.Namespace) -> int:
     loaded = load(Everything, sources(options))
     if options.part:
         if options.only or options.report:
-            raise ConfigError("stop: has no steps and no report; -o json prints its result")
+            raise ConfigError("stop: has no steps and no report")
         return stop_command.run(options, loaded.config)
-    if options.output != "text":
-        raise ConfigError("-o: only `t2 checkout stop` has other formats than text")
     file = report_file(options.report, loaded.config.robot.id)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)  # as Ctrl-C

@@ -3,13 +3,11 @@
 import argparse
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from cli.commission.stops import DIRECTIONS, Stop, Streams, find_stops
 from cli.inspect import output
-from cli.inspect.session import wants_json
 from cli.recordings.info import open_recording
 from cli.settings import Everything
 from common import keys
@@ -73,11 +71,8 @@ def run(options: argparse.Namespace, config: Everything) -> int:
             "stop: name at least one recording: start `t2 record` on the robot, drive and stop"
         )
     result = Result(*read(options.files), config.safety, SENSING_S)
-    if wants_json(options):
-        output.line(as_json(result))
-    else:
-        rows = [as_cells(result, n) for n in range(len(result.stops))]
-        print(output.table(HEAD, rows), "", *verdict(result), sep="\n", flush=True)
+    rows = [as_cells(result, n) for n in range(len(result.stops))]
+    print(output.table(HEAD, rows), "", *verdict(result), sep="\n", flush=True)
     return 0 if result.passed else 1
 
 
@@ -132,20 +127,6 @@ def as_cells(result: Result, index: int) -> Sequence[str]:
         f"{result.reckoned(stop):.3f}",
         stop.file,
     )
-
-
-def as_json(result: Result) -> dict[str, Any]:
-    """Return the result as JSON fields; SI units."""
-    return {
-        "stops": [
-            asdict(stop) | {"needed": result.needed(stop), "reckoned": result.reckoned(stop)}
-            for stop in result.stops
-        ],
-        "worst": result.worst,
-        "left_out": dict(result.left_out),
-        "missing": result.missing,
-        "passed": result.passed,
-    }
 
 
 def verdict(result: Result) -> Iterator[str]:

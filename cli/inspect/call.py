@@ -14,7 +14,7 @@ from cli.inspect import output
 from cli.inspect.addressing import chunks, parse_one_key
 from cli.inspect.client import SafetyClient
 from cli.inspect.payload import read
-from cli.inspect.session import add_options, open_session, positive
+from cli.inspect.session import add_options, open_session
 from common import codec, keys
 from common.bus.probe import Answer
 from common.client import reset_request
@@ -38,10 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="""a JSON object, such as '{"bumper_brake": true}'; all defaults if omitted; `echo`,
         and the `causes` of a reset, are those of safety's newest state if omitted""",
     )  # fmt: skip
-    parser.add_argument(
-        "--timeout", type=positive, default=2.0, metavar="S",
-        help="wait for S seconds, 2 by default",
-    )  # fmt: skip
     add_options(parser, every=False)
 
 
@@ -52,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
             (each.path, each.request.__name__, each.reply.__name__, each.what) for each in CALLS
         ]
         things = [dict(zip(HEAD, row, strict=True)) for row in rows]
-        output.rows(things, HEAD, lambda row: list(row.values()), options.output)
+        output.rows(things, HEAD, lambda row: list(row.values()), as_json=options.json)
         return 0
     robot, below = chunks(options.key.strip("/"))
     options.robot = options.robot or robot  # of a whole key
@@ -76,17 +72,17 @@ def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace
         seen = client.fresh_state()
         request = filled(call, request, seen)
     typed = msgspec.convert(request, call.request)
-    answers = client.call(call, typed, options.timeout)
-    show(answers, options.output)
+    answers = client.call(call, typed)
+    show(answers, as_json=options.json)
     if seen and call is keys.RESET and not client.is_reset(seen, answers):
         raise RobotError("not confirmed: safety's state does not show this reset; run `t2 doctor`")
 
 
-def show(answers: list[Answer], form: str) -> None:
+def show(answers: list[Answer], *, as_json: bool) -> None:
     """Print the replies; raise ``RobotError`` with the refusals."""
     for answer in answers:
         if not answer.refusal:
-            output.value(read(answer.payload, answer.encoding).value, form)
+            output.value(read(answer.payload, answer.encoding).value, as_json=as_json)
     if refusals := [answer.refusal for answer in answers if answer.refusal]:
         raise RobotError(f"refused: {' '.join(refusals)}")
 

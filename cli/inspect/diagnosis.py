@@ -1,25 +1,84 @@
-"""Diagnosis from the laptop to the robot's services, from an observation of the bus. Pure.
+"""Diagnosis of the path from the laptop to the wheels, from an observation of the bus. Pure.
 
 A finding is ``ok``, ``note`` (information, no effect), ``wrong``, or ``unknown`` because an earlier
-part of the path is wrong.
+part of the path is wrong. A remedy is an instruction to the operator.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal, TypeVar
 
-from cli.inspect import remedies
 from common import keys
 from common.keys import Topic
-from common.messages import Health, Message
+from common.messages import SONAR_NAMES, Health, Link, Message, Relay
 
 M = TypeVar("M", bound=Message)
 Level = Literal["ok", "note", "wrong", "unknown"]
 
 NEEDED = ("bridge", "safety", "odom")
+STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOMETRY)
+ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
 SPREAD_S = 0.2  # delay variation; half of safety's limit for the delay of a request
+
+START = "on the robot: `t2 up`, or start this service; if its process exists, it hangs: kill it"
+UPDATE = "install the same version on both, and restart the robot's services"
+SILENT = "the board does not send it: check the board; `t2 hz` shows the rate"
+BOARD_LOST = "check the board's power and cable; the link recovers by itself"
+SWITCHES = """t2 call bridge/switches '{"ultrasonic_brake": true, "bumper_brake": true}'"""
+RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"
+BUMPER = "free it; if that is impossible: `t2 drive`, hold F or B, away from it; then reset"
+DRIVER = "switch the vehicle off and on; check what the fault names; then reset"
+LIMIT = "`t2 echo safety/state --field limit_sources` shows who limits, and why"
+RELAY = (
+    "is the relay on, its service running, and its cable to the PC connected? board.address and "
+    "board.relay_port must be the relay's (docs/relay.md); without a relay set relay_port = 0"
+)
+RELAY_BRAKES = {
+    "start": "it waits for a neutral command: is the bridge running?",
+    "silent": "it lost the commands of the PC: check the cable and the load of both computers",
+    "hit": "it waits for the bridge's answer to a bumper hit: is the bridge running?",
+}
+SONARS = {
+    "fault": ("is faulty", "check its cable; it blocks its sector until it measures"),
+    "too_near": ("is covered: an object is below its minimum range", "remove the object"),
+}
+FAULTS = {
+    "over_current": "over-current: a wheel is blocked",
+    "over_voltage": "over-voltage",
+    "encoder": "invalid encoder signal: the encoder's cable",
+    "under_voltage": "under-voltage: the battery",
+    "overload": "overload for too long",
+}
+# By the names of safety's causes, where its text does not contain the remedy.
+CAUSES = {
+    "contact": BUMPER,
+    "estop_reader": f"safety had lost the router; {RESET}",
+    "estop_keepalive": f"start its pendant, page or `t2 estop --keepalive NAME`; {RESET}",
+    "runaway": f"check the wheels and the ground; {RESET}",
+    "uncommanded_motion": f"check for a push or a slope; {RESET}",
+    "not_stopping": "use the switch on the vehicle; then check its brakes and the ground",
+    "driver_left": DRIVER,
+    "driver_right": DRIVER,
+    "flapping": f"find the input that is intermittent (t2 echo evt/safety); {RESET}",
+    "leaving": START,
+    "starting": "wait; if it lasts, see the sensors above",
+    "link": BOARD_LOST,
+    "switches": SWITCHES,
+    "bumper": SILENT,
+    "bumper_lossy": "check the cable and the board's load: t2 echo tel/bridge/bumper",
+    "silent": SILENT,
+    "unarmed": "see the link above: the bridge reports what it waits for",
+    "limit_stop": f"clear the area; then release the controls and drive; {LIMIT}",
+    "limit_silent": "start its program, check its network and certificate; see safety.limits",
+    "two_publishers": "stop one of the two programs; `t2 ls --services` lists them",
+    "blocked": "drive another way, or remove the obstacle",
+    "limit": LIMIT,
+    "sonar": SONARS["fault"][1],
+}
+# Causes of normal operation, with or without a driver.
+NORMAL = ("release", "neutral", "obstacle", "blocked", "limit", "limit_stop")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +108,6 @@ class Observation:
     undecodable: dict[str, str] = field(default_factory=dict)  # reason by path
     first: dict[str, Message] = field(default_factory=dict)  # message by path
     newest: dict[str, Message] = field(default_factory=dict)  # message by path
-    ros_tokens: list[str] = field(default_factory=list)  # of all nodes of ROS 2
-    ros_place: tuple[int, str] | None = None  # domain and namespace of the gateway
 
     def add(self, path: str, message: Message) -> None:
         """Add a message."""
@@ -73,6 +130,21 @@ class Observation:
         return next((hz for key, hz in rates.items() if key.endswith(f"/{path}")), 0.0)
 
 
+def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
+    """Return all findings from the router to the wheels, and safety's state last."""
+    yield from router(seen)
+    if not seen.instances and seen.others:
+        text = f"no service of robot {name} is here; the router knows {', '.join(seen.others)}"
+        todo = "is it switched on, and its stack started? Otherwise correct --robot or robot.id"
+        yield Finding("robot", "wrong", text, todo)
+        return
+    for check in (services, versions, rights, clock, board, safety):
+        yield from check(seen)
+
+
+# --- from the laptop to the services --------------------------------------------------------------
+
+
 def router(seen: Observation) -> Iterator[Finding]:
     """Report the router's version."""
     if not seen.routers:
@@ -82,14 +154,7 @@ def router(seen: Observation) -> Iterator[Finding]:
             yield Finding("router", "ok", f"Zenoh {version}, as on this laptop")
         else:
             text = f"Zenoh {version}, on this laptop {seen.zenoh}"
-            yield Finding("router", "note", text, remedies.UPDATE)
-
-
-def robot(seen: Observation, name: str) -> Iterator[Finding]:
-    """Report a robot without any service, while other robots are at the same router."""
-    if not seen.instances and seen.others:
-        text = f"no service of robot {name} is here; the router knows {', '.join(seen.others)}"
-        yield Finding("robot", "wrong", text, remedies.NO_ROBOT)
+            yield Finding("router", "note", text, UPDATE)
 
 
 def services(seen: Observation) -> Iterator[Finding]:
@@ -98,15 +163,17 @@ def services(seen: Observation) -> Iterator[Finding]:
     for name in sorted({*NEEDED, *seen.instances}):
         count, health = seen.instances.get(name, 0), healths.get(name)
         if not count:
-            yield Finding("services", "wrong", f"{name} is not running", remedies.START)
+            yield Finding("services", "wrong", f"{name} is not running", START)
         elif count > 1 and name in NEEDED:
-            yield Finding("services", "wrong", f"{name} is running {count} times", remedies.TWICE)
+            todo = "stop one of them: a robot has one of each; look for a second `t2 up`"
+            yield Finding("services", "wrong", f"{name} is running {count} times", todo)
         elif not health:
             text = f"{name} is running and publishes no health: it hangs"
-            yield Finding("services", "wrong", text, remedies.HANGS)
+            todo = "kill its process; its supervisor restarts it"
+            yield Finding("services", "wrong", text, todo)
         elif health.lateness > LATE_S:
             text = f"{name} stalls for up to {health.lateness:.2f} s"
-            yield Finding("services", "note", text, remedies.STALLS)
+            yield Finding("services", "note", text, "find the processes that use its CPU")
         else:
             yield Finding("services", "ok", f"{name} is up for {health.uptime:.0f} s")
 
@@ -117,27 +184,29 @@ def versions(seen: Observation) -> Iterator[Finding]:
     other = {name: h.version for name, h in healths.items() if h.version != seen.t2}
     for name, version in sorted(other.items()):
         text = f"{name} is T2 {version}, this laptop {seen.t2}"
-        yield Finding("versions", "note", text, remedies.UPDATE)
+        yield Finding("versions", "note", text, UPDATE)
     if healths and not other:
         yield Finding("versions", "ok", f"T2 {seen.t2} everywhere")
     for path, reason in sorted(seen.undecodable.items()):
-        yield Finding("versions", "wrong", f"{path}: {reason}", remedies.UNDECODABLE)
+        todo = "a publisher with another version, or a foreign program"
+        yield Finding("versions", "wrong", f"{path}: {reason}", todo)
 
 
 def rights(seen: Observation) -> Iterator[Finding]:
     """Report what the router allows this laptop to do."""
+    allowed = {"driving": seen.may_drive, "calls": seen.may_call}
+    barred = [name for name, may in allowed.items() if may is False]
     if not seen.instances:
         text = "no service found, or the router's list lacks this certificate"
         yield Finding("rights", "unknown", text)
-        return
-    if not seen.rates:
-        yield Finding("rights", "wrong", "services run, but no message arrives", remedies.BLIND)
-        return
-    allowed = {"driving": seen.may_drive, "calls": seen.may_call}
-    barred = [name for name, may in allowed.items() if may is False]
-    if barred:
+    elif not seen.rates:
+        text = "services run, but no message arrives"
+        todo = "the router's access rules do not allow this laptop to read: use another certificate"
+        yield Finding("rights", "wrong", text, todo)
+    elif barred:
         text = f"this laptop may read; safety does not receive its {' and '.join(barred)}"
-        yield Finding("rights", "note", text, remedies.RIGHTS)
+        todo = "the emergency stop may be allowed; `t2 keys list` shows its certificate's role"
+        yield Finding("rights", "note", text, todo)
     elif None in allowed.values():
         yield Finding("rights", "unknown", "driving and calls require safety")
     else:
@@ -152,18 +221,156 @@ def clock(seen: Observation) -> Iterator[Finding]:
     least, most = min(seen.delays_s), max(seen.delays_s)
     if most - least > SPREAD_S:
         text = f"messages take up to {most - least:.2f} s longer than the fastest"
-        yield Finding("clock", "note", text, remedies.SLOW_LINK)
+        todo = "move closer to the access point; safety refuses requests with too high a delay"
+        yield Finding("clock", "note", text, todo)
     if seen.one_clock:
         yield Finding("clock", "ok", "the robot runs on this host")
     elif abs(least) > CLOCK_S:
         side = "behind" if least < 0 else "ahead of"
         text = f"this laptop's clock is {abs(least):.1f} s {side} the robot's"
-        yield Finding("clock", "note", text, remedies.CLOCK)
+        todo = "synchronize both clocks with NTP; driving does not need it, recordings do"
+        yield Finding("clock", "note", text, todo)
     else:
         yield Finding("clock", "ok", f"clocks agree to {abs(least) * 1000:.0f} ms")
 
 
-def diagnose_bus(seen: Observation) -> Iterator[Finding]:
-    """Return all findings between the router and the services."""
-    for check in (router, services, versions, rights, clock):
+# --- from the bridge to the wheels ----------------------------------------------------------------
+
+
+def board(seen: Observation) -> Iterator[Finding]:
+    """Report everything behind the bridge."""
+    now = seen.of(keys.LINK)
+    if now is None:
+        yield Finding("link", "unknown", "no bridge reports the board")
+        return
+    yield from relay(now.relay, seen.t2)
+    yield from link(now, seen.first[keys.LINK.path])
+    if now.state != "up":
+        yield Finding("sensors", "unknown", "no sensor data without the board")
+        return
+    for check in (switches, streams, sensors, drivers):
         yield from check(seen)
+
+
+def relay(now: Relay | None, t2: str) -> Iterator[Finding]:
+    """Report a configured relay; ``t2`` is the version of this laptop."""
+    if now is None:
+        return
+    if now.state != "up":
+        text = "the relay is silent" if now.state == "lost" else "no report of the relay received"
+        yield Finding("relay", "wrong", text, RELAY)
+    elif now.braking:
+        todo = RELAY_BRAKES.get(now.braking, "")
+        yield Finding("relay", "wrong", f"the relay sends BRAKE: {now.braking}", todo)
+    else:
+        yield Finding("relay", "ok", f"the relay passes commands, up for {now.uptime:.0f} s")
+    if now.version not in ("", t2):
+        text = f"the relay is T2 {now.version}, this laptop {t2}"
+        todo = "copy services/relay of this version to the relay (docs/relay.md)"
+        yield Finding("relay", "note", text, todo)
+
+
+def link(now: Link, before: Message) -> Iterator[Finding]:
+    """Report the link to the board, with rejected and unsent frames since ``before``."""
+    if now.state == "never":
+        todo = (
+            "is the board on, its cable connected, and this robot's address the one that it sends "
+            "to (board.listen_address; 10.7.5.220 on the vehicle)?"
+        )
+        yield Finding("link", "wrong", f"no frame received from the board at {now.board}", todo)
+        return
+    if now.state == "lost":
+        yield Finding("link", "wrong", f"the board at {now.board} is silent", BOARD_LOST)
+        return
+    earlier = before if isinstance(before, Link) else now
+    new = {reason: n - earlier.rejected.get(reason, 0) for reason, n in now.rejected.items()}
+    if bad := ", ".join(f"{n} {reason}" for reason, n in new.items() if n > 0):
+        text = f"the bridge rejects frames of the board: {bad}"
+        todo = "`t2 wire decode` shows the invalid frames; see wire.crc"
+        yield Finding("link", "note", text, todo)
+    if (unsent := now.send_errors - earlier.send_errors) > 0:
+        text = f"the system failed to send {unsent} datagrams to the board"
+        todo = "check the robot's network interface, its firewall and board.address"
+        yield Finding("link", "wrong", text, todo)
+    round_trip = "" if now.round_trip is None else f", answers in {now.round_trip * 1000:.1f} ms"
+    yield Finding("link", "ok", f"the board at {now.board} is up{round_trip}")
+    if not now.armed:
+        yield Finding("link", "note", f"the bridge accepts no motion now: {now.waiting}")
+
+
+def switches(seen: Observation) -> Iterator[Finding]:
+    """Report the board's own emergency brakes."""
+    echo = seen.of(keys.SWITCHES)
+    positions = {
+        "ultrasonic": echo and echo.ultrasonic_brake,
+        "bumper": echo and echo.bumper_brake,
+    }
+    for name, on in positions.items():
+        if not on:
+            text = f"the board's {name} brake is {'off' if on is False else 'not confirmed'}"
+            yield Finding("switches", "wrong", text, SWITCHES)
+    if all(positions.values()):
+        yield Finding("switches", "ok", "both emergency brakes of the board are on")
+
+
+def streams(seen: Observation) -> Iterator[Finding]:
+    """Report streams that are slow at their publisher, or do not arrive here.
+
+    A router downsamples streams for laptops, so their rate here is no evidence.
+    """
+    for topic in STREAMS:
+        rate, sent_hz = seen.rates.get(topic.path, 0.0), seen.sent_hz(topic.path)
+        if max(rate, sent_hz) < ENOUGH * topic.rate_hz:
+            level: Level = "note" if rate else "wrong"
+            text = f"{topic.path} has {rate:.0f} of {topic.rate_hz:g} Hz"
+            yield Finding("sensors", level, text, SILENT)
+        elif not rate:
+            text = f"{topic.path} is sent with {sent_hz:.0f} Hz and does not arrive here"
+            todo = "the network or the router drops it: move closer to the access point"
+            yield Finding("sensors", "wrong", text, todo)
+
+
+def sensors(seen: Observation) -> Iterator[Finding]:
+    """Report the bumper, and each untrusted sonar."""
+    if bumper := seen.of(keys.BUMPER):
+        if bumper.pressed:
+            yield Finding("bumper", "wrong", "the bumper is pressed", BUMPER)
+        else:
+            yield Finding("bumper", "ok", "the bumper is free")
+    if ultrasonic := seen.of(keys.ULTRASONIC):
+        statuses = zip(SONAR_NAMES, ultrasonic.status, strict=True)
+        bad = [(name, SONARS[status]) for name, status in statuses if status in SONARS]
+        for name, (text, todo) in bad:
+            yield Finding("sonar", "wrong", f"the {name.replace('_', ' ')} sonar {text}", todo)
+        if not bad:
+            yield Finding("sonar", "ok", "all eight sonars measure")
+
+
+def drivers(seen: Observation) -> Iterator[Finding]:
+    """Report the motor drivers' faults."""
+    for side in ("left", "right"):
+        driver = seen.of(keys.DRIVER, side=side)
+        if driver and not driver.faults:
+            yield Finding("drivers", "ok", f"the {side} motor driver reports no fault")
+        for fault in driver.faults if driver else ():
+            meaning = FAULTS.get(fault, "not documented in the manual")
+            text = f"the {side} motor driver reports {fault}: {meaning}"
+            yield Finding("drivers", "wrong", text, DRIVER)
+
+
+def safety(seen: Observation) -> Iterator[Finding]:
+    """Report the causes in safety's state, with safety's texts."""
+    state = seen.of(keys.SAFETY)
+    if state is None:
+        yield Finding("safety", "unknown", "safety publishes no state")
+        return
+    for cause in state.causes:
+        latched = cause.name in state.latched
+        level: Level = "note" if cause.name in NORMAL else "wrong"
+        if cause.name == "no_request":
+            level = "ok"
+        todo = CAUSES.get(cause.name, RESET if latched else "")
+        text = f"{cause.text} ({cause.action}{', latched' * latched})"
+        yield Finding("safety", level, text, todo)
+    if not state.causes:
+        yield Finding("safety", "ok", state.text)

@@ -1,8 +1,7 @@
 """``t2 doctor``: diagnosis of the path from this laptop to the wheels, with remedies.
 
 It checks in the order of a request's path: network, router, services, versions, rights, clock,
-board, switches, sensors, drivers, safety, nodes of ROS 2. It only listens and queries; it changes
-nothing.
+board, switches, sensors, drivers, safety. It only listens and queries; it changes nothing.
 """
 
 import argparse
@@ -15,13 +14,11 @@ from dataclasses import asdict, replace
 from importlib.metadata import version
 from pathlib import Path
 
-from cli.inspect import diagnosis, output, remedies
+from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
-from cli.inspect.diagnosis import Finding, Observation, diagnose_bus
+from cli.inspect.diagnosis import NEEDED, Finding, Observation, diagnose
 from cli.inspect.payload import read
-from cli.inspect.ros_graph import diagnose_ros, place
-from cli.inspect.session import add_duration, add_options, settings, until_interrupt, wants_json
-from cli.inspect.vehicle import diagnose_vehicle
+from cli.inspect.session import add_duration, add_options, settings, until_interrupt
 from common import keys
 from common.bus.probe import Probe, probe
 from common.bus.publisher import host_id
@@ -31,16 +28,19 @@ from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
 from common.settings import BusSettings, Shared
 from common.text import printable
-from services.ros2 import names
 
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
 CONNECT_S = 2.0
-ROS_S = 1.0  # a router that denies the query does not answer
 ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
 STREAMS = ("tcp", "tls", "ws")
 ROUTER = "@/*/*"
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
-TONES = {"ok": "good", "note": "note", "wrong": "bad"}
+KEYS = "`t2 keys list` shows the validity of certificates; renew it and copy its folder here again"
+REFUSED = (
+    "on the robot: is `t2 up` running? By default the router listens on its own host only; "
+    "docs/security.md explains how to open it for laptops"
+)
+NO_ROUTE = "join the robot's Wi-Fi; then --set bus.connect=tcp/ROBOT:7447 with the robot's address"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,12 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print all findings; return 1 if something is wrong."""
-    as_json = wants_json(options)
     wrong = 0
     for finding in findings(settings(options), options.duration):
         wrong += finding.level == "wrong"
-        output.line(asdict(finding)) if as_json else print(as_text(finding), flush=True)
-    if not as_json:
+        output.line(asdict(finding)) if options.json else print(as_text(finding), flush=True)
+    if not options.json:
         print(f"\n{wrong or 'No'} problem{'s' * (wrong != 1)} found.")
     return 1 if wrong else 0
 
@@ -75,26 +74,20 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
             seen = observe(opened, config.robot.id, seconds)
     except LinkError:
         text = "the endpoint accepts connections but is not a router"
-        yield Finding("router", "wrong", text, remedies.NOT_A_ROUTER)
+        todo = "it hangs, requires TLS, or is not a router: restart it, or correct bus.connect"
+        yield Finding("router", "wrong", text, todo)
         return
-    other = list(diagnosis.robot(seen, config.robot.id))
-    if other:
-        yield from diagnosis.router(seen)
-        yield from other
-        return
-    yield from diagnose_bus(seen)
-    yield from diagnose_vehicle(seen)
-    yield from diagnose_ros(seen)
+    yield from diagnose(seen, config.robot.id)
 
 
 def connect(endpoint: str, bus: BusSettings) -> Finding:
     """Connect to one endpoint with a plain socket, to find problems below Zenoh."""
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]
-    trouble, todo, took_s = "", remedies.KEYS, 0.0
+    trouble, todo, took_s = "", KEYS, 0.0
     if protocol == "unixsock-stream":
         trouble = "" if Path(address).exists() else "the socket file is missing"
-        todo = remedies.NO_SOCKET
+        todo = "the router creates this file: start it, or correct bus.connect"
     elif protocol not in STREAMS:
         return Finding("network", "unknown", f"{endpoint} cannot be tested by itself")
     else:
@@ -116,12 +109,12 @@ def explain(error: OSError, host: str) -> tuple[str, str]:
     """Return problem and remedy of a failed connection."""
     match error:
         case socket.gaierror():
-            return f"unknown host name {host}", remedies.NO_NAME
+            return f"unknown host name {host}", "use a numeric address, or correct bus.connect"
         case ConnectionRefusedError():
-            return "connection refused: the host is up, but nothing listens", remedies.REFUSED
+            return "connection refused: the host is up, but nothing listens", REFUSED
         case TimeoutError():
-            return "no answer", remedies.NO_ROUTE
-    return (error.strerror or str(error)).lower(), remedies.NO_ROUTE
+            return "no answer", NO_ROUTE
+    return (error.strerror or str(error)).lower(), NO_ROUTE
 
 
 def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
@@ -157,22 +150,12 @@ def observe(opened: Probe, robot: str, seconds: float) -> Observation:
     present = [chunks(token) for token in opened.alive(keys.live_key("*", "*", "*"))]
     running = [(name, path.split("/")[1]) for name, path in present]
     seen.instances = Counter(service for name, service in running if name == robot)
-    on_board = {name for name, service in running if service in diagnosis.NEEDED}
+    on_board = {name for name, service in running if service in NEEDED}
     seen.others = sorted(on_board - {robot})
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
         seen.may_call = opened.has_server(keys.RESET.on(robot))
-    seen.ros_tokens = opened.alive(f"{names.LIVELINESS}/**", ROS_S)
-    if "ros2" in seen.instances:
-        seen.ros_place = ros_place(opened, robot)
     return seen
-
-
-def ros_place(opened: Probe, robot: str) -> tuple[int, str] | None:
-    """Return the domain and the namespace that the gateway uses; None without its answer."""
-    answers = opened.query(keys.info_key(robot, "ros2", "config"))
-    found = (place(read(answer.payload, answer.encoding).value) for answer in answers)
-    return next((each for each in found if each), None)
 
 
 def listen(opened: Probe, robot: str, seconds: float, seen: Observation) -> None:
@@ -206,6 +189,5 @@ def add_sample(sample: Sample, seen: Observation, host: int) -> None:
 
 def as_text(finding: Finding) -> str:
     """Return a finding as text, with its remedy on a second line."""
-    mark = output.painted(f"{MARKS[finding.level]:6}", TONES.get(finding.level, ""))
-    text = f"{finding.where:9} {mark} {printable(finding.text)}"
+    text = f"{finding.where:9} {MARKS[finding.level]:6} {printable(finding.text)}"
     return f"{text}\n{'':17}-> {printable(finding.todo)}" if finding.todo else text

@@ -14,7 +14,7 @@ import msgspec
 from cli.inspect import output
 from cli.inspect.addressing import chunks, decode
 from cli.inspect.diagnosis import LATE_S, NEEDED
-from cli.inspect.session import BusSession, add_options, open_session, wants_json
+from cli.inspect.session import BusSession, add_options, open_session
 from common import keys
 from common.errors import MessageError
 from common.messages import Durations, Health
@@ -57,29 +57,21 @@ def run(options: argparse.Namespace) -> int:
             rows = query(session, options.service)
         else:
             rows = listen_to_all(session)
-    return show(rows, in_json=wants_json(options))
+    return show(rows, as_json_lines=options.json)
 
 
-def show(rows: list[Row], *, in_json: bool) -> int:
+def show(rows: list[Row], *, as_json_lines: bool) -> int:
     """Print the services; return 1 if one is unhealthy."""
-    if in_json:
+    if as_json_lines:
         for row in rows:
             output.line(as_json(row))
     else:
-        head, *lines = output.table(HEAD, list(map(as_cells, rows))).splitlines()
-        painted = (output.painted(line, tone(row)) for line, row in zip(lines, rows, strict=True))
-        print("\n".join([head, *painted, *reaction_lines(rows)]), flush=True)
+        table = output.table(HEAD, list(map(as_cells, rows)))
+        print("\n".join([table, *reaction_lines(rows)]), flush=True)
     unhealthy = [row for row in rows if row.state != "ok"]
     for row in unhealthy:
         output.warn(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}")
     return 1 if unhealthy else 0
-
-
-def tone(row: Row) -> str:
-    """Return the tone of a service's line."""
-    if row.state != "ok":
-        return "bad"
-    return "note" if row.health and row.health.lateness > LATE_S else "good"
 
 
 def query(session: BusSession, name: str) -> list[Row]:
@@ -124,9 +116,7 @@ def listen_to_all(session: BusSession) -> list[Row]:
 
 def as_json(row: Row) -> dict[str, Any]:
     """Return one service as a JSON object."""
-    fields = msgspec.structs.asdict(row.health) if row.health else {}
-    if row.health:
-        fields["reactions"] = {name: figures(each) for name, each in row.health.reactions.items()}
+    fields = msgspec.to_builtins(row.health) if row.health else {}
     alive, has_health = row.state in ("ok", "hangs"), row.health is not None
     return {"robot": row.robot, "service": row.name, "alive": alive, "told": has_health} | fields
 
@@ -162,17 +152,6 @@ def reaction_lines(rows: list[Row]) -> list[str]:
         for name, each in row.health.reactions.items()
         if any(each.counts)
     ]
-
-
-def figures(durations: Durations) -> dict[str, Any]:
-    """Return count, quantiles and worst in s; None without any."""
-    known = any(durations.counts)
-    return {
-        "count": sum(durations.counts),
-        "p50": quantile(durations, 0.5) if known else None,
-        "p99": quantile(durations, 0.99) if known else None,
-        "worst": durations.worst if known else None,
-    }
 
 
 def quantile(durations: Durations, part: float) -> float:

@@ -10,20 +10,12 @@ import time
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, expression, short
-from cli.inspect.session import (
-    BusSession,
-    add_end,
-    add_options,
-    open_session,
-    until_interrupt,
-    whole,
-)
-from cli.inspect.stream_stats import StreamStats, stream_sample
+from cli.inspect.session import BusSession, add_end, add_options, open_session, until_interrupt
+from cli.inspect.stream_stats import StreamStats
 from common.bus.publisher import host_id
 from common.errors import RobotError
 
 REPORT_S = 1.0
-WINDOW = 10_000
 HEAD = ("key", "Hz", "gap ms: min", "max", "lost", "kB/s", "bytes", "delay ms: p50", "p99", "max",
         "clock")  # fmt: skip
 
@@ -31,9 +23,6 @@ HEAD = ("key", "Hz", "gap ms: min", "max", "lost", "kB/s", "bytes", "delay ms: p
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     add_key(parser)
-    parser.add_argument(
-        "--window", "-w", type=whole, default=WINDOW, metavar="N", help="of the last N samples"
-    )
     add_end(parser)
     add_options(parser)
 
@@ -56,33 +45,29 @@ def follow(
 ) -> None:
     """Measure and report until the duration or the count is reached."""
     host = host_id()
-    begun_s = reported_s = time.monotonic()
-    end_s = begun_s + (options.duration or float("inf"))
-    silent = True
+    reported_s = time.monotonic()
+    end_s = reported_s + (options.duration or float("inf"))
+    new = 0  # since the last report
     while (now_s := time.monotonic()) < end_s:
-        sample = session.probe.take(min(end_s, reported_s + REPORT_S) - now_s)
-        if sample:
-            silent = False
+        if sample := session.probe.take(min(end_s, reported_s + REPORT_S) - now_s):
+            new += 1
             key = short(sample.key, session.robot)
-            streams.setdefault(key, StreamStats(options.window)).add(stream_sample(sample, host))
-            if options.count and sum(each.count for each in streams.values()) >= options.count:
+            streams.setdefault(key, StreamStats(host)).add(sample)
+            if sum(each.count for each in streams.values()) == options.count:
                 break
         if time.monotonic() - reported_s >= REPORT_S:
             reported_s += REPORT_S
-            if silent:
-                output.warn("t2 hz: no new messages")
-            else:
-                report(streams, options)
-            silent = True
-    if not silent:
+            report(streams, options) if new else output.warn("t2 hz: no new messages")
+            new = 0
+    if new:
         report(streams, options)
 
 
 def report(streams: dict[str, StreamStats], options: argparse.Namespace) -> None:
     """Print the figures of every key."""
     rows = [{"key": key, **stats.figures()} for key, stats in sorted(streams.items())]
-    output.rows(rows, HEAD, as_cells, options.output)
-    if options.output != "json":
+    output.rows(rows, HEAD, as_cells, as_json=options.json)
+    if not options.json:
         print(flush=True)
 
 

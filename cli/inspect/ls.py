@@ -1,59 +1,38 @@
-"""``t2 ls``: the active keys with type, rate, publishers and readers; ``--services``: the services.
+"""``t2 ls``: the active keys with type and rate; ``--services``: what each session declares.
 
-A key is active if a message arrives on it while the command listens, or if a publisher is declared.
-Keys that begin with ``@`` are missing from the router's lists: their publishers are known by their
-messages, and of their readers only that one exists.
+A key is active if a message arrives on it while the command listens. The sessions come from
+liveliness tokens and from the router's admin space, which lists the sessions that have declared a
+key. A session without a token (a tool, safety's session for the emergency stop) has a part of its
+id for a name. The admin space omits keys that begin with ``@`` (eclipse-zenoh 1.10.2).
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, add_key, chunks, expression, short, topic_of
-from cli.inspect.members import Member, by_boot, discover, title
+from cli.inspect.payload import read
 from cli.inspect.session import (
     BusSession,
     add_duration,
     add_options,
     open_session,
     until_interrupt,
-    wants_json,
 )
-from cli.inspect.stream_stats import StreamStats, stream_sample
-from common import codec
-from common.bus.probe import Probe, intersects
-from common.codec import Sample
+from cli.inspect.stream_stats import StreamStats
+from common import codec, keys
+from common.bus.probe import Probe
 from common.errors import RobotError
 from common.text import printable
 
 LISTEN_S = 2.0  # two periods of the slowest streams
-WINDOW = 10_000
-NO_STREAMS = ("live/", "info/", "srv/")  # tokens and calls
-UNLISTED = "@cmd/"  # keys that the router does not list
-SOMEONE = "?"
-HEAD = ("key", "type", "Hz", "of", "publishers", "readers")
-CLOSED = "the router does not show readers and publishers (its admin space is closed)"
-
-
-@dataclass(slots=True)
-class Stream:
-    """One key with its type, rate, publishers and readers."""
-
-    kind: str = ""
-    stats: StreamStats = field(default_factory=lambda: StreamStats(WINDOW))
-    boots: set[int] = field(default_factory=set)
-    publishers: set[str] = field(default_factory=set)
-    readers: set[str] = field(default_factory=set)
-
-    def add(self, sample: Sample) -> None:
-        """Add a sample."""
-        measured = stream_sample(sample, 0)
-        self.stats.add(measured)
-        self.kind = codec.kind_of(sample.encoding) or self.kind
-        if measured.boot:
-            self.boots.add(measured.boot)
+HEAD = ("key", "type", "Hz", "of")
+ROLES = {"publisher": "publishes", "subscriber": "reads", "queryable": "answers"}
+ZENOH_OWN = "@adv"  # declarations of Zenoh itself below a key
+# The router of a robot that connects to a site's router is a peer there.
+ADMIN = "@/*/*/*/t2/v1/{robot}/**"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,89 +50,37 @@ def run(options: argparse.Namespace) -> int:
     with open_session(options) as session:
         if options.services:
             return list_services(session, options)
-        words = [options.key] if options.key else EVERYTHING
-        wanted = [expression(word, session.robot) for word in words]
-        streams = listen(session.probe, wanted, options.duration)
-        found = discover(session.probe, session.robot)
-        add_publishers(streams, found, wanted)
-        add_readers(streams, found, session.probe)
+        return list_keys(session, options)
+
+
+# --- keys -----------------------------------------------------------------------------------------
+
+
+def list_keys(session: BusSession, options: argparse.Namespace) -> int:
+    """List the keys on which messages arrive."""
+    words = [options.key] if options.key else EVERYTHING
+    wanted = [expression(word, session.robot) for word in words]
+    streams: dict[str, StreamStats] = {}
+    kinds: dict[str, str] = {}
+    for each in wanted:
+        session.probe.listen(each)
+    with until_interrupt():
+        for sample in session.probe.samples(options.duration):
+            streams.setdefault(sample.key, StreamStats()).add(sample)
+            kinds[sample.key] = codec.kind_of(sample.encoding)
     if not streams:
         raise RobotError(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
-    warn_if_closed(found)
-    rows = [as_json(key, streams[key], session.robot) for key in sorted(streams)]
-    output.rows(rows, HEAD, as_cells, options.output)
-    return 0
-
-
-def listen(probe: Probe, wanted: list[str], seconds: float) -> dict[str, Stream]:
-    """Return the streams that arrive on these keys."""
-    streams: dict[str, Stream] = {}
-    for each in wanted:
-        probe.listen(each)
-    with until_interrupt():
-        for sample in probe.samples(seconds):
-            streams.setdefault(sample.key, Stream()).add(sample)
-    return streams
-
-
-def add_publishers(streams: dict[str, Stream], found: list[Member], wanted: list[str]) -> None:
-    """Add the publishers, and the declared keys on which no message arrived."""
-    boots = by_boot(found)
-    for member in found:
-        for key in member.publishes:
-            is_stream = not chunks(key)[1].startswith(NO_STREAMS) and "*" not in key
-            if is_stream and any(intersects(key, each) for each in wanted):
-                streams.setdefault(key, Stream()).publishers.add(title(member, found))
-    for key, stream in streams.items():
-        stream.publishers |= {title(boots[boot], found) for boot in stream.boots if boot in boots}
+    rows = []
+    for key, stats in sorted(streams.items()):
         topic = topic_of(key)
-        if topic and not stream.kind:
-            stream.kind = topic.message.__name__
-
-
-def add_readers(streams: dict[str, Stream], found: list[Member], probe: Probe) -> None:
-    """Add the readers of each key."""
-    for key, stream in streams.items():
-        if chunks(key)[1].startswith(UNLISTED):
-            stream.readers = {SOMEONE} if probe.has_reader(key) else set()
-            continue
-        for member in found:
-            if any(intersects(key, read) for read in member.reads):
-                stream.readers.add(title(member, found))
-
-
-def list_services(session: BusSession, options: argparse.Namespace) -> int:
-    """List the services; raise ``RobotError`` without any."""
-    found = discover(session.probe, session.robot)
-    if not found:
-        raise RobotError("no service found; try `t2 doctor`")
-    warn_if_closed(found)
-    rows = [service_as_json(each, found, session.robot) for each in found]
-    if wants_json(options):
-        for row in rows:
-            output.line(row)
-    else:
-        print(printable("\n\n".join(map(service_as_text, rows)), "\n"))
+        rows.append({
+            "key": short(key, session.robot),
+            "type": kinds[key],
+            "hz": stats.rate_hz(),
+            "expected_hz": topic.rate_hz if topic else None,
+        })  # fmt: skip
+    output.rows(rows, HEAD, as_cells, as_json=options.json)
     return 0
-
-
-def warn_if_closed(found: Sequence[Member]) -> None:
-    """Warn if the router lists no declaration."""
-    if not any(each.reads or each.publishes for each in found):
-        output.warn(f"t2 ls: {CLOSED}")
-
-
-def as_json(key: str, stream: Stream, robot: str) -> dict[str, Any]:
-    """Return one stream as a JSON object."""
-    topic = topic_of(key)
-    return {
-        "key": short(key, robot),
-        "type": stream.kind,
-        "hz": stream.stats.rate_hz(),
-        "expected_hz": topic.rate_hz if topic else None,
-        "publishers": sorted(stream.publishers),
-        "readers": sorted(stream.readers),
-    }
 
 
 def as_cells(row: output.Row) -> list[str]:
@@ -164,26 +91,92 @@ def as_cells(row: output.Row) -> list[str]:
         row["type"] or "?",
         "-" if hz is None else f"{hz:.1f}",
         "" if expected_hz is None else f"{expected_hz:g}" if expected_hz else "change",
-        ", ".join(row["publishers"]) or "?",
-        ", ".join(row["readers"]) or "-",
     ]
 
 
-def service_as_json(member: Member, found: Sequence[Member], robot: str) -> dict[str, Any]:
-    """Return one session as a JSON object."""
+# --- sessions -------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Member:
+    """One session on the bus with its declared keys; a service has an instance."""
+
+    name: str
+    robot: str = ""
+    instance: str = ""
+    publishes: set[str] = field(default_factory=set)
+    reads: set[str] = field(default_factory=set)
+    answers: set[str] = field(default_factory=set)
+
+
+def list_services(session: BusSession, options: argparse.Namespace) -> int:
+    """List the sessions except this one."""
+    found = discover(session.probe, session.robot)
+    if not found:
+        raise RobotError("no service found; try `t2 doctor`")
+    if not any(each.reads or each.publishes for each in found):
+        output.warn("t2 ls: the router shows no declarations (its admin space is closed)")
+    rows = [as_json(each, session.robot) for each in found]
+    if options.json:
+        for row in rows:
+            output.line(row)
+    else:
+        print(printable("\n\n".join(map(as_text, rows)), "\n"))
+    return 0
+
+
+def discover(probe: Probe, robot: str) -> list[Member]:
+    """Return the services by name, then the other sessions."""
     declared = {
-        "publishes": member.publishes, "reads": member.reads, "answers": member.answers,
-    }  # fmt: skip
-    return {
-        "name": title(member, found),
-        "robot": member.robot,
-        "instance": member.instance,
-        "session": member.zid,
-        **{role: [short(key, robot) for key in sorted(each)] for role, each in declared.items()},
+        each.key: read(each.payload, each.encoding).value
+        for each in probe.query(ADMIN.format(robot=robot))
+        if not each.refusal
+    }
+    return members(probe.alive(keys.live_key(robot, "*", "*")), declared, probe.zid)
+
+
+def members(tokens: Sequence[str], declared: Mapping[str, Any], own: str) -> list[Member]:
+    """Return the members of liveliness tokens and of the admin space, without ``own``."""
+    named = {}
+    for token in tokens:
+        robot, path = chunks(token)
+        name, _, instance = path.removeprefix("live/").partition("/")
+        named[token] = Member(name, robot, instance)
+    by_zid: dict[str, Member] = {}
+    entries = [_entry(key, value) for key, value in declared.items()]
+    for role, key, zids in entries:
+        if role == "token" and key in named:
+            by_zid |= dict.fromkeys(zids, named[key])
+    for role, key, zids in entries:
+        if role in ROLES and ZENOH_OWN not in key:
+            for zid in zids - {own}:
+                member = by_zid.setdefault(zid, Member(zid[:8]))
+                getattr(member, ROLES[role]).add(key)
+    found = [*named.values(), *(each for each in by_zid.values() if not each.instance)]
+    return sorted(found, key=lambda each: (not each.instance, each.robot, each.name, each.instance))
+
+
+def _entry(key: str, value: Any) -> tuple[str, str, set[str]]:
+    """Return role, key and session ids of one entry ``@/ZID/MODE/ROLE/KEY``.
+
+    All sessions are clients; other entries are routers that declare on behalf of their clients.
+    """
+    parts = key.split("/", 4)
+    if len(parts) < 5 or not isinstance(value, dict):
+        return "", "", set()
+    return parts[3], parts[4], set(value.get("clients") or ())
+
+
+def as_json(member: Member, robot: str) -> dict[str, Any]:
+    """Return one session as a JSON object."""
+    head = {"name": member.name, "robot": member.robot, "instance": member.instance}
+    return head | {
+        role: [short(key, robot) for key in sorted(getattr(member, role))]
+        for role in ROLES.values()
     }
 
 
-def service_as_text(row: dict[str, Any]) -> str:
+def as_text(row: dict[str, Any]) -> str:
     """Return one session as lines; every service answers the keys info/."""
     kind = f"instance {row['instance']}" if row["instance"] else "session without a service"
     lines = [f"{row['name']}  ({kind})"]

@@ -3,7 +3,6 @@
 Every table, value and JSON line of the inspection commands is printed here.
 """
 
-import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -13,7 +12,6 @@ import msgspec
 from common.text import printable
 
 Row = Mapping[str, Any]
-COLOURS = {"good": 32, "note": 33, "bad": 31}  # of a terminal, by ECMA-48
 
 
 def line(thing: object) -> None:
@@ -22,31 +20,25 @@ def line(thing: object) -> None:
     sys.stdout.flush()
 
 
-def painted(text: str, tone: str) -> str:
-    """Return a text in the colour of ``good``, ``note`` or ``bad``, if a terminal shows it.
-
-    ``NO_COLOR`` in the environment turns colours off.
-    """
-    if tone not in COLOURS or not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
-        return text
-    return f"\x1b[{COLOURS[tone]}m{text}\x1b[0m"
-
-
 def warn(text: str) -> None:
     """Print a line to standard error."""
     print(printable(text, "\n"), file=sys.stderr)
 
 
-def value(thing: Any, form: str) -> None:
-    """Print a value as one JSON line, or as lines ``name: value``; ``form`` is that of ``-o``."""
-    line(thing) if form == "json" else print(printable(fields(thing), "\n"), flush=True)
+def value(thing: Any, *, as_json: bool) -> None:
+    """Print a value as one JSON line, or as lines ``name: value``."""
+    line(thing) if as_json else print(printable(fields(thing), "\n"), flush=True)
 
 
 def rows(
-    things: Iterable[Row], head: Sequence[str], cells: Callable[[Row], Sequence[str]], form: str
+    things: Iterable[Row],
+    head: Sequence[str],
+    cells: Callable[[Row], Sequence[str]],
+    *,
+    as_json: bool,
 ) -> None:
     """Print one JSON line per row, or a table whose cells ``cells`` returns."""
-    if form == "json":
+    if as_json:
         for each in things:
             line(each)
     else:

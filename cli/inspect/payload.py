@@ -56,7 +56,8 @@ def at(value: Any, path: str) -> Any:
         elif isinstance(here, list) and part.isdigit() and int(part) < len(here):
             here = here[int(part)]
         else:
-            raise MessageError(f"{path!r} has no field {part!r}; available: {_names(here)}")
+            names = ", ".join(map(str, here)) if isinstance(here, dict) else ""
+            raise MessageError(f"{path!r} has no field {part!r}; available: {names or 'none'}")
     return here
 
 
@@ -72,11 +73,3 @@ def _complaint(value: Any, name: str) -> str:
     except UNREADABLE as error:
         return f"not a {name}: {error}"
     return ""
-
-
-def _names(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(map(str, value)) or "none, it is empty"
-    if isinstance(value, list):
-        return f"0 to {len(value) - 1}" if value else "none, it is empty"
-    return "none, it is a single value"

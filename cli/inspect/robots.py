@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     if not found:
         raise RobotError("no robot found; try `t2 doctor`")
     rows = [as_json(name, found[name]) for name in sorted(found)]
-    output.rows(rows, HEAD, as_cells, options.output)
+    output.rows(rows, HEAD, as_cells, as_json=options.json)
     return 0 if all(each.state for each in found.values() if each.moves) else 1
 
 

@@ -45,17 +45,8 @@ def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
 
 
 def add_output(parser: argparse.ArgumentParser) -> None:
-    """Add the output format options; the default is the same on a terminal and in a pipe."""
-    parser.add_argument(
-        "-o", "--output", choices=["text", "table", "json"], default="text",
-        help="text (default), table: one line per message where text has several, json: JSON lines",
-    )  # fmt: skip
-    parser.add_argument(
-        "--json", dest="output", action="store_const", const="json", help="the same as -o json"
-    )
-    parser.add_argument(
-        "--text", dest="output", action="store_const", const="text", help="the same as -o text"
-    )
+    """Add the output format option; the default is the same on a terminal and in a pipe."""
+    parser.add_argument("--json", action="store_true", help="print JSON lines instead of text")
 
 
 def one_robot(text: str) -> str:
@@ -76,9 +67,7 @@ def add_duration(parser: argparse.ArgumentParser, default_s: float) -> None:
 def add_end(parser: argparse.ArgumentParser) -> None:
     """Add the options that limit how long a command runs."""
     parser.add_argument("--duration", type=positive, metavar="S", help="end after S seconds")
-    parser.add_argument(
-        "--count", "--times", "-n", "-t", type=whole, metavar="N", help="end after N messages"
-    )
+    parser.add_argument("--count", "-n", type=whole, metavar="N", help="end after N messages")
 
 
 def positive(text: str) -> float:
@@ -95,11 +84,6 @@ def whole(text: str) -> int:
     if number < 1:
         raise argparse.ArgumentTypeError(f"{text} must be 1 or more")
     return number
-
-
-def wants_json(options: argparse.Namespace) -> bool:
-    """Return whether the output format is JSON lines."""
-    return bool(options.output == "json")
 
 
 def settings(options: argparse.Namespace) -> Shared:

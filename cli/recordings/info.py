@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cli.inspect import output
-from cli.inspect.session import add_output, wants_json
+from cli.inspect.session import add_output
 from cli.recordings.timeline import Timeline
 from common.errors import RobotError
 from common.freshness import NS_PER_S
@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
         with open_recording(file) as reader:
             timeline = timeline_of(reader)
         complete = complete and not (reader.cut or reader.damaged)
-        if wants_json(options):
+        if options.json:
             output.line(as_json(reader, timeline))
         else:
             print(*([""] if number else []), printable(as_text(reader, timeline), "\n"), sep="\n")

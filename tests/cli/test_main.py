@@ -56,7 +56,6 @@ def test_help_of_a_command(command: str, capsys: pytest.CaptureFixture[str]) -> 
     ("words", "printed"),
     [
         (["fly"], "unknown command 'fly'; \"t2 --help\" lists the commands"),
-        (["pub"], "no command 'pub' any more; use zenoh-cli (docs/inspect.md)"),
         (["eco", "safety/state"], "unknown command 'eco'; did you mean \"t2 echo\"?"),
         (["up", "--nonsense"], "t2 up: error: unrecognized arguments: --nonsense"),
         (["up", "--nonsense"], "usage: t2 up [-h] [--no-sim]"),

@@ -1,92 +1,129 @@
-"""Diagnosis of an observation: laptop to services."""
+"""Diagnosis of an observation, from the laptop to the wheels."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, get_args
 
 import pytest
+from msgspec.structs import replace
 
-from cli.inspect import remedies
-from cli.inspect.diagnosis import (
-    Finding,
-    Observation,
-    clock,
-    diagnose_bus,
-    rights,
-    robot,
-    router,
-    services,
-    versions,
-)
-from common.messages import Health
+from cli.inspect import diagnosis as d
+from cli.inspect.diagnosis import Finding, Observation, diagnose
+from common import keys
+from common import messages as m
+from services.safety.core.causes import RULES
 from tests.cli.inspect.tool import health
 
-THREE = ("bridge", "safety", "odom")
+CLEAR: Any = ("ok",) * 8
+RATES = {topic.path: topic.rate_hz for topic in d.STREAMS}
+NO_MESSAGE = m.Message()
 Check = Callable[[Observation], Iterator[Finding]]
 
 
-def healths(*messages: Health) -> dict[str, Health]:
+def healths(*messages: m.Health) -> dict[str, m.Message]:
     return {f"tel/{each.service}/health": each for each in messages}
 
 
-def seen(**given: Any) -> Observation:
+def link(state: Any = "up", **given: Any) -> m.Link:
+    healthy: dict[str, Any] = {"board": "10.7.5.224:4002", "epoch": 0, "armed": True, "waiting": "",
+                            "rates": {}, "rejected": {}, "round_trip": 0.002}  # fmt: skip
+    return m.Link(state=state, **(healthy | given))
+
+
+def relay(state: Any = "up", **given: Any) -> m.Link:
+    usual: dict[str, Any] = {"version": "1", "braking": "", "uptime": 60.0, "counters": {}}
+    return link(relay=m.Relay(state=state, **(usual | given)))
+
+
+def state(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
+    texts = {rule.name: (rule.action, rule.text) for rule in RULES}
+    causes = tuple(
+        m.Cause(name=n, action=action, age=1.0, text=text)
+        for n in names
+        for action, text in [texts.get(n, ("stop", n))]
+    )
+    return m.SafetyState(
+        verdict="stop", latched=latched, causes=causes, source=None, heartbeat=1,
+        limits=m.Limits(forward=1, backward=1, angular=1), text="All is well.",
+    )  # fmt: skip
+
+
+def seen(*messages: m.Message, **given: Any) -> Observation:
     """Return the observation of a healthy robot, with the given differences."""
+    side = keys.DRIVER.path.format
+    newest: dict[str, m.Message] = {
+        keys.LINK.path: link(),
+        keys.SWITCHES.path: m.Switches(ultrasonic_brake=True, bumper_brake=True),
+        keys.BUMPER.path: m.Bumper(pressed=False),
+        keys.ULTRASONIC.path: m.Ultrasonic(ranges=(1.0,) * 8, status=CLEAR),
+        side(side="left"): m.Driver(faults=(), bits=0),
+        side(side="right"): m.Driver(faults=(), bits=0),
+        keys.SAFETY.path: state("no_request"),
+        **healths(*map(health, d.NEEDED)),
+    }
+    for message in messages:
+        for path, other in newest.items():
+            if type(other) is type(message):
+                newest[path] = message
+                break
+    newest |= given.pop("newest", {})
     healthy: dict[str, Any] = {
         "zenoh": "1.10.2", "t2": "1", "routers": ["1.10.2"],
-        "instances": dict.fromkeys(THREE, 1), "may_drive": True, "may_call": True,
-        "newest": healths(*map(health, THREE)), "delays_s": [0.01, 0.02],
-        "rates": {"tel/bridge/bumper": 50.0},
+        "instances": dict.fromkeys(d.NEEDED, 1), "may_drive": True, "may_call": True,
+        "newest": newest, "first": newest, "delays_s": [0.01, 0.02], "rates": RATES,
     }  # fmt: skip
     return Observation(**(healthy | given))
 
 
+def problems(observed: Observation) -> list[tuple[str, str, str]]:
+    """Return level, text and remedy of all findings that are not ok."""
+    found = diagnose(observed, "001")
+    return [(each.level, each.text, each.todo) for each in found if each.level != "ok"]
+
+
 def test_a_healthy_robot() -> None:
-    assert {each.level for each in diagnose_bus(seen())} == {"ok"}
+    assert problems(seen()) == []
+    assert problems(seen(state())) == []
 
 
 def test_a_wrong_robot_gets_the_names_of_the_others() -> None:
-    (found,) = robot(seen(instances={}, others=["001", "berlin-2"]), "002")
-    assert (found.level, found.todo) == ("wrong", remedies.NO_ROBOT)
+    *_, found = diagnose(seen(instances={}, others=["001", "berlin-2"]), "002")
+    assert found.level == "wrong"
     assert found.text == "no service of robot 002 is here; the router knows 001, berlin-2"
-    assert not list(robot(seen(others=["002"]), "001"))
-    assert not list(robot(seen(instances={}), "001"))
+    assert "--robot" in found.todo
 
 
 def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
     late = healths(health("safety"), health("odom", lateness=0.3), health("teleop"))
     instances = {"safety": 2, "odom": 1, "mine": 1, "teleop": 2}
-    found = {
-        each.text.split()[0]: each for each in services(seen(instances=instances, newest=late))
-    }
-    assert {name: (each.level, each.todo) for name, each in found.items()} == {
-        "bridge": ("wrong", remedies.START),
-        "safety": ("wrong", remedies.TWICE),
-        "odom": ("note", remedies.STALLS),
-        "mine": ("wrong", remedies.HANGS),
-        "teleop": ("ok", ""),  # any number of a tool may run
-    }
+    observed = seen(instances=instances)
+    observed.newest = late
+    found = {each.text.split()[0]: each for each in d.services(observed)}
+    assert {name: each.level for name, each in found.items()} == {
+        "bridge": "wrong", "safety": "wrong", "odom": "note", "mine": "wrong",
+        "teleop": "ok",  # any number of a tool may run
+    }  # fmt: skip
+    assert found["bridge"].todo == d.START
 
 
 @pytest.mark.parametrize(
     ("check", "given", "expected"),
     [
-        (router, {"routers": ["1.9.0"]}, [("note", "Zenoh 1.9.0, on this laptop 1.10.2")]),
-        (router, {"routers": []}, [("note", "admin space is closed")]),
-        (versions, {"newest": healths(health("bridge", version="0"), health("safety"))},
+        (d.router, {"routers": ["1.9.0"]}, [("note", "Zenoh 1.9.0, on this laptop 1.10.2")]),
+        (d.router, {"routers": []}, [("note", "admin space is closed")]),
+        (d.versions, {"newest": healths(health("bridge", version="0"))},
          [("note", "bridge is T2 0, this laptop 1")]),
-        (versions, {"newest": {}, "undecodable": {"tel/x": "not a Bumper"}},
-         [("wrong", "tel/x: not a Bumper")]),
-        (rights, {}, [("ok", "read, call and drive")]),
-        (rights, {"may_drive": False}, [("note", "does not receive its driving")]),
-        (rights, {"may_drive": False, "may_call": False}, [("note", "driving and calls")]),
-        (rights, {"may_drive": None, "may_call": None}, [("unknown", "require safety")]),
-        (rights, {"instances": {}}, [("unknown", "no service found")]),
-        (rights, {"rates": {}}, [("wrong", "no message arrives")]),
-        (clock, {"delays_s": []}, [("unknown", "no message arrived")]),
-        (clock, {"delays_s": [0.004, 0.05]}, [("ok", "agree to 4 ms")]),
-        (clock, {"delays_s": [5.0]}, [("note", "5.0 s ahead of")]),
-        (clock, {"delays_s": [-5.0]}, [("note", "5.0 s behind")]),
-        (clock, {"delays_s": [0.0, 0.3]}, [("note", "0.30 s longer"), ("ok", "agree")]),
-        (clock, {"one_clock": True}, [("ok", "on this host")]),
+        (d.versions, {"undecodable": {"tel/x": "not a Bumper"}},
+         [("ok", "everywhere"), ("wrong", "tel/x: not a Bumper")]),
+        (d.rights, {"may_drive": False}, [("note", "does not receive its driving")]),
+        (d.rights, {"may_drive": False, "may_call": False}, [("note", "driving and calls")]),
+        (d.rights, {"may_drive": None, "may_call": None}, [("unknown", "require safety")]),
+        (d.rights, {"instances": {}}, [("unknown", "no service found")]),
+        (d.rights, {"rates": {}}, [("wrong", "no message arrives")]),
+        (d.clock, {"delays_s": []}, [("unknown", "no message arrived")]),
+        (d.clock, {"delays_s": [5.0]}, [("note", "5.0 s ahead of")]),
+        (d.clock, {"delays_s": [-5.0]}, [("note", "5.0 s behind")]),
+        (d.clock, {"delays_s": [0.0, 0.3]}, [("note", "0.30 s longer"), ("ok", "agree to 0 ms")]),
+        (d.clock, {"one_clock": True}, [("ok", "on this host")]),
     ],
 )  # fmt: skip
 def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, str]]) -> None:
@@ -94,3 +131,94 @@ def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, s
     assert [each.level for each in found] == [level for level, _ in expected]
     for each, (_, phrase) in zip(found, expected, strict=True):
         assert phrase in each.text
+
+
+@pytest.mark.parametrize(
+    ("message", "expected"),
+    [
+        (m.Bumper(pressed=True), [("wrong", "the bumper is pressed", d.BUMPER)]),
+        (m.Ultrasonic(ranges=(None,) * 3 + (1.0,) * 5,
+                      status=("fault", "too_near", "no_echo", *CLEAR[3:])), [
+            ("wrong", "the left sonar is faulty", d.SONARS["fault"][1]),
+            ("wrong", "the front left sonar is covered: an object is below its minimum range",
+             d.SONARS["too_near"][1])]),
+        (m.Driver(faults=("encoder", "bit_9"), bits=0x204), [
+            ("wrong", "the left motor driver reports encoder: invalid encoder signal: "
+             "the encoder's cable", d.DRIVER),
+            ("wrong", "the left motor driver reports bit_9: not documented in the manual",
+             d.DRIVER)]),
+        (m.Switches(ultrasonic_brake=False, bumper_brake=True),
+         [("wrong", "the board's ultrasonic brake is off", d.SWITCHES)]),
+        (m.Switches(ultrasonic_brake=True),
+         [("wrong", "the board's bumper brake is not confirmed", d.SWITCHES)]),
+        (link(armed=False, waiting="link lost"),
+         [("note", "the bridge accepts no motion now: link lost", "")]),
+        (relay(), []),
+        (relay("lost"), [("wrong", "the relay is silent", d.RELAY)]),
+        (relay("never", version=""), [("wrong", "no report of the relay received", d.RELAY)]),
+        (relay(braking="silent"),
+         [("wrong", "the relay sends BRAKE: silent", d.RELAY_BRAKES["silent"])]),
+        (state("contact", "neutral", latched=("contact",)), [
+            ("wrong", "The bumper was hit. (brake, latched)", d.BUMPER),
+            ("note", "Waiting for a neutral request: release the controls, then drive. (stop)",
+             "")]),
+        (state("smoke", latched=("smoke",)), [("wrong", "smoke (stop, latched)", d.RESET)]),
+        (state("smoke"), [("wrong", "smoke (stop)", "")]),
+    ],
+)  # fmt: skip
+def test_problems(message: m.Message, expected: list[tuple[str, str, str]]) -> None:
+    assert problems(seen(message)) == expected
+
+
+def test_a_relay_of_another_version() -> None:
+    ((level, text, _),) = problems(seen(relay(version="2")))
+    assert (level, text) == ("note", "the relay is T2 2, this laptop 1")
+
+
+@pytest.mark.parametrize("lost", ["never", "lost"])
+def test_without_the_board_its_sensors_are_unknown(lost: str) -> None:
+    reported = problems(seen(link(lost), m.Bumper(pressed=True)))
+    assert [level for level, _, _ in reported] == ["wrong", "unknown"]
+
+
+def test_without_messages_the_rest_is_unknown() -> None:
+    nothing = Observation(zenoh="1", t2="1", instances=dict.fromkeys(d.NEEDED, 1), rates={"x": 1.0})
+    levels = {each.where: each.level for each in diagnose(nothing, "001")}
+    assert (levels["link"], levels["safety"]) == ("unknown", "unknown")
+    left = keys.DRIVER.path.format(side="left")
+    absent = dict.fromkeys((keys.BUMPER.path, keys.ULTRASONIC.path, left), NO_MESSAGE)
+    assert problems(seen(newest=absent)) == []
+
+
+def test_frames_rejected_and_unsent_during_the_observation() -> None:
+    before = link(rejected={"bad_crc": 4, "no_magic": 1}, send_errors=4)
+    now = link(rejected={"bad_crc": 9, "no_magic": 1}, send_errors=7)
+    reported = problems(seen(now, first={keys.LINK.path: before}))
+    assert [(level, text) for level, text, _ in reported] == [
+        ("note", "the bridge rejects frames of the board: 5 bad_crc"),
+        ("wrong", "the system failed to send 3 datagrams to the board"),
+    ]
+    assert problems(seen(now, first={keys.LINK.path: NO_MESSAGE})) == []
+
+
+def test_streams_that_are_slow_missing_or_downsampled() -> None:
+    sent = replace(
+        health("bridge"),
+        rates={f"t2/v1/001/{path}": hz for path, hz in RATES.items() if "mileage" not in path},
+    )
+    rates = RATES | {
+        "tel/bridge/bumper": 0.0, "tel/bridge/mileage": 12.0, "tel/bridge/velocity": 10.0,
+    }  # fmt: skip
+    found = [text for _, text, _ in problems(seen(rates=rates, newest=healths(sent)))]
+    assert found == [
+        "tel/bridge/mileage has 12 of 25 Hz",
+        "tel/bridge/bumper is sent with 50 Hz and does not arrive here",
+    ]  # the velocity is downsampled for this laptop
+    level, text, _ = problems(seen(rates=rates))[-1]
+    assert (level, text) == ("wrong", "tel/bridge/bumper has 0 of 50 Hz")
+
+
+def test_remedies_name_existing_causes_and_faults() -> None:
+    names = {rule.name for rule in RULES}
+    assert names >= d.CAUSES.keys() | {*d.NORMAL}
+    assert d.FAULTS.keys() == set(get_args(m.FaultName))

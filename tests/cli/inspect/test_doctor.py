@@ -1,155 +1,92 @@
-"""``t2 doctor`` on the real stack with injected faults, and without a stack."""
+"""``t2 doctor`` on a real router with simulated services, and without one.
 
-import signal
+On the real stack: ``tests/cli/test_on_stack.py``.
+"""
+
 import socket
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import pytest
 
-from cli.inspect import remedies
+from cli.inspect import doctor
+from cli.inspect.diagnosis import START, Finding
 from cli.inspect.doctor import connect, findings
+from common import keys
+from common.bus.bus import Bus
+from common.messages import Bumper
 from common.settings import BusSettings, Shared
-from sim.requests import Bumper, Freeze, Sonar
-from tests.cli.inspect.tool import Tool
+from tests.cli.inspect.tool import Result, Tool, health, pretend
+from tests.common.bus_fixture import BusFixture
+from tests.factories import safety_state
 from verification.harness.bus import at, router_process
+from verification.harness.certificates import Site, connecting
 from verification.harness.ports import free_port
-from verification.harness.stack import RunningStack, running_stack
-from verification.harness.waiting import wait_until
-
-TRIES_S = 30.0
 
 
-@pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
-    with running_stack(tmp_path_factory.mktemp("doctor")) as it:
-        yield it
-
-
-@pytest.fixture
-def doctor(stack: RunningStack, capsys: pytest.CaptureFixture[str]) -> Callable[[], "list[Any]"]:
-    tool = Tool(stack.endpoint, "001", capsys)
-
-    def diagnose() -> list[Any]:
-        result = tool("doctor", "--duration", "2")
-        assert result.err == ""
-        assert result.code == (1 if wrong(result.lines) else 0)
-        return result.lines
-
-    return diagnose
-
-
-Doctor = Callable[[], "list[Any]"]
-
-
-def wrong(found: list[Any]) -> list[tuple[str, str]]:
+def wrong(result: Result) -> list[tuple[str, str]]:
     """Return places and remedies of the problems."""
-    return [(each["where"], each["todo"]) for each in found if each["level"] == "wrong"]
+    return [(each["where"], each["todo"]) for each in result.lines if each["level"] == "wrong"]
 
 
-def until_wrong(doctor: Doctor, where: str, todo: str) -> list[Any]:
-    """Repeat the diagnosis until it finds the problem; a fault takes time to show."""
-    found: list[Any] = []
-    begin_s = time.monotonic()
-    while (where, todo) not in wrong(found):
-        assert time.monotonic() - begin_s < TRIES_S, found
-        found = doctor()
-    return found
+def test_what_it_observes(buses: BusFixture, tool: Tool) -> None:
+    def safety(bus: Bus) -> None:
+        bus.on_any(keys.DRIVE.on(bus.robot, source="teleop"), lambda _: None)
+        bus.serve(keys.RESET, lambda _, __: None)
 
-
-def until_healthy(doctor: Doctor) -> None:
-    begin_s = time.monotonic()
-    while wrong(found := doctor()):
-        assert time.monotonic() - begin_s < TRIES_S, found
-
-
-def test_a_pressed_bumper_and_a_faulty_sonar(stack: RunningStack, doctor: Doctor) -> None:
-    until_healthy(doctor)
-
-    stack.control.do(Bumper(pressed=True))
-    found = until_wrong(doctor, "bumper", remedies.BUMPER)
-    assert ("safety", remedies.BUMPER) in wrong(found)
-    stack.control.do(Bumper(pressed=False))
-    reset(doctor, stack)
-
-    stack.control.do(Sonar(name="rear_left", fault=True))
-    found = until_wrong(doctor, "sonar", remedies.SONAR_FAULT)
-    assert "the rear left sonar is faulty" in [each["text"] for each in found]
-    stack.control.do(Sonar(name="rear_left"))
-
-
-def reset(doctor: Doctor, stack: RunningStack) -> None:
-    """Reset as the remedy describes, until safety accepts."""
-    from cli.__main__ import main
-
-    where = ["--set", f"bus.connect={stack.endpoint}"]
-    wait_until(lambda: main(["call", "safety/reset", *where]) == 0, "a reset")
-    until_healthy(doctor)
-
-
-def test_a_frozen_board(stack: RunningStack, doctor: Doctor) -> None:
-    stack.control.do(Freeze(seconds=3600.0))
-    found = until_wrong(doctor, "link", remedies.BOARD_LOST)
-    assert any(each["where"] == "sensors" and each["level"] == "unknown" for each in found)
-    stack.control.do(Freeze(seconds=0.0))
-
-
-def test_missing_services_and_their_return(stack: RunningStack, doctor: Doctor) -> None:
-    # The router drops a stopped process, but not one whose loop hangs.
-    stack.processes["odom"].send_signal(signal.SIGSTOP)
-    begin_s = time.monotonic()
-    while not wrong(found := doctor()):
-        assert time.monotonic() - begin_s < TRIES_S, found
-    assert any(each["text"].startswith("odom is") for each in found if each["level"] == "wrong")
-    stack.processes["odom"].send_signal(signal.SIGCONT)
-    stack.processes["bridge"].terminate()
-    stack.processes["bridge"].wait()
-    found = until_wrong(doctor, "services", remedies.START)
-    assert ("link", "unknown") in {(each["where"], each["level"]) for each in found}
-    stack.start("bridge")
-    until_healthy(doctor)
-
-
-# --- without a stack --------------------------------------------------------------------------
+    streams = {keys.BUMPER: lambda: Bumper(pressed=True)}
+    pretend(buses, "bridge", {**streams, keys.HEALTH: partial(health, "bridge")}, service="bridge")
+    pretend(buses, "safety", {keys.SAFETY: partial(safety_state, heartbeat=1)}, safety)
+    session, key = buses.session(), keys.LINK.on(buses.robot)
+    buses.loop.post(lambda: buses.loop.every(0.1, lambda _: session.put(key, b"\xc1")))
+    result = tool("doctor", "--duration", "1")
+    assert (result.code, result.err) == (1, "")
+    found = [(each["where"], each["level"], each["text"]) for each in result.lines]
+    assert ("rights", "ok", "this laptop may read, call and drive") in found
+    assert ("services", "ok", "bridge is up for 3 s") in found
+    assert ("services", "wrong", "odom is not running") in found
+    assert any(text.startswith("safety is running and publishes no") for *_, text in found)
+    assert any(text.startswith("tel/bridge/link: ") for *_, text in found)
+    assert any(where == "clock" and level == "ok" for where, level, _ in found)
 
 
 def test_no_router(capsys: pytest.CaptureFixture[str]) -> None:
-    result = Tool(f"tcp/127.0.0.1:{free_port()}", "001", capsys)("doctor", "--text")
+    result = Tool(f"tcp/127.0.0.1:{free_port()}", "001", capsys)("doctor", text=True)
     assert (result.code, result.err) == (1, "")
     lines = result.out.splitlines()
     assert "WRONG" in lines[0]
     assert "connection refused" in lines[0]
-    assert lines[1].strip() == f"-> {remedies.REFUSED}"
+    assert lines[1].strip() == f"-> {doctor.REFUSED}"
     assert lines[-1] == "1 problem found."
 
 
-def test_a_router_without_services(capsys: pytest.CaptureFixture[str]) -> None:
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    with router_process(endpoint):
-        result = Tool(endpoint, "001", capsys)("doctor", "--duration", "0.2")
-    assert result.code == 1
-    assert wrong(result.lines) == [("services", remedies.START)] * 3
+def test_one_reachable_endpoint_is_enough_and_services_may_be_missing() -> None:
+    reached, absent = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
+    with router_process(reached):
+        config = Shared(bus=BusSettings(connect=(absent, reached)))
+        first, second, *rest = findings(config, 0.1)
+    assert (first.level, first.todo) == ("note", doctor.REFUSED)
+    assert (second.where, second.level) == ("network", "ok")
+    assert [each.todo for each in rest if each.level == "wrong"] == [START] * 3
 
 
 def test_an_endpoint_that_is_not_a_router(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
         result = Tool(f"tcp/127.0.0.1:{port}", "001", capsys)("doctor")
-    assert wrong(result.lines) == [("router", remedies.NOT_A_ROUTER)]
+    assert [where for where, _ in wrong(result)] == ["router"]
 
 
 def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert connect("udp/127.0.0.1:7447", at()).level == "unknown"
-    assert connect(f"unixsock-stream/{tmp_path}/no.sock", at()).todo == remedies.NO_SOCKET
+    assert connect(f"unixsock-stream/{tmp_path}/no.sock", at()).level == "wrong"
     assert connect(f"unixsock-stream/{tmp_path}", at()).level == "ok"
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        assert connect(f"tcp/127.0.0.1:{server.getsockname()[1]}?so_rcvbuf=1", at()).level == "ok"
-    for error, todo in (
-        (socket.gaierror(), remedies.NO_NAME),
-        (TimeoutError(), remedies.NO_ROUTE),
-        (OSError(101, "Network is unreachable"), remedies.NO_ROUTE),
+    for error, text in (
+        (socket.gaierror(), "unknown host name robot"),
+        (TimeoutError(), "no answer"),
+        (OSError(101, "Network is unreachable"), "network is unreachable"),
     ):
 
         def fail(*_: object, error: OSError = error) -> None:
@@ -157,13 +94,37 @@ def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
         monkeypatch.setattr(socket, "create_connection", fail)
         found = connect("tcp/robot:7447", at())
-        assert (found.level, found.todo) == ("wrong", todo)
+        assert (found.level, found.text) == ("wrong", f"tcp/robot:7447: {text}")
 
 
-def test_one_reachable_endpoint_is_enough() -> None:
-    reached, absent = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
-    with router_process(reached):
-        config = Shared(bus=BusSettings(connect=(absent, reached)))
-        first, second, *_ = findings(config, 0.1)
-    assert (first.level, first.todo) == ("note", remedies.REFUSED)
-    assert (second.where, second.level) == ("network", "ok")
+# --- certificates ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def driver_at(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[BusSettings, str]]:
+    """Return a driver's settings, and the endpoint of the robot's router."""
+    site = Site(tmp_path_factory.mktemp("ours") / "keys")
+    driver = site.member("driver", "anna", "--robot", "001")
+    with site.router(site.member("robot", "001", "--address", "127.0.0.1")) as (endpoint, _):
+        yield driver, endpoint
+
+
+def first(member: BusSettings, endpoint: str) -> Finding:
+    """Return the finding of the network."""
+    return next(findings(Shared(bus=connecting(member, endpoint)), 0.1))
+
+
+def test_certificates(driver_at: tuple[BusSettings, str], tmp_path: Path) -> None:
+    driver, endpoint = driver_at
+    assert first(driver, endpoint).level == "ok"
+    stranger = Site(tmp_path / "keys").member("driver", "mallory", "--robot", "001")
+    missing = msgspec.structs.replace(driver, private_key=str(tmp_path / "no.key"))
+    mixed = msgspec.structs.replace(stranger, ca=driver.ca)
+    for member, problem in (
+        (stranger, "the router's certificate is not trusted: "),
+        (mixed, "the router refuses this certificate: "),
+        (missing, "bus.private_key is invalid: No such file or directory"),
+    ):
+        found = first(member, endpoint)
+        assert (found.where, found.level, found.todo) == ("network", "wrong", doctor.KEYS)
+        assert problem in found.text

@@ -4,12 +4,10 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from functools import partial
 
 import msgspec
 import pytest
-from msgspec import structs
 
 from cli.inspect import echo
 from cli.inspect.echo import clock
@@ -29,24 +27,15 @@ def bridge(buses: BusFixture) -> Bus:
     return pretend(buses, "bridge", {keys.BUMPER: lambda: Bumper(pressed=True)})
 
 
-def test_a_message_in_each_format(bridge: Bus, tool: Tool) -> None:
+def test_a_message_and_one_field(bridge: Bus, tool: Tool) -> None:
     result = tool("echo", "bumper", "--once")
     (line,) = result.lines
     assert (result.code, result.err) == (0, "")
     assert (line["key"], line["type"]) == ("tel/bridge/bumper", "Bumper")
     assert (line["message"]["pressed"], line["message"]["boot"]) == (True, bridge.boot)
-    head, *fields = tool("echo", "bumper", "--once", "--text").out.splitlines()
+    head, *fields = tool("echo", "bumper", "--once", text=True).out.splitlines()
     assert head.startswith("# tel/bridge/bumper  Bumper  seq ")
     assert fields == ["pressed: true", "lost: 0", "---"]
-    assert "boot: " in tool("echo", "bumper", "--once", "--text", "--header").out
-    first, second = tool("echo", "bumper", "--count", "2", "-o", "table").out.splitlines()
-    at, key, row = first.split(maxsplit=2)
-    assert time.strptime(at.partition(".")[0], "%H:%M:%S")
-    assert (key, row) == ("tel/bridge/bumper", '{"pressed":true,"lost":0}')
-    assert second.endswith(row)
-
-
-def test_one_field(bridge: Bus, tool: Tool) -> None:
     assert tool("echo", "bumper", "--field", "pressed", "--count", "2").out == "true\ntrue\n"
     result = tool("echo", "bumper", "--field", "presed")
     assert (result.code, result.out) == (1, "")
@@ -71,7 +60,7 @@ def test_invalid_messages(buses: BusFixture, tool: Tool) -> None:
     assert complaints["bytes"] == "not MessagePack"
     assert "pressed" in complaints["Bumper"]
     assert any(line.get("deleted") for line in lines)
-    shown = tool("echo", "tel/x", "--count", "6", "--text").out
+    shown = tool("echo", "tel/x", "--count", "6", text=True).out
     assert "# invalid: not a Bumper" in shown
     assert "DELETE" in shown
 
@@ -81,15 +70,14 @@ def test_control_characters_are_escaped(buses: BusFixture, tool: Tool) -> None:
     payload = msgspec.msgpack.encode({f"a{hostile}": {f"b{hostile}": hostile}})
     put = partial(buses.session().put, f"t2/v1/{buses.robot}/tel/x{hostile[:4]}", payload)
     buses.loop.post(lambda: buses.loop.every(0.1, lambda _: put()))
-    for form in ("--text", "--json", "-otable"):
-        shown = tool("echo", "tel/*", "--once", form).out
+    for text in (True, False):
+        shown = tool("echo", "tel/*", "--once", text=text).out
         assert shown.replace("\n", "").isprintable(), shown
         assert "\\u001b[2J\\u0" in shown
-    (line,) = tool("echo", "tel/*", "--once").lines
-    assert line["message"] == {f"a{hostile}": {f"b{hostile}": hostile}}
+    assert json.loads(shown)["message"] == {f"a{hostile}": {f"b{hostile}": hostile}}
 
 
-def test_earlier_events(buses: BusFixture, tool: Tool) -> None:
+def test_earlier_events_have_their_own_time(buses: BusFixture, tool: Tool) -> None:
     def publish(bus: Bus) -> None:
         bus.publisher(keys.EVENTS, service="mine").put(
             Event(name="x", level="info", text="long ago")
@@ -97,27 +85,19 @@ def test_earlier_events(buses: BusFixture, tool: Tool) -> None:
 
     buses.bus(publish)
     assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "long ago"
-
-
-def test_an_event_has_its_own_time() -> None:
     at_ns = 1_700_000_000 * NS_PER_S
-    late = Sample("t2/v1/001/evt/safety", b"", "", False, None, 0, at_ns + 30 * NS_PER_S)
-    stored = structs.replace(late, wall_ns=at_ns)
-    assert clock(late, Reading("Event", {"t_ns": at_ns})) == clock(stored, Reading("text", ""))
-    next_day = structs.replace(late, wall_ns=at_ns + 86_400 * NS_PER_S)
-    assert clock(next_day, Reading("Event", {"t_ns": at_ns})).startswith("2023-11-1")
-    assert not clock(next_day, Reading("Event", {"t_ns": 0})).startswith("2023")
+    late = Sample("t2/v1/001/evt/safety", b"", "", False, None, 0, at_ns + 86_400 * NS_PER_S)
+    assert clock(late, Reading("Event", {"t_ns": at_ns})).startswith("2023-11-1")
+    assert clock(late, Reading("text", "")) in clock(late, Reading("Event", {"t_ns": 0}))
+    assert clock(late, Reading("Event", 1, "invalid")) == clock(late, Reading("text", ""))
 
 
 def test_silence(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(echo, "FIRST_S", 0.1)
     monkeypatch.setattr(echo, "ONCE_S", 0.3)
     for words in (("tel/none", "--duration", "0.3"), ("tel/none", "--once")):
         result = tool("echo", *words)
         assert (result.code, result.out) == (1, "")
-        waiting, reason = result.err.splitlines()
-        assert waiting.endswith("yet; waiting")
-        assert f"no message on t2/v1/{tool.robot}/tel/none within 0.3 s; `t2 ls`" in reason
+        assert f"no message on t2/v1/{tool.robot}/tel/none within 0.3 s; `t2 ls`" in result.err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -134,7 +114,7 @@ def test_ctrl_c_ends_it_silently(number: signal.Signals, bridge: Bus, buses: Bus
 
 
 def test_a_closed_pipe_ends_it_silently(bridge: Bus, buses: BusFixture) -> None:
-    words = f"echo bumper -o json --set bus.connect={buses.endpoint} --robot {buses.robot}"
+    words = f"echo bumper --json --set bus.connect={buses.endpoint} --robot {buses.robot}"
     done = subprocess.run(
         ["bash", "-c", f"set -o pipefail; {sys.executable} -m cli {words} | head -1"],
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,

@@ -1,4 +1,4 @@
-"""Any payload is decoded without an exception."""
+"""Any payload is decoded without an exception, and shown as text."""
 
 import msgspec
 import pytest
@@ -75,12 +75,40 @@ def test_a_field_by_its_path() -> None:
     ("value", "path", "phrase"),
     [
         ({"x": 1, "y": 2}, "z", "'z' has no field 'z'; available: x, y"),
-        ({"causes": [1, 2]}, "causes.2", "available: 0 to 1"),
-        ({"causes": []}, "causes.0", "none, it is empty"),
-        ({}, "x", "none, it is empty"),
-        (None, "x", "none, it is a single value"),
+        ({"causes": [1, 2]}, "causes.2", "'causes.2' has no field '2'; available: none"),
+        (None, "x", "available: none"),
     ],
 )
 def test_a_missing_field_names_the_existing_ones(value: object, path: str, phrase: str) -> None:
     with pytest.raises(MessageError, match=phrase):
         at(value, path)
+
+
+# --- as text --------------------------------------------------------------------------------------
+
+
+def test_a_table_is_aligned_with_numbers_to_the_right() -> None:
+    shown = output.table(("key", "Hz"), [("tel/a", "5.0"), ("b\x1b", "120.5"), ("c", "-")])
+    assert shown.splitlines() == [
+        "key         Hz",
+        "tel/a      5.0",
+        "b\\u001b  120.5",
+        "c            -",
+    ]
+    assert output.table(("a", "b"), []) == "a  b"
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        ({"x": 1.23456789, "ok": True, "who": None}, "x: 1.23457\nok: true\nwho: null"),
+        ({"a": [1.0, 2.5], "b": []}, "a: [1, 2.5]\nb: []"),
+        ({"a": {"b": {"c": 1}}, "d": {}}, "a:\n  b:\n    c: 1\nd: {}"),
+        ({"a": [{"b": 1}]}, "a:\n  -\n    b: 1"),
+        ("words\x07", "words\\u0007"),
+        ("", '""'),
+        (b"\x01\xff", "01ff"),
+    ],
+)
+def test_fields(value: object, shown: str) -> None:
+    assert output.fields(value) == shown

@@ -37,14 +37,13 @@ class Tool:
     robot: str
     capsys: pytest.CaptureFixture[str]
 
-    def __call__(self, *words: str, robot: str | None = None) -> Result:
-        """Run it to its end, with JSON output unless the arguments choose another format."""
+    def __call__(self, *words: str, robot: str | None = None, text: bool = False) -> Result:
+        """Run it to its end, with JSON output unless ``text`` is set."""
         named = robot or self.robot
         where = ("--set", f"bus.connect={self.endpoint}", *(("--robot", named) if named else ()))
         self.capsys.readouterr()
         try:
-            form = () if {"--text", "-o"} & {*words} else ("-o", "json")
-            code = main([*words, *form, *where])
+            code = main([*words, *(() if text else ("--json",)), *where])
         except SystemExit as end:  # invalid arguments
             code = int(str(end.code))
         captured = self.capsys.readouterr()

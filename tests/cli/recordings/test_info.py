@@ -37,7 +37,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def as_json(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, dict[str, Any]]:
-    code = main(["info", "-o", "json", str(path)])
+    code = main(["info", "--json", str(path)])
     printed: dict[str, Any] = json.loads(capsys.readouterr().out)
     return code, printed
 
@@ -78,12 +78,12 @@ def test_a_truncated_file_is_summarized_up_to_its_end(
     assert printed["cut"]
     assert 0 < printed["readable"] <= printed["bytes"]
     assert printed["messages"] == 13
-    assert main(["info", "--text", str(path)]) == 1
+    assert main(["info", str(path)]) == 1
     assert f"truncated, {printed['readable']} bytes are readable" in capsys.readouterr().out
 
 
 def test_text_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", "--text", str(path)]) == 0
+    assert main(["info", str(path)]) == 0
     shown = capsys.readouterr().out
     for message in (
         "complete", "robot 007, recorded by T2 1.2.3", "reason: latch-contact",
@@ -98,7 +98,7 @@ def test_text_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_empty_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), {})
     made.close()
-    assert main(["info", "--text", str(made.path)]) == 0
+    assert main(["info", str(made.path)]) == 0
     assert "no messages" in capsys.readouterr().out
 
 
