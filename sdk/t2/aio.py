@@ -1,20 +1,21 @@
 """Twins for asyncio: the same names, with ``await``, ``async for`` and ``async with``."""
 
 import asyncio
-from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from t2 import messages as m
 from t2.connection import connect
 from t2.drive import Drive
-from t2.limit import SpeedLimit
 from t2.robot import Robot
 from t2.stream import Stream
 
 M = TypeVar("M", bound=m.Message)
+
+POLL_S = 0.01  # shorter than the period of each stream
 
 
 @asynccontextmanager
@@ -49,64 +50,46 @@ def _close(opening: "asyncio.Task[Robot]") -> None:
 
 
 class AsyncStream(Generic[M]):
-    """A ``Stream`` for asyncio; ``stream`` is the twin."""
+    """A ``Stream`` for asyncio; ``stream`` is the twin.
+
+    ``async for`` yields each new message, never a backlog, and ends when the robot is closed.
+
+    >>> async def main():
+    ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
+    ...         async for pose in robot.odometry:
+    ...             return print(math.isfinite(pose.x))
+    >>> asyncio.run(main())
+    True
+    """
 
     def __init__(self, stream: Stream[M]) -> None:
         self.stream = stream
 
     async def latest(self, timeout: float = 1.0) -> M:
-        """Return the newest message as ``Stream.latest`` does. Raises ``NoData``.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         print((await robot.bumper.latest()).pressed)
-        >>> asyncio.run(main())
-        False
-        """
+        """Return the newest message as ``Stream.latest`` does. Raises ``NoData``."""
         return await asyncio.to_thread(self.stream.latest, timeout)
 
     async def __aiter__(self) -> AsyncIterator[M]:
-        """Yield each new message, never a backlog; end when the robot is closed.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         async for pose in robot.odometry:
-        ...             return print(math.isfinite(pose.x))
-        >>> asyncio.run(main())
-        True
-        """
-        inbox: Inbox[M] = Inbox(self.stream.depth)
-        with self.stream.reading(inbox):
+        with self.stream.reading() as queue:
             while not self.stream.closed:
-                message = await inbox.next()
-                if message is not None:
-                    yield message
-
-
-class Inbox(Generic[M]):
-    """A bounded queue that Zenoh's threads fill and a task empties."""
-
-    def __init__(self, depth: int) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._queue: deque[M | None] = deque(maxlen=depth)
-        self._filled = asyncio.Event()
-
-    def append(self, message: M | None) -> None:
-        """Add a message, from any thread; drop the oldest one when full."""
-        self._queue.append(message)
-        with suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(self._filled.set)
-
-    async def next(self) -> M | None:
-        """Return the oldest message; None when the stream was closed."""
-        while not self._queue:
-            self._filled.clear()
-            await self._filled.wait()
-        return self._queue.popleft()
+                if queue:
+                    yield queue.popleft()
+                else:
+                    await asyncio.sleep(POLL_S)
 
 
 class AsyncDrive:
-    """A ``Drive`` for asyncio; a cancelled motion requests zero before the task goes on."""
+    """A ``Drive`` for asyncio; a cancelled motion requests zero before the task goes on.
+
+    >>> async def main():
+    ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
+    ...         async with robot.drive("nav") as drive:
+    ...             await drive.forward(0.1)
+    ...             await drive.turn(math.pi / 8)
+    ...             drive.velocity(0.1)
+    ...             await drive.stop()
+    >>> asyncio.run(main())
+    """
 
     def __init__(self, drive: Drive) -> None:
         self._drive = drive
@@ -126,38 +109,16 @@ class AsyncDrive:
         await asyncio.to_thread(self._drive.__exit__, *raised)
 
     async def stop(self) -> None:
-        """Stop as ``Drive.stop`` does.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         async with robot.drive("nav") as drive:
-        ...             drive.velocity(0.1)
-        ...             await drive.stop()
-        >>> asyncio.run(main())
-        """
+        """Stop as ``Drive.stop`` does."""
         self._drive.velocity(0.0)  # at once: a thread may not be free
         await self._wait(self._drive.stop)
 
     async def forward(self, distance: float, speed: float = 0.3, patience: float = 3.0) -> None:
-        """Drive a distance in m as ``Drive.forward`` does.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         async with robot.drive("nav") as drive:
-        ...             await drive.forward(0.1)
-        >>> asyncio.run(main())
-        """
+        """Drive a distance in m as ``Drive.forward`` does."""
         await self._wait(self._drive.forward, distance, speed, patience)
 
     async def turn(self, angle: float, speed: float = 0.5, patience: float = 3.0) -> None:
-        """Turn by an angle in rad as ``Drive.turn`` does.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         async with robot.drive("nav") as drive:
-        ...             await drive.turn(math.pi / 8)
-        >>> asyncio.run(main())
-        """
+        """Turn by an angle in rad as ``Drive.turn`` does."""
         await self._wait(self._drive.turn, angle, speed, patience)
 
     async def _wait(self, motion: Callable[..., object], *values: float) -> None:
@@ -174,88 +135,43 @@ class AsyncDrive:
 
 
 class AsyncRobot:
-    """A ``Robot`` for asyncio, from ``aconnect``; ``robot`` is the twin."""
+    """A ``Robot`` for asyncio, from ``aconnect``; ``robot`` is the twin.
+
+    Each stream is an ``AsyncStream``; the other methods of ``Robot`` run in a thread: ``await`` it.
+
+    >>> async def main():
+    ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
+    ...         await robot.set_pose(x=1.0)
+    ...         await robot.estop()
+    ...         await asyncio.sleep(1)  # look at the vehicle
+    ...         await robot.reset()
+    >>> asyncio.run(main())
+    """
+
+    odometry: AsyncStream[m.Odometry]
+    safety: AsyncStream[m.SafetyState]
+    velocity: AsyncStream[m.Velocity]
+    mileage: AsyncStream[m.Mileage]
+    ultrasonic: AsyncStream[m.Ultrasonic]
+    bumper: AsyncStream[m.Bumper]
+    switches: AsyncStream[m.Switches]
+    link: AsyncStream[m.Link]
+    events: AsyncStream[m.Event]
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.odometry = AsyncStream(robot.odometry)
-        self.safety = AsyncStream(robot.safety)
-        self.velocity = AsyncStream(robot.velocity)
-        self.mileage = AsyncStream(robot.mileage)
-        self.ultrasonic = AsyncStream(robot.ultrasonic)
-        self.bumper = AsyncStream(robot.bumper)
-        self.switches = AsyncStream(robot.switches)
-        self.link = AsyncStream(robot.link)
-        self.events = AsyncStream(robot.events)
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self.robot, name)
+        if isinstance(value, Stream):
+            return AsyncStream(value)
+        return partial(asyncio.to_thread, value) if callable(value) else value
 
     def drive(self, source: str) -> AsyncDrive:
-        """Return a drive as this source, for ``async with``; ``AsyncDrive`` has examples."""
+        """Return a drive as this source, for ``async with``."""
         return AsyncDrive(self.robot.drive(source))
 
-    async def limit(
-        self,
-        source: str,
-        linear: float | None = None,
-        angular: float | None = None,
-        reason: str = "",
-        *,
-        seconds: float,
-    ) -> SpeedLimit:
-        """Cap the speed in m/s and rad/s as ``Robot.limit`` does.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         limit = await robot.limit("detector", linear=0.3, seconds=1)
-        ...         limit.end()
-        >>> asyncio.run(main())
-        """
-        return await asyncio.to_thread(
-            self.robot.limit, source, linear, angular, reason, seconds=seconds
-        )
-
     async def estop(self) -> None:
-        """Stop and latch as ``Robot.estop`` does; a cancelled task does not end the attempts.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         await robot.estop()
-        ...         await asyncio.sleep(1)  # look at the vehicle
-        ...         await robot.reset()
-        >>> asyncio.run(main())
-        """
+        """Stop and latch as ``Robot.estop`` does; a cancelled task does not end the attempts."""
         self.robot.put_estop()  # at once: a thread may not be free
         await asyncio.to_thread(self.robot.estop)
-
-    async def reset(self) -> m.ResetDone:
-        """Reset as ``Robot.reset`` does; ``estop`` has an example."""
-        return await asyncio.to_thread(self.robot.reset)
-
-    async def release(self, direction: m.Direction, source: str, timeout: float = 5.0) -> None:
-        """Move off a pressed bumper as ``Robot.release`` does.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         await robot.release("backward", "teleop")
-        >>> asyncio.run(main())
-        """
-        await asyncio.to_thread(self.robot.release, direction, source, timeout)
-
-    async def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
-        """Set the pose of odometry in ``odom``: m, m, rad.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         await robot.set_pose(x=1.0)
-        >>> asyncio.run(main())
-        """
-        await asyncio.to_thread(self.robot.set_pose, x, y, heading)
-
-    async def led(self, channel: int, mode: int, **settings: int) -> None:
-        """Set one lamp channel as ``Robot.led`` does.
-
-        >>> async def main():
-        ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
-        ...         await robot.led(channel=1, mode=1)
-        >>> asyncio.run(main())
-        """
-        await asyncio.to_thread(self.robot.led, channel, mode, **settings)

@@ -3,7 +3,6 @@
 import math
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -37,6 +36,14 @@ class Drive:
     A thread repeats the requests: a program that waits keeps its last velocity. When the program
     dies, safety stops the vehicle within its lease. After an error the drive requests zero for
     good, and each method raises it: open another one.
+
+    >>> with robot.drive("nav") as drive:
+    ...     drive.forward(0.1)  # m
+    ...     drive.turn(-math.pi / 8)  # rad
+    ...     drive.velocity(-0.1, 0.2, seconds=0.5)  # m/s, rad/s; returns at once
+    ...     time.sleep(0.2)  # something else
+    ...     drive.check()
+    ...     drive.stop()
     """
 
     def __init__(self, session: zenoh.Session, key: str, source: str, robot: "Robot") -> None:
@@ -87,32 +94,17 @@ class Drive:
             self._raise()
 
     def close(self) -> None:
-        """Send zeros and end the requests.
-
-        >>> drive = robot.drive("nav")
-        >>> drive.close()
-        >>> drive.is_open
-        False
-        """
+        """Send zeros and end the requests."""
         self.end()
         if self._thread.is_alive():
             self._thread.join()
 
     def end(self) -> None:
-        """Send zeros and end the requests, without waiting for that.
-
-        >>> robot.drive("nav").end()
-        """
+        """Send zeros and end the requests, without waiting for that."""
         self._ended.set()
 
     def check(self) -> None:
-        """Raise what stopped the vehicle, if anything did.
-
-        >>> with robot.drive("nav") as drive:
-        ...     drive.velocity(0.0, 0.2, seconds=0.5)
-        ...     time.sleep(0.2)  # something else
-        ...     drive.check()
-        """
+        """Raise what stopped the vehicle, if anything did."""
         check_process()
         self._raise()
         if not (self.is_open and self._thread.is_alive()):
@@ -124,21 +116,11 @@ class Drive:
             raise self._error
 
     def cancel(self) -> None:
-        """End the motion of another thread, or the next one, with an error, and request zero.
-
-        >>> with robot.drive("nav") as drive:
-        ...     threading.Timer(0.5, drive.cancel).start()
-        ...     drive.forward(5.0, speed=0.1)
-        Traceback (most recent call last):
-        t2.errors.T2Error: the motion was cancelled
-        """
+        """End the motion of another thread, or the next one, with an error, and request zero."""
         self._cancelled = True
 
     def uncancel(self) -> None:
-        """Forget a cancel after the end of the motion; the request is zero.
-
-        >>> robot.drive("nav").uncancel()
-        """
+        """Forget a cancel after the end of the motion; the request is zero."""
         self._target = STILL  # before the flag: the thread reads them in the other order
         self._cancelled = False
 
@@ -150,9 +132,6 @@ class Drive:
         """Request m/s and rad/s until changed, or for some seconds; return at once.
 
         Open loop: a program that waits for something else keeps driving.
-
-        >>> with robot.drive("nav") as drive:
-        ...     drive.velocity(-0.1, seconds=0.5)
         """
         end_s = math.inf if seconds is None else time.monotonic() + finite(seconds)
         target = Target(finite(linear), finite(angular), end_s)
@@ -161,12 +140,7 @@ class Drive:
         self._target = target
 
     def stop(self) -> None:
-        """Request zero and wait until the vehicle stands.
-
-        >>> with robot.drive("nav") as drive:
-        ...     drive.velocity(0.1)
-        ...     drive.stop()
-        """
+        """Request zero and wait until the vehicle stands."""
         self.velocity(0.0)
         self._until(lambda pose: abs(pose.linear) < STANDING and abs(pose.angular) < STANDING)
 
@@ -174,20 +148,11 @@ class Drive:
         """Drive straight for a distance in m, negative backward, by odometry; wait for the end.
 
         Raises ``Blocked`` after ``patience`` s without progress, and what else stops the vehicle.
-
-        >>> with robot.drive("nav") as drive:
-        ...     drive.forward(0.1)
-        ...     drive.forward(-0.1, speed=0.2)
         """
         self._go(Straight(self._robot.odometry.latest(), distance, speed), patience)
 
     def turn(self, angle: float, speed: float = 0.5, patience: float = PATIENCE_S) -> None:
-        """Turn on the spot by an angle in rad, positive to the left; else as ``forward``.
-
-        >>> with robot.drive("nav") as drive:
-        ...     drive.turn(math.pi / 8)
-        ...     drive.turn(-math.pi / 8)
-        """
+        """Turn on the spot by an angle in rad, positive to the left; else as ``forward``."""
         self._go(Turn(self._robot.odometry.latest(), angle, speed), patience)
 
     def _go(self, motion: "Straight | Turn", patience: float) -> None:
@@ -214,10 +179,9 @@ class Drive:
         self.stop()
 
     def _until(self, arrived: Callable[[Odometry], bool]) -> None:
-        queue: deque[Odometry | None] = deque(maxlen=1)
         stream = self._robot.odometry
         start = stream.latest()
-        with stream.reading(queue):
+        with stream.reading() as queue:
             while True:
                 pose = stream.after(queue, 1.0)
                 self._end_cancelled()

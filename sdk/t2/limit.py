@@ -17,7 +17,12 @@ SHOWN_S, POLL_S = 1.0, 0.01  # until safety's state shows a limit; its period is
 
 
 class SpeedLimit:
-    """The limit of one source; a thread repeats it 10 times a second for ``seconds``."""
+    """The limit of one source; a thread repeats it 10 times a second for ``seconds``.
+
+    >>> limit = robot.limit("detector", linear=0.5, seconds=1)
+    >>> limit.set(0.2, reason="person close", seconds=1)
+    >>> limit.end()
+    """
 
     def __init__(
         self, session: zenoh.Session, key: str, source: str, safety: Stream[SafetyState]
@@ -48,10 +53,6 @@ class SpeedLimit:
         """Replace the limit; send it at once, and repeat it for some seconds or until ``end``.
 
         Returns and raises as ``Robot.limit``.
-
-        >>> limit = robot.limit("detector", linear=0.5, seconds=1)
-        >>> limit.set(0.2, reason="person close", seconds=1)
-        >>> limit.end()
         """
         if self.has_ended:
             raise T2Error("this limit has ended; Robot.limit returns another one") from self._error
@@ -78,10 +79,7 @@ class SpeedLimit:
         )
 
     def end(self) -> None:
-        """Send no more; safety treats the silence as its settings for this source say.
-
-        >>> robot.limit("detector", linear=0.3, seconds=1).end()
-        """
+        """Send no more; safety treats the silence as its settings for this source say."""
         if self.has_ended:
             return
         self._ended.set()

@@ -35,6 +35,18 @@ class Robot:
     """A robot, from ``connect``; use it in ``with``, or ``close`` it.
 
     Each stream is subscribed on first use.
+
+    >>> robot.safety.latest().verdict in ("run", "slow", "stop", "brake", "inhibited")
+    True
+    >>> robot.led(channel=1, mode=1)
+    >>> robot.set_pose(x=1.0)
+    >>> limit = robot.limit("detector", linear=0.3, reason="person ahead", seconds=1)
+    >>> limit.end()
+    >>> robot.estop()
+    >>> robot.safety.latest().latched
+    ('estop',)
+    >>> time.sleep(1)  # look at the vehicle
+    >>> _ = robot.reset()
     """
 
     def __init__(self, session: zenoh.Session, name: str, endpoint: str) -> None:
@@ -61,11 +73,7 @@ class Robot:
         self.close()
 
     def close(self) -> None:
-        """End drives with zeros, end limits, and disconnect.
-
-        >>> other = t2.connect("001", endpoint=ENDPOINT)
-        >>> other.close()
-        """
+        """End drives with zeros, end limits, and disconnect."""
         check_process()
         for drive in self._drives:
             drive.close()
@@ -81,9 +89,6 @@ class Robot:
         """Return a drive as this source, for ``with``; safety must know the source.
 
         ``safety.sources`` lists the sources with their priorities.
-
-        >>> with robot.drive("nav") as drive:
-        ...     drive.velocity(0.1, seconds=1)
         """
         self._drives = [each for each in self._drives if each.is_open]
         drive = Drive(self._session, self._key("drive", source=source), source, self)
@@ -106,9 +111,6 @@ class Robot:
         ``silence`` for this source can treat as a stop. Returns once safety's state shows the
         limit. ``safety.limits`` must list the source. Raises ``NotAllowed``, ``ValueError``,
         ``TypeError``, and ``NoData`` without safety.
-
-        >>> limit = robot.limit("detector", linear=0.3, reason="person ahead", seconds=1)
-        >>> limit.end()
         """
         if source not in self._limits or self._limits[source].has_ended:
             key = self._key("limit", source=source)
@@ -119,14 +121,7 @@ class Robot:
     # --- stopping -----------------------------------------------------------------------------
 
     def estop(self) -> None:
-        """Stop the robot and latch it; repeated until safety confirms. Raises ``NotConfirmed``.
-
-        >>> robot.estop()
-        >>> robot.safety.latest().latched
-        ('estop',)
-        >>> time.sleep(1)  # look at the vehicle
-        >>> _ = robot.reset()
-        """
+        """Stop the robot and latch it; repeated until safety confirms. Raises ``NotConfirmed``."""
         self.put_estop()  # before anything else
         begin_s, repetition = time.monotonic(), EstopRepetition()
         repetition.start()
@@ -145,12 +140,7 @@ class Robot:
         )
 
     def put_estop(self) -> None:
-        """Send one emergency stop, without waiting for safety; ``estop`` confirms it.
-
-        >>> robot.put_estop()
-        >>> time.sleep(1)  # look at the vehicle
-        >>> _ = robot.reset()
-        """
+        """Send one emergency stop, without waiting for safety; ``estop`` confirms it."""
         check_process()
         self._session.put(
             f"{ROOT}/{self.name}/estop",
@@ -165,10 +155,6 @@ class Robot:
 
         A later cause is not cleared. Raises ``Refused`` with the reason, ``NotConfirmed`` when
         safety's state does not show the effect, and ``NoData`` without safety.
-
-        >>> robot.reset()
-        Traceback (most recent call last):
-        t2.errors.Refused: Nothing is latched.
         """
         seen = self.safety.latest()
         check = ResetCheck(seen)
@@ -187,8 +173,6 @@ class Robot:
         ``safety.sources``: at most 0.1 m/s and 0.15 m, and ``contact`` stays latched until
         ``reset``. Know which direction is free: the bumper has none. Raises ``Refused`` with the
         reason, ``NotAllowed``, ``NotConfirmed`` after ``timeout`` s, and ``NoData``.
-
-        >>> robot.release("backward", "teleop")  # the bumper is free
         """
         publisher = DrivePublisher(self._session, self._key("drive", source=source), self.safety)
         self.safety.latest()
@@ -219,16 +203,11 @@ class Robot:
         """Set one lamp channel; ``settings`` are the further fields of ``LedRequest``.
 
         Raises ``Refused`` and ``TypeError``.
-
-        >>> robot.led(channel=1, mode=1)
         """
         self._call("bridge/led", m.LedRequest(channel=channel, mode=mode, **settings), m.Done)
 
     def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
-        """Set the pose of odometry in ``odom``: m, m, rad. Raises ``Refused``.
-
-        >>> robot.set_pose(x=1.0)
-        """
+        """Set the pose of odometry in ``odom``: m, m, rad. Raises ``Refused``."""
         echo = self.safety.latest().heartbeat
         request = m.PoseRequest(x=finite(x), y=finite(y), heading=finite(heading), echo=echo)
         self._call("odom/reset", request, m.Done)

@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 import zenoh
@@ -17,7 +17,6 @@ from t2.keys import ROOT
 from t2.messages import Message
 
 M = TypeVar("M", bound=Message)
-T = TypeVar("T", contravariant=True)
 
 LIVE_S = 0.5  # for the list of robots
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
@@ -31,20 +30,19 @@ def check_process() -> None:
         raise LinkError("no connection survives a fork: connect in the new process only")
 
 
-class Queue(Protocol[T]):
-    """What a stream fills from Zenoh's threads, such as a ``deque``."""
-
-    def append(self, message: T, /) -> object:
-        """Add a message."""
-
-
 class Stream(Generic[M]):
     """The messages of a topic; subscribed on first use.
 
-    ``depth`` messages wait for a slow reader, older ones are dropped. ``invalid`` counts messages
-    that do not have the topic's type.
+    ``for`` yields each new message until the robot is closed; ``depth`` messages wait for a slow
+    reader, older ones are dropped. ``invalid`` counts messages that do not have the topic's type.
 
     >>> robot.odometry.latest(timeout=1.0).epoch >= 0
+    True
+    >>> robot.odometry.age < 1.0
+    True
+    >>> for pose in robot.odometry:
+    ...     print(math.hypot(pose.x, pose.y) < 100.0)
+    ...     break
     True
     """
 
@@ -61,36 +59,23 @@ class Stream(Generic[M]):
         self._changed = threading.Condition()
         self._newest: M | None = None
         self._received_s = 0.0
-        self._queues: list[Queue[M | None]] = []
+        self._queues: list[deque[M]] = []
         self._subscriber: Any = None
 
     @property
     def newest(self) -> M | None:
-        """The newest message received; None before the first one, or before the first use.
-
-        >>> _ = robot.ultrasonic.latest()  # subscribes
-        >>> len(robot.ultrasonic.newest.ranges)
-        8
-        """
+        """The newest message received; None before the first one, or before the first use."""
         return self._newest
 
     @property
     def age(self) -> float:
-        """Time in s since the newest message was received; infinite before the first one.
-
-        >>> _ = robot.velocity.latest()
-        >>> robot.velocity.age < 1.0
-        True
-        """
+        """Time in s since the newest message was received; infinite before the first one."""
         return time.monotonic() - self._received_s if self._newest else float("inf")
 
     def latest(self, timeout: float = 1.0) -> M:
         """Return the newest message, at most ``timeout`` s old; wait for it at most that long.
 
         Raises ``NoData``.
-
-        >>> robot.bumper.latest(timeout=1.0).pressed
-        False
         """
         self.open()
         with self._changed:
@@ -103,16 +88,11 @@ class Stream(Generic[M]):
         """Call a function with the newest message, in a thread of its own, until the robot closes.
 
         A slow function skips messages. Its exceptions are logged, and the next message is handled.
-
-        >>> def warn(sample):
-        ...     if sample.pressed:
-        ...         print("contact")
-        >>> thread = robot.bumper.on(warn)
         """
-        messages = iter(self)
+        self.open()
 
         def run() -> None:
-            for message in messages:
+            for message in self:
                 try:
                     handle(message)
                 except Exception:
@@ -123,27 +103,26 @@ class Stream(Generic[M]):
         return thread
 
     def __iter__(self) -> Iterator[M]:
-        """Yield each new message; end when the robot is closed.
-
-        >>> for pose in robot.odometry:
-        ...     print(math.hypot(pose.x, pose.y) < 100.0)
-        ...     break
-        True
-        """
-        queue: deque[M | None] = deque(maxlen=self.depth)
-        self._add(queue)
-        return self._messages(queue)
+        with self.reading() as queue:
+            while not self.closed:
+                message = self.after(queue, 1.0)
+                if message is not None:
+                    yield message
 
     @contextmanager
-    def reading(self, queue: "Queue[M | None]") -> Iterator[None]:
-        """Add each message to a queue during the context."""
-        self._add(queue)
+    def reading(self) -> Iterator["deque[M]"]:
+        """Yield a queue that receives each message during the context."""
+        queue: deque[M] = deque(maxlen=self.depth)
+        with self._changed:
+            self._queues.append(queue)
+        self.open()
         try:
-            yield
+            yield queue
         finally:
-            self._remove(queue)
+            with self._changed:  # by identity: two empty queues are equal
+                self._queues = [each for each in self._queues if each is not queue]
 
-    def after(self, queue: "deque[M | None]", timeout: float) -> M | None:
+    def after(self, queue: "deque[M]", timeout: float) -> M | None:
         """Return the next message of a queue; None after ``timeout`` s, or when closed."""
         with self._changed:
             self._changed.wait_for(lambda: queue or self.closed, timeout)
@@ -157,16 +136,9 @@ class Stream(Generic[M]):
                 self._subscriber = self._session.declare_subscriber(self.key, self._on_sample)
 
     def close(self) -> None:
-        """End all iterations, before the robot closes.
-
-        >>> robot.link.close()
-        >>> list(robot.link)
-        []
-        """
+        """End all iterations, before the robot closes."""
         with self._changed:
             self.closed = True
-            for queue in self._queues:
-                queue.append(None)  # wakes its reader
             self._changed.notify_all()
 
     def _advice(self) -> str:
@@ -180,24 +152,6 @@ class Stream(Generic[M]):
         if not robots or mine in robots:
             return ADVICE
         return f"no robot {mine} at this router, which has {', '.join(sorted(robots))}"
-
-    def _messages(self, queue: "deque[M | None]") -> Iterator[M]:
-        try:
-            while not self.closed:
-                message = self.after(queue, 1.0)
-                if message is not None:
-                    yield message
-        finally:
-            self._remove(queue)
-
-    def _add(self, queue: "Queue[M | None]") -> None:
-        with self._changed:
-            self._queues.append(queue)
-        self.open()
-
-    def _remove(self, queue: "Queue[M | None]") -> None:
-        with self._changed:  # by identity: two empty queues are equal
-            self._queues = [each for each in self._queues if each is not queue]
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         try:

@@ -1,4 +1,4 @@
-"""Fixtures of the client library: one stack for a file, a connection for each test."""
+"""Fixtures of the client library: one stack for all tests, a connection for each."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from tests.sdk.library_robot import library_stack, ready
 from verification.harness.stack import RunningStack
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
     """Yield a running stack."""
     with library_stack(tmp_path_factory.mktemp("sdk")) as it:

@@ -11,7 +11,7 @@ import zenoh
 import t2
 from common.bus.session import client_config
 from t2.connection import LOCAL, settings
-from t2.messages import Odometry, Velocity
+from t2.messages import Velocity
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
 
@@ -23,14 +23,23 @@ class Robot:
 
     def __init__(self, endpoint: str) -> None:
         self.client = t2.connect("001", endpoint=endpoint)
+        self.stream = self.client.velocity
         self._session = zenoh.open(client_config(at(endpoint)))
         self._publisher = self._session.declare_publisher(KEY)
 
     def put(self, linear: float) -> None:
-        self._publisher.put(msgspec.msgpack.encode(Velocity(linear=linear, angular=0.0)))
+        self.put_raw(msgspec.msgpack.encode(Velocity(linear=linear, angular=0.0)))
 
     def put_raw(self, payload: bytes) -> None:
         self._publisher.put(payload)
+
+    def put_until_received(self, linear: float) -> None:
+        def received() -> bool:
+            self.put(linear)
+            return self.stream.newest is not None and self.stream.newest.linear == linear
+
+        self.stream.open()
+        wait_until(received, "a velocity")
 
     def close(self) -> None:
         self.client.close()
@@ -44,38 +53,32 @@ def robot(endpoint: str) -> Iterator[Robot]:
     it.close()
 
 
-def received(robot: Robot, linear: float) -> bool:
-    """Publish until it is received."""
-    robot.put(linear)
-    newest = robot.client.velocity.newest
-    return newest is not None and newest.linear == linear
-
-
-def test_the_newest_is_kept_with_its_age(robot: Robot) -> None:
-    stream = robot.client.velocity
+def test_the_newest_is_kept_with_its_age_and_others_are_counted(robot: Robot) -> None:
+    stream = robot.stream
     assert (stream.newest, stream.age) == (None, float("inf"))
-    stream.open()
-    wait_until(lambda: received(robot, 0.5), "a velocity")
-    assert stream.latest().linear == 0.5
-    assert stream.age < 10.0
-
-
-def test_without_a_message_the_error_names_key_and_remedy(robot: Robot) -> None:
     with pytest.raises(t2.NoData, match=rf"no velocity within 0\.1 s on {KEY}.*t2 doctor"):
-        robot.client.velocity.latest(timeout=0.1)
+        stream.latest(timeout=0.1)
+    robot.put_until_received(0.5)
+    robot.put_raw(b"\xc1")
+    wait_until(lambda: stream.invalid == 1, "the count")
+    assert stream.latest(timeout=60.0).linear == 0.5
+    assert stream.age < 60.0
 
 
-def test_a_slow_reader_gets_the_newest_only(robot: Robot) -> None:
-    stream = robot.client.velocity
-    messages = iter(stream)
-    wait_until(lambda: received(robot, 0.0), "a velocity")
-    for number in range(1, 20):
-        robot.put(float(number))
-    wait_until(lambda: stream.newest and stream.newest.linear == 19.0, "the last one")
-    assert next(messages).linear == 19.0
+def test_a_slow_reader_gets_the_newest_only_whatever_others_read(robot: Robot) -> None:
+    with robot.stream.reading() as kept:
+        with robot.stream.reading() as ended:
+            robot.put_until_received(0.0)
+            assert robot.stream.after(ended, 20.0) is not None
+        for number in range(1, 20):
+            robot.put(float(number))
+        wait_until(lambda: robot.stream.latest().linear == 19.0, "the last one")
+        newest = robot.stream.after(kept, 20.0)
+        assert newest is not None
+        assert newest.linear == 19.0
 
 
-def test_a_handler_that_fails_is_called_again(
+def test_a_handler_that_fails_is_called_again_until_the_robot_closes(
     robot: Robot, caplog: pytest.LogCaptureFixture
 ) -> None:
     seen: list[float] = []
@@ -85,7 +88,7 @@ def test_a_handler_that_fails_is_called_again(
         if len(seen) == 1:
             raise ValueError("the first one")
 
-    robot.client.velocity.on(handle)
+    thread: threading.Thread = robot.stream.on(handle)
 
     def twice() -> bool:
         robot.put(time.monotonic())
@@ -93,43 +96,9 @@ def test_a_handler_that_fails_is_called_again(
 
     wait_until(twice, "two messages")
     assert "the first one" in caplog.text
-
-
-def test_a_message_of_another_type_is_counted(robot: Robot) -> None:
-    stream = robot.client.velocity
-    stream.open()
-    wait_until(lambda: received(robot, 0.1), "a velocity")
-    robot.put_raw(b"\xc1")
-    wait_until(lambda: stream.invalid == 1, "the count")
-    assert stream.latest(timeout=60.0).linear == 0.1
-
-
-def test_the_end_of_one_iteration_leaves_the_others(robot: Robot) -> None:
-    stream = robot.client.velocity
-    kept, ended = iter(stream), iter(stream)
-    wait_until(lambda: received(robot, 0.5), "a velocity")
-    assert next(ended).linear == next(kept).linear
-    ended.close()  # type: ignore[attr-defined]
-    wait_until(lambda: received(robot, 0.7), "another velocity")
-    assert next(kept).linear in (0.5, 0.7)
-
-
-def test_closing_ends_an_iteration(robot: Robot) -> None:
-    ended = threading.Event()
-
-    def read() -> None:
-        for _ in robot.client.velocity:
-            pass
-        ended.set()
-
-    threading.Thread(target=read, daemon=True).start()
     robot.client.close()
-    assert ended.wait(10)
-
-
-def test_without_a_router_the_error_names_the_endpoint() -> None:
-    with pytest.raises(t2.LinkError, match=r"no router answers at tcp/127\.0\.0\.1:1: .*t2 doctor"):
-        t2.connect("001", endpoint="tcp/127.0.0.1:1")
+    thread.join(10)
+    assert not thread.is_alive()
 
 
 @pytest.mark.parametrize("name", ["", "*", "001/**"])
@@ -145,7 +114,3 @@ def test_tls_files_go_into_the_settings_of_zenoh() -> None:
         "connect_private_key": "p.key", "enable_mtls": True,
     }  # fmt: skip
     assert "link" not in settings([LOCAL], {})["transport"]
-
-
-def test_a_message_type_is_that_of_the_stack() -> None:
-    assert "pose_covariance" in Odometry.__struct_fields__

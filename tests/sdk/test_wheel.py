@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 UV = [str(Path(sys.executable).with_name("uv")), "--quiet"]
 ENVIRONMENT = {**os.environ, "PATH": os.defpath}  # without our own `t2`
 ENVIRONMENT.pop("PYTHONPATH", None)
+PYTHON = ".venv/bin/python"
 FOREIGN = ("common", "services", "sim", "tests")
 TEST = """
 import t2
@@ -51,44 +52,28 @@ def run(*words: str | Path, cwd: Path) -> str:
     return done.stdout
 
 
-@pytest.fixture(scope="module")
-def wheels(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Build both distributions; return their wheels by name."""
-    folder = tmp_path_factory.mktemp("wheels")
-    for project in (ROOT, ROOT / "sdk"):
-        run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder, cwd=project)
-    return {wheel.name.partition("-")[0]: wheel for wheel in folder.glob("*.whl")}
-
-
-@pytest.fixture
-def repository(tmp_path: Path) -> Path:
-    """Return a folder with packages of its own, and a virtual environment."""
-    folder = tmp_path / "repository"
-    for name in FOREIGN:
-        (folder / name).mkdir(parents=True)
-        (folder / name / "__init__.py").write_text("SIDE = 0.3\n")
-    run(*UV, "venv", "--python", sys.executable, folder / ".venv", cwd=folder)
-    return folder
-
-
-def install(repository: Path, *packages: str | Path) -> Path:
-    """Install packages at the locked versions; return the interpreter."""
-    python = repository / ".venv/bin/python"
-    options = ("--system-certs", "--python", python, "-c", ROOT / "requirements.lock")
+def install(repository: Path, *packages: str | Path) -> None:
+    """Install packages at the locked versions."""
+    options = ("--system-certs", "--python", repository / PYTHON, "-c", ROOT / "requirements.lock")
     run(*UV, "pip", "install", *options, *packages, cwd=ROOT)
-    return python
 
 
-def test_a_program_without_the_stack_gets_clear_errors(
-    wheels: dict[str, Path], repository: Path
-) -> None:
-    python = install(repository, wheels["t2_sdk"])
-    no_router, no_stack = run(python, "-c", USE, cwd=repository).splitlines()
+def test_a_program_and_then_a_test_in_a_repository_of_its_own(tmp_path: Path) -> None:
+    for project in (ROOT, ROOT / "sdk"):
+        words = ("-m", "hatchling", "build", "-t", "wheel", "-d", tmp_path)
+        run(sys.executable, *words, cwd=project)
+    wheels = {wheel.name.partition("-")[0]: wheel for wheel in tmp_path.glob("*.whl")}
+    repository = tmp_path / "repository"
+    for name in FOREIGN:
+        (repository / name).mkdir(parents=True)
+        (repository / name / "__init__.py").write_text("SIDE = 0.3\n")
+    run(*UV, "venv", "--python", sys.executable, repository / ".venv", cwd=repository)
+
+    install(repository, wheels["t2_sdk"])
+    no_router, no_stack = run(PYTHON, "-c", USE, cwd=repository).splitlines()
     assert no_router.startswith("no router answers at tcp/127.0.0.1:9")
     assert no_stack.startswith("the simulated robot needs the stack, and 't2' is not found")
 
-
-def test_a_test_drives_the_robot_of_the_fixture(wheels: dict[str, Path], repository: Path) -> None:
-    python = install(repository, wheels["t2"], wheels["t2_sdk"], "pytest")
+    install(repository, wheels["t2"], "pytest")
     (repository / "tests/test_forward.py").write_text(TEST)
-    assert "1 passed" in run(python, "-m", "pytest", "-q", cwd=repository)
+    assert "1 passed" in run(PYTHON, "-m", "pytest", "-q", cwd=repository)
