@@ -50,8 +50,8 @@ MANY = -n 6 --dist worksteal
 FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
-SEARCH = tests/search tests/safety/test_walk.py
-WITHOUT_SEARCH = $(addprefix --ignore=,$(SEARCH))
+SEARCH = tests/search
+WITHOUT_SEARCH = --ignore=$(SEARCH)
 
 # Failed tests run a second time, alone: docs/decisions.md#second-run.
 TESTS = $(BIN)/python -m tools.run_tests

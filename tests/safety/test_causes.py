@@ -7,21 +7,15 @@ from common.messages import Action
 from services.safety.core.causes import (
     BARRING,
     FAILURES,
-    GOOD_SAMPLES,
     RULES,
     Clears,
     FaultBudget,
     Held,
     Latches,
     Observation,
-    begun,
-    latched,
-    named,
     observe,
     ordered,
-    reset,
     severity,
-    still_present,
     wants_neutral,
 )
 
@@ -83,14 +77,6 @@ def see(held: Latches, name: str, present: bool, now_ns: int, seq: int = 0) -> d
     return observe(held, [Observation(name, present, (1, seq))], now_ns, SETTLE_NS)
 
 
-def gone(held: Latches, *names: str) -> Latches:
-    """Return the causes after so many good samples of these that a reset may clear them."""
-    for seq in range(2, 2 + GOOD_SAMPLES):
-        for name in names:
-            held = see(held, name, False, seq, seq)
-    return held
-
-
 @pytest.mark.parametrize(
     ("name", "now_ns", "stays"),
     [
@@ -107,49 +93,6 @@ def test_each_way_to_clear(name: str, now_ns: int, stays: bool) -> None:
     assert see({}, name, False, now_ns) == {}
 
 
-def test_without_a_time_to_settle_none_is_needed() -> None:
-    assert observe(see({}, "link", True, 0), [Observation("link", False, (1, 1))], 0) == {}
-
-
-def test_a_latched_cause_counts_good_samples_and_waits_for_a_reset() -> None:
-    assert GOOD_SAMPLES == 3
-    held = see({}, "contact", True, 7, seq=5)
-    assert held["contact"] == Held(7, 7, 0, (1, 5), "The bumper was hit.", 0)
-    held = see(held, "contact", False, 8, seq=5)  # the sample that showed it is no good one
-    for seq in range(6, 6 + GOOD_SAMPLES):
-        assert still_present(held) == ("contact",)
-        held = see(held, "contact", False, seq, seq)
-        held = see(held, "contact", False, seq, seq)  # the same sample again
-    assert (still_present(held), latched(held)) == ((), ("contact",))
-    assert still_present(see(held, "contact", True, 99, seq=99)) == ("contact",)
-
-
-def test_a_reset_clears_the_named_latches_that_are_gone() -> None:
-    held: Latches = {}
-    for name in ("estop", "runaway", "contact", "link"):
-        held = see(held, name, True, 0, seq=1)
-    held = gone(held, "estop", "runaway")
-    estop, runaway, contact, link = (one.id for one in held.values())
-    for ids, cleared in (
-        ((), set()),
-        ((estop,), {"estop"}),
-        ((estop, runaway), {"estop", "runaway"}),
-        ((contact, link), set()),
-        ((estop, contact), {"estop"}),
-    ):
-        assert named(held, ids) == ordered(n for n in latched(held) if held[n].id in ids)
-        assert held.keys() - reset(held, ids).keys() == cleared
-    assert still_present(held) == ("contact",)
-
-
-def test_begun_names_the_latches_of_one_decision() -> None:
-    held = observe({}, [Observation("estop", True, (0, 0))], 0, decision=8)
-    held = observe(held, [Observation("runaway", True, (0, 1), "Gone.")], 1, decision=9)
-    held = observe(held, [Observation("link", True, (0, 1))], 1, decision=9)
-    assert [begun(held, decision) for decision in (8, 9, 10)] == [("estop",), ("runaway",), ()]
-    assert held["runaway"].text == "Gone."
-
-
 @pytest.mark.parametrize(("goods", "same"), [(0, True), (2, True), (3, False), (4, False)])
 def test_a_cause_that_comes_back_after_three_good_samples_is_new(goods: int, same: bool) -> None:
     held = observe({}, [Observation("contact", True, (1, 1))], 5, decision=100)
@@ -159,16 +102,6 @@ def test_a_cause_that_comes_back_after_three_good_samples_is_new(goods: int, sam
     after = observe(held, [Observation("contact", True, (1, 50))], 50, decision=150)["contact"]
     expected = (before.id, 5) if same else (before.id + 50 * len(RULES), 50)
     assert (after.id, after.since_ns, after.bad_ns) == (*expected, 50)
-
-
-def test_identities_differ_by_cause_and_decision() -> None:
-    ids = {
-        observe({}, [Observation(rule.name, True, (0, 0))], 0, decision=decision)[rule.name].id
-        for rule in RULES
-        for decision in (7, 8)
-    }
-    assert len(ids) == 2 * len(RULES)
-    assert min(ids) == 7 * len(RULES)
 
 
 def test_the_fault_budget_drains_faster_than_it_refills() -> None:

@@ -8,10 +8,9 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage
 from common.motion import STILL, Twist
-from common.standstill import GRACE_NS, Displacement
+from common.standstill import GRACE_NS
 from services.safety.config import Safety
 from services.safety.core.motion_watch import (
-    CONFIRM_NS,
     Axis,
     Bounds,
     MotionWatch,
@@ -62,17 +61,6 @@ def test_bad_time_is_forgiven_half_as_fast_and_is_capped() -> None:
     for _ in range(20):  # flapping
         axis = follow(follow(axis, 0.0, 1.0, 0.04), 0.0, 0.0, 0.04)
     assert axis.bad_s > 0.27
-
-
-@pytest.mark.parametrize("axes", [(Axis(bad_s=0.3), Axis()), (Axis(), Axis(bad_s=0.3))])
-def test_each_axis_runs_away(axes: tuple[Axis, Axis]) -> None:
-    runaway, patient = MotionWatch(*axes), MotionWatch(Axis(bad_s=0.29), Axis(bad_s=0.29))
-    fast = Latest(Twist(2.0), 1)
-    for before, velocity, runs_away in (
-        (runaway, fast, True), (patient, fast, False), (patient, None, False)
-    ):  # fmt: skip
-        after = Supervisor(SETTINGS).follow(before, STILL, velocity, None, step_s=0.0, now_ns=1)
-        assert after.runs_away is runs_away
 
 
 # --- standstill -----------------------------------------------------------------------------
@@ -159,15 +147,6 @@ def test_time_to_stop_is_at_most_3_s(slow: dict[str, float]) -> None:
     assert board.late()
 
 
-def test_late_from_the_first_moment_after_the_limit() -> None:
-    moves = Displacement(Latest(Twist(0.1), 5), Twist(0.1))
-    state = Standstill(Phase.STOPPING, due_ns=100, displacement=moves)
-    assert [state.is_late(at_ns) for at_ns in (100, 101)] == [False, True]
-    assert not replace(state, phase=Phase.STANDING).is_late(101)
-    assert not replace(state, due_ns=None).is_late(101)
-    assert not replace(state, displacement=Displacement(steady=STILL)).is_late(101)
-
-
 @pytest.mark.parametrize(("linear", "angular", "stop_s"), [(0.7, 0.4, 0.7 / 0.6), (0.1, 0.9, 0.9)])
 def test_an_unknown_velocity_counts_as_the_fastest(
     linear: float, angular: float, stop_s: float
@@ -218,37 +197,6 @@ def test_a_motion_of_half_a_second_renews_the_limit(ticks: int, renewed: bool) -
     assert (after_ns == due_ns + ticks * TICK_NS) != renewed
 
 
-def test_a_commanded_motion_begins_the_confirmation_anew() -> None:
-    board = Board()
-    board.run(0.1)
-    board.step(0.0, moves=True)
-    phases = []
-    for seconds in (0.2, 0.04):
-        board.run(seconds)
-        phases.append(board.state.phase)
-    assert phases == [Phase.STOPPING, Phase.STANDING]
-
-
-def test_a_vehicle_that_stood_has_a_new_limit() -> None:
-    board = stopping(0.3)
-    board.run(0.1, 0.3)
-    board.step(0.0, moves=True)
-    board.step(0.3, moves=True)
-    assert board.state.due_ns is None
-    assert board.step(0.3).due_ns == board.now_ns + NS_PER_S
-
-
-def test_standstill_is_confirmed_after_exactly_its_time() -> None:
-    board = Board()
-    board.step()
-    for _ in range(CONFIRM_NS // TICK_NS):
-        assert board.state.phase is Phase.STOPPING
-        board.step()
-    assert board.state.phase is Phase.STANDING
-    board.run(5.0)
-    assert not board.late()
-
-
 def test_a_motion_between_begins_the_confirmation_anew() -> None:
     board = stopping(0.4)
     board.run(0.1, 0.4)
@@ -273,17 +221,6 @@ def test_velocities_alone_detect_an_uncommanded_motion(linear: float, angular: f
         assert took_s < 1.0
     away = max(abs(linear), abs(angular)) * took_s
     assert away < 0.05 + 0.02 * max(1.0, abs(linear) * 2)
-
-
-@pytest.mark.parametrize(
-    ("field", "away", "left"),
-    [("distance", 0.049, False), ("distance", -0.051, True), ("distance", 3.0, True),
-     ("heading", -0.048, False), ("heading", 0.052, True), ("heading", -1.9, True)],
-)  # fmt: skip
-def test_counters_alone_detect_an_uncommanded_motion(field: str, away: float, left: bool) -> None:
-    board = standing()
-    setattr(board, field, away)
-    assert board.step().left is left
 
 
 def test_a_vehicle_that_left_has_to_stop_anew_and_is_held_until_it_drives() -> None:

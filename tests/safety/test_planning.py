@@ -8,13 +8,11 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from common.messages import SONAR_NAMES
-from common.motion import STILL, Twist
+from common.motion import Twist
 from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
 from services.safety.core.planning import GRAZING_MPS, Zones, ramp, ramp_start, zones
-from services.safety.core.release import stopping_distance
 
-FREE = (math.inf,) * 8
 ALLOWED_AT_1M = math.sqrt(0.15**2 + 2 * 0.6 * 0.8) - 0.15
 
 distances = st.tuples(*[st.floats(0.0, 6.0) | st.just(math.inf)] * 8)
@@ -50,11 +48,6 @@ def only(name: str, distance: float) -> tuple[float, ...]:
     return tuple(distance if one == name else math.inf for one in SONAR_NAMES)
 
 
-@pytest.mark.parametrize("distance", [0.0, 0.1, 0.199999, 0.2])
-def test_inside_the_margin_nothing_is_allowed(field: Zones, distance: float) -> None:
-    assert field.allowed(distance) == 0.0
-
-
 @given(st.floats(0.01, 10.0), st.floats(0.01, 10.0))
 def test_nothing_is_exactly_nothing_whatever_the_settings(
     field: Zones, react: float, deceleration: float
@@ -77,44 +70,15 @@ def test_the_room_of_a_speed_is_where_it_is_allowed(
     assert replace(field, react=0.5, deceleration=0.4).room(0.2) == pytest.approx(0.35)
 
 
-@pytest.mark.parametrize(
-    ("name", "along"),
-    [("left", 0.0), ("front", 0.3), ("front_left", 0.54 * math.sqrt(0.5)), ("rear", -0.3)],
-)
-def test_a_flank_does_not_move_along_its_axis(field: Zones, name: str, along: float) -> None:
-    assert field.axes[SONAR_NAMES.index(name)].along(Twist(0.3, 1.2)) == pytest.approx(
-        along, abs=1e-12
-    )
-
-
-def test_a_wall_at_the_flank_lets_the_vehicle_pass_but_not_turn(field: Zones) -> None:
-    wall = only("left", 0.1)
-    assert field.limit(Twist(1.0, 0.0), wall).factor == 1.0
-    assert field.limit(Twist(0.0, 0.5), wall).factor == 0.0
-    assert field.limit(Twist(0.5, -0.5), wall).sonar == SONAR_NAMES.index("left")
-
-
 @pytest.mark.parametrize(("speed", "factor"), [(GRAZING_MPS, 1.0), (2 * GRAZING_MPS, 0.0)])
 def test_grazing_is_no_approach(field: Zones, speed: float, factor: float) -> None:
     assert field.limit(Twist(speed, 0.0), only("front", 0.0)).factor == factor
-
-
-@pytest.mark.parametrize("speed", [0.9, 2.0])
-def test_the_factor_brings_the_twist_down_to_what_is_allowed(field: Zones, speed: float) -> None:
-    limit = field.limit(Twist(speed, 0.0), only("front", 1.0))
-    assert limit.factor == pytest.approx(ALLOWED_AT_1M / speed)
-    assert limit.sonar == SONAR_NAMES.index("front")
 
 
 def test_the_first_of_two_equally_near_is_named(field: Zones) -> None:
     left, right = SONAR_NAMES.index("front_left"), SONAR_NAMES.index("front_right")
     ranges = tuple(0.4 if n in (left, right) else math.inf for n in range(8))
     assert field.limit(Twist(1.0, 0.0), ranges).sonar == min(left, right)
-
-
-def test_free_space_limits_nothing(field: Zones) -> None:
-    assert field.limit(Twist(1.0, 1.0), FREE).factor == 1.0
-    assert field.limit(Twist(1.0, 1.0), FREE).sonar is None
 
 
 @given(twists, distances)
@@ -136,15 +100,6 @@ def test_a_limited_twist_stays_on_its_curve(
     assert limited.linear * twist.angular == pytest.approx(limited.angular * twist.linear)
 
 
-@given(distances, st.floats(0.01, 1.0))
-def test_the_way_out_stays_open(field: Zones, ranges: tuple[float, ...], speed: float) -> None:
-    behind_free = tuple(
-        math.inf if name.startswith("rear") else distance
-        for name, distance in zip(SONAR_NAMES, ranges, strict=True)
-    )
-    assert field.limit(Twist(-speed, 0.0), behind_free).factor == 1.0
-
-
 @pytest.mark.parametrize(
     ("distance", "measured", "stops"),
     [
@@ -160,11 +115,6 @@ def test_measured_motion_has_its_own_bounds(
 ) -> None:
     sonar = field.too_fast(Twist(measured, 0.0), only("front", distance))
     assert sonar == (SONAR_NAMES.index("front") if stops else None)
-
-
-def test_stopping_distance() -> None:
-    assert stopping_distance(1.0, 0.25, 0.5) == pytest.approx(1.25)
-    assert stopping_distance(0.5, 0.2, 0.5) == pytest.approx(0.35)
 
 
 UP, DOWN = Twist(0.5, 1.5), Twist(0.6, 1.0)
@@ -185,11 +135,6 @@ speeds = st.floats(-2.0, 2.0)
 )
 def test_a_ramp_step(current: float, target: float, after: float) -> None:
     assert ramp(Twist(current), Twist(target), UP, DOWN, 0.1).linear == pytest.approx(after)
-
-
-def test_turning_has_a_ramp_of_its_own() -> None:
-    after = ramp(STILL, Twist(1.0, 1.0), UP, DOWN, 0.1)
-    assert (after.linear, after.angular) == pytest.approx((0.05, 0.15))
 
 
 @given(speeds, speeds, st.floats(0.0, 0.1))

@@ -17,20 +17,11 @@ from common.messages import (
     Switches,
     Velocity,
 )
-from common.motion import STILL, Twist
+from common.motion import Twist
 from services.safety.config import Safety
 from services.safety.core.causes import FAILURES, RULES, Held, latched
 from services.safety.core.inputs import Inputs
 from tests.safety.policy_fixture import TICK_S, PolicyFixture, hit, link
-
-
-def test_a_start_waits_for_every_input() -> None:
-    fixture = PolicyFixture()
-    assert fixture.decide().name == "inhibited"
-    assert fixture.state.latches["starting"].text.count(",") == 6
-    fixture.estop_connection = 0
-    fixture.decide()
-    assert "emergency stop" in fixture.state.latches["starting"].text
 
 
 @pytest.mark.parametrize(
@@ -51,13 +42,6 @@ def test_a_neutral_request_comes_before_the_first_run() -> None:
     assert "neutral" in fixture.state.latches
     assert fixture.drive().command == "run"
     assert fixture.drive(0.5).twist.linear > 0
-
-
-def test_a_neutral_request_while_inputs_settle_does_not_count() -> None:
-    fixture = PolicyFixture()
-    fixture.drive(seconds=0.1)
-    assert fixture.tick(40).name == "stop"  # the lease is over by now
-    assert fixture.drive(0.5).name == "inhibited"
 
 
 Trip = Callable[[PolicyFixture], None]
@@ -135,16 +119,6 @@ def test_inputs_that_fail_again_and_again_latch() -> None:
     fixture.tick(20)
     assert fixture.reset() == ""
     assert fixture.drive(seconds=1.0).command == "run"
-
-
-def test_inputs_that_fail_now_and_then_are_forgiven() -> None:
-    fixture = PolicyFixture().ready()
-    for _ in range(int(FAILURES) + 2):
-        fixture.muted = {"bumper"}
-        fixture.tick(10)
-        fixture.muted = set()
-        fixture.tick(600)
-    assert not latched(fixture.state.latches)
 
 
 SETTLING: list[tuple[str, Trip, Trip]] = [
@@ -243,13 +217,6 @@ def test_a_bridge_that_started_anew_wants_a_neutral_request() -> None:
     assert fixture.drive().command == "run"
 
 
-def test_leaving_stops() -> None:
-    fixture = PolicyFixture().running()
-    fixture.inputs = replace(fixture.inputs, leaving=True)
-    assert fixture.decide().command == "stop"
-    assert fixture.drive(0.5).command == "stop"
-
-
 def test_an_emergency_stop_that_only_the_bridge_received_latches_and_is_acknowledged() -> None:
     fixture = PolicyFixture().running(0.3)
     fixture.link = replace(fixture.link, estop=77)
@@ -301,13 +268,6 @@ def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_reque
     assert fixture.drive(0.3, seconds=1.0).command == "stop"
     fixture.drive()
     assert fixture.drive(0.3).command == "run"
-
-
-def test_being_pushed_off_the_bumper_uses_up_no_way() -> None:
-    fixture = hit()
-    fixture.linear = 0.3
-    fixture.tick(5)
-    assert fixture.state.release.travelled == 0.0
 
 
 def test_an_old_velocity_is_no_runaway() -> None:
@@ -365,39 +325,6 @@ def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str)
         assert fixture.drive(0.5, seconds=2.0).command == "stop"
         fixture.drive()
     assert fixture.drive(0.5).command == "run"
-
-
-def test_a_held_cause_knows_since_when() -> None:
-    fixture = PolicyFixture().ready()
-    lease_ticks = round(0.3 / TICK_S)
-    fixture.tick(lease_ticks)
-    assert "no_request" not in fixture.state.latches
-    fixture.tick()
-    since_ns, decision = fixture.now_ns, fixture.state.decision
-    fixture.tick(3)
-    now_ns = fixture.now_ns
-    held = fixture.state.latches["no_request"]
-    assert held == Held(since_ns, now_ns, 0, (0, now_ns), "No source requests motion.", held.id)
-    assert held.id // len(RULES) == decision
-
-
-def test_room_is_not_looked_for_while_motion_is_barred() -> None:
-    fixture = PolicyFixture().running()
-    fixture.estop()
-    fixture.linear = 0.0
-    fixture.sonar(front=0.1)
-    assert fixture.drive(0.5).command == "brake"
-    assert "blocked" not in fixture.state.latches
-    assert fixture.verdict.twist == STILL
-
-
-def test_a_request_that_is_stopped_commands_no_motion() -> None:
-    fixture = PolicyFixture()
-    fixture.tick(40)
-    fixture.drive(0.5)
-    assert fixture.tick().name == "inhibited"  # time has passed, so that a ramp would have begun
-    assert "neutral" in fixture.state.latches
-    assert fixture.verdict.twist == STILL
 
 
 @pytest.mark.parametrize("latched_by", [None, 41])
@@ -500,15 +427,6 @@ def test_a_motion_that_the_bridge_braked_alone_has_its_own_text() -> None:
     assert fixture.state.latches["predecessor"].text == (
         "The vehicle moved without a command while safety was absent."
     )
-
-
-def test_a_successor_without_a_link_sample_names_no_predecessor() -> None:
-    fixture = successor(latched_by=OLD)
-    fixture.muted = {"link"}
-    fixture.tick()
-    fixture.estop()
-    motion = fixture.motions[-1]
-    assert (motion.latched, motion.predecessor) == (True, None)
 
 
 @pytest.mark.parametrize("first", ["bumper", "link"])

@@ -34,12 +34,6 @@ def moving(
     return release.moving(sent, known, counter, reach=REACH, dt_s=dt_s, now_ns=now_ns)
 
 
-def test_it_moves_straight_in_the_chosen_direction() -> None:
-    assert Release().away(0.1) == STILL
-    assert Release(direction="forward").away(0.1) == Twist(0.1, 0.0)
-    assert Release(direction="backward").away(0.1) == Twist(-0.1, 0.0)
-
-
 @pytest.mark.parametrize(
     ("sent", "known", "travelled"),
     [
@@ -94,11 +88,6 @@ def test_coasting_ends_at_standstill(known: Twist | None, moves: bool) -> None:
     assert (moving(begun, None, known, now_ns=9).moved_ns == 9) == moves
 
 
-def test_a_new_contact_has_everything_anew() -> None:
-    used = Release(integrated=0.1, forbidden=frozenset({"forward"}), direction="backward")
-    assert used.after(None, TOUCHED, LEG, 9) == Release(barred_ns=9, came=LEG)
-
-
 def held(good: int, occurrence: int = 40) -> Held:
     return Held(1, 1, good, (1, 1), "hit", occurrence)
 
@@ -120,12 +109,6 @@ def test_a_press_during_a_release_forbids_its_direction(later_ns: int, forbidden
     assert (after.direction, after.barred_ns) == (None, later_ns)
     assert after.travelled == used.travelled
     assert after.came == (used.came if forbidden else LEG)
-
-
-def test_a_press_without_any_release_forbids_nothing() -> None:
-    assert Release().after(held(1), TOUCHED, LEG, 0).forbidden == frozenset()
-    never_chosen = Release(moved_ns=0)
-    assert never_chosen.after(held(1), TOUCHED, LEG, 0).forbidden == frozenset()
 
 
 def test_the_direction_that_moved_is_forbidden() -> None:

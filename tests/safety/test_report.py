@@ -62,14 +62,6 @@ def test_nothing_is_allowed_while_a_cause_is_latched() -> None:
     assert fixture.published().limits.forward > 0.5  # a request is missing, nothing else
 
 
-def test_the_motion_tells_what_was_judged() -> None:
-    fixture = PolicyFixture().running()
-    motion = fixture.motions[-1]
-    assert (motion.command, motion.source) == ("run", "teleop")
-    assert motion.linear == pytest.approx(fixture.verdict.twist.linear)
-    assert (motion.judged_boot, motion.judged) == (fixture.boot, fixture.seq)
-
-
 def test_one_sentence_says_why() -> None:
     fixture = PolicyFixture()
     assert sentence(fixture.state).startswith("Waiting for the first sample of: velocity,")
@@ -92,19 +84,6 @@ def test_one_sentence_says_why() -> None:
     fixture.pressed = False
     fixture.tick(5)
     assert sentence(fixture.state) == "The bumper was hit. Reset to go on."
-
-
-def test_a_latched_cause_names_what_is_due_before_a_reset() -> None:
-    fixture = PolicyFixture().ready()
-    fixture.estop()
-    due = "It is still pressed or requested: release it, then reset."
-    assert sentence(fixture.state) == f"Emergency stop. {due}"
-    fixture.tick(5)
-    assert sentence(fixture.state) == "Emergency stop. Reset to go on."
-    fixture = PolicyFixture().ready()
-    fixture.left_bits = 1
-    fixture.tick()
-    assert sentence(fixture.state).endswith("The cause is still present: fix it, then reset.")
 
 
 def test_a_pressed_bumper_names_the_step_that_is_accepted() -> None:
@@ -230,16 +209,6 @@ def test_zeros_after_an_emergency_stop_are_no_control() -> None:
     fixture.request(0.0)
     assert fixture.state.verdict.source == "teleop"
     assert list(transitions(before, fixture.state, None)) == []
-
-
-def test_a_source_that_waited_for_safety_is_reported_when_it_may_drive() -> None:
-    fixture = PolicyFixture()
-    found = []
-    for _ in range(100):
-        before = fixture.state
-        fixture.drive()
-        found += [note.about["to"] for note in transitions(before, fixture.state, None)]
-    assert found.count("teleop") == 1
 
 
 def test_the_longest_state_decodes() -> None:

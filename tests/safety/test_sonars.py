@@ -47,10 +47,6 @@ def along(metres: float) -> Moved:
     return Moved(along=metres)
 
 
-def test_nearer_counts_at_once() -> None:
-    assert feed(GOOD, 0.999).distance == 0.999
-
-
 @pytest.mark.parametrize(
     ("readings", "distance"),
     [
@@ -87,12 +83,6 @@ def test_what_cannot_be_trusted_is_no_distance(
     assert feed(recovering, 1.0) == Sonar(distance=1.0, fault="", same=1.0)
 
 
-def test_a_bad_sample_begins_the_count_anew() -> None:
-    bad = read(GOOD, None, "fault", STILL)
-    again = read(feed(bad, 1.0, 1.0), None, "fault", STILL)
-    assert feed(again, 1.0, 1.0).fault == "faulty"
-
-
 @pytest.mark.parametrize("fault", ["silent", "faulty", "too near to measure"])
 @pytest.mark.parametrize("reading", [0.0, 0.01, 0.04, 0.28])
 def test_a_fault_ends_with_near_readings_too(fault: str, reading: float) -> None:
@@ -102,14 +92,6 @@ def test_a_fault_ends_with_near_readings_too(fault: str, reading: float) -> None
         sonar = read(sonar, reading, "ok", STILL)
         assert sonar.fault == expected
     assert sonar.distance == reading
-
-
-def test_no_echo_is_free_space() -> None:
-    sonar = GOOD
-    for _ in range(3):
-        sonar = read(sonar, None, "no_echo", along(1.0))
-    assert sonar.distance == math.inf
-    assert sonar.fault == ""
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -179,11 +161,6 @@ def test_suspicion_ends_after_three_other_readings_in_a_row() -> None:
     assert (open_space.suspect, open_space.distance) == (False, math.inf)
 
 
-def test_a_fault_ends_a_suspicion_and_is_worse() -> None:
-    suspect = feed(feed(GOOD, 2.0, 2.0, 2.0), *[2.0] * 3, moved=along(0.2))
-    assert read(suspect, None, "fault", STILL) == Sonar(fault="faulty")
-
-
 readings = st.none() | st.floats(allow_nan=True, allow_infinity=True)
 statuses = st.sampled_from(["ok", "fault", "too_near", "no_echo"])
 
@@ -230,24 +207,6 @@ def after_samples(count: int, front: float | None = None, linear: float = 0.0) -
     return array
 
 
-def test_the_corners_swing_out_to_the_flanks_only() -> None:
-    swings = {name: axis.swing for name, axis in zip(SONAR_NAMES, FILTER.axes, strict=True)}
-    assert swings == dict.fromkeys(SONAR_NAMES, 0.0) | dict.fromkeys(("left", "right"), 0.55)
-
-
-def test_three_samples_open_all_sectors() -> None:
-    assert doubts(after_samples(2)) == "all silent"
-    assert doubts(after_samples(3)) == ""
-    assert after_samples(3, 1.0).distances[2] == 1.0
-
-
-def test_one_sample_is_taken_once() -> None:
-    array = after_samples(2)
-    for _ in range(3):
-        array = FILTER.update(array, sample(2), Twist(), 2 * STEP_NS)
-    assert doubts(array) == "all silent"
-
-
 def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> None:
     array, old = after_samples(3), sample(3)
     limit_ns = 3 * STEP_NS + round(0.3 * NS_PER_S)
@@ -256,17 +215,6 @@ def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> Non
     assert array.distances == (0.0,) * 8
     assert FILTER.update(array, old, Twist(), 3 * STEP_NS).distances == (0.0,) * 8
     assert FILTER.update(array, None, Twist(), 3 * STEP_NS).distances == (0.0,) * 8
-
-
-def test_a_constant_sonar_is_suspect_by_the_way_along_its_axis() -> None:
-    assert doubts(after_samples(13, 2.0, linear=1.0)) == "front suspect"
-    assert doubts(after_samples(13, 2.0, linear=0.5)) == ""
-    array = after_samples(13, 2.0, linear=1.0)
-    assert [math.isinf(one) for one in array.distances].count(True) == 7
-    assert array.distances[2] == 2.0
-    assert array.unseen == frozenset()
-    assert array.cautious(ROOM_M)[2] == ROOM_M
-    assert after_samples(2).unseen == frozenset(range(8))
 
 
 def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
@@ -325,12 +273,6 @@ def test_the_sensors_greatest_reading_is_no_disagreement() -> None:
     assert array.saturation.reading == 4.5
     assert "front" not in doubts(array)
     assert drive(60, AHEAD, **fronts).saturation.reading is None  # others see farther
-
-
-def test_no_number_is_no_wall_alongside() -> None:
-    assert doubts(drive(31, AHEAD, front_left=0.8, left=math.nan)) == (
-        "left faulty, front left suspect"
-    )
 
 
 @pytest.mark.parametrize("twist", [Twist(0.019), Twist(-0.019, 0.049), Twist(0.0, 0.049)])

@@ -10,8 +10,6 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from msgspec.structs import replace
 
-from common import codec
-from common.errors import MessageError
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive, EstopKeepalive, KeepaliveState, Limit, LimitState
@@ -140,16 +138,6 @@ def test_values_that_are_not_finite_are_refused(value: float) -> None:
     assert request(DRIVES, angular=value) == (DRIVES, "not_finite")
     assert limit(LIMITS, value) == (LIMITS, "not_finite")
     assert limit(LIMITS, angular=value) == (LIMITS, "not_finite")
-
-
-@pytest.mark.parametrize(("seq", "reason"), [(5, "seq_not_rising"), (6, "")])
-def test_each_kind_is_checked_against_its_channel(seq: int, reason: str) -> None:
-    channels: list[tuple[Any, Any]] = [(request, DRIVES), (limit, LIMITS), (keep, KEPT)]
-    for accept, empty in channels:
-        before, _ = accept(empty, seq=5)
-        after, refused = accept(before, now_ns=1, seq=seq)
-        assert refused == reason
-        assert (after == before) == bool(reason)
 
 
 class Publishers(RuleBasedStateMachine):
@@ -292,16 +280,6 @@ def test_a_release_requests_no_other_motion() -> None:
 # --- speed limits ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [{"linear": -0.1}, {"angular": -1}, {"linear": "fast"}, {"linear": True}, {"reason": "x" * 81},
-     {"reason": 5}, {"echo": None}],
-)  # fmt: skip
-def test_a_wrong_type_is_no_limit(fields: dict[str, object]) -> None:
-    with pytest.raises(MessageError, match="not a Limit"):
-        codec.decode(codec._encoder.encode({"echo": 1, **fields}), Limit)
-
-
 def test_a_reason_shows_no_control_characters() -> None:
     assert printable("person\tat\x1b[2J 2 m\u202e\n") == "person at [2J 2 m"
     assert limit(LIMITS, 0.2, reason="a\x07b.")[0].channels["lidar"].reason == "a b."
@@ -319,31 +297,6 @@ def test_a_second_limiting_publisher_is_reported_for_the_lease() -> None:
     slow, _ = limit(limit(slow)[0], boot=2)
     assert next(slow.observations(NS_PER_S - 1)).text == "Stopped by lidar: two publishers."
     assert slow.conflicts(NS_PER_S) == []
-
-
-@pytest.mark.parametrize(
-    ("linear", "angular", "asked", "slowed"),
-    [
-        (0.25, None, Twist(-1.0, 0.4), Twist(-0.25, 0.1)),
-        (None, 0.1, Twist(1.0, 0.4), Twist(0.25, 0.1)),
-        (0.25, None, Twist(0.25, 2.0), None),
-        (None, None, Twist(1.0, 1.0), None),
-    ],
-)
-def test_a_cap_keeps_the_curve_and_ends_with_its_lease(
-    linear: float | None, angular: float | None, asked: Twist, slowed: Twist | None
-) -> None:
-    limits, _ = limit(LIMITS, linear, angular=angular)
-    expected = (slowed, "lidar") if slowed else (asked, None)
-    assert limits.limited(asked, LEASE_NS) == expected
-    assert limits.limited(asked, LEASE_NS + 1) == (asked, None)
-
-
-@pytest.mark.parametrize(("lidar", "fleet"), [(0.5, 0.2), (0.2, 0.5)])
-def test_the_tightest_source_is_named(lidar: float, fleet: float) -> None:
-    limits, _ = limit(limit(LIMITS, lidar)[0], fleet, source="fleet")
-    tightest = "fleet" if fleet < lidar else "lidar"
-    assert limits.limited(Twist(1.0), 0) == (Twist(0.2), tightest)
 
 
 @pytest.mark.parametrize(
