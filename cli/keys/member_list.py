@@ -1,11 +1,11 @@
-"""The member list: valid profiles, lookup, revocation, and the output of ``t2 keys list``. Pure.
+"""The member list: valid profiles, lookup, revocation, and the table of ``t2 keys list``. Pure.
 
 Routers of robots and sites listen: their certificates hold addresses and are valid for both ends of
 a link. All other members only connect, and their certificates are not valid for a router.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from ipaddress import ip_address
 from typing import Annotated, Literal
 
@@ -31,19 +31,13 @@ VEHICLE = ("192.168.201.1", "10.7.5.220")  # on its own Wi-Fi and on its cable (
 EVERY_ROBOT = "*"
 LONGEST = 48  # of a name: a common name has 64 characters (RFC 5280), ours role and serial too
 NAMES = f"1 to {LONGEST} letters, digits, dots, hyphens and underscores"
-SOURCE_NAMES = (
-    "a lowercase letter, then up to 31 lowercase letters, digits, hyphens and underscores, as in "
-    "safety.sources and safety.limits"
-)
+SOURCE_NAMES = "a lowercase letter, then up to 31 of a-z, 0-9, hyphen and underscore"
 LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?"
 HOST = re.compile(rf"(?=.{{1,253}}\Z)(?!(.*\.)?\d+\Z)({LABEL}\.)*{LABEL}\Z")  # no 300.1.1.1
 HEAD = ("role", "name", "robots", "sources", "until", "state", "certificate")
 
 Span = tuple[float, float]  # validity of a certificate, in seconds since 1970
 State = Literal["valid", "expires soon", "expired", "revoked"]
-
-
-# --- a new certificate --------------------------------------------------------------------------
 
 
 def profile(
@@ -76,7 +70,7 @@ def default_sources(role: Role, name: str) -> tuple[str, ...]:
 
 def span(now_s: float, days: int, authority_ends_s: float) -> Span:
     """Return the validity of a new certificate; it never exceeds the authority's."""
-    left = days_left(authority_ends_s, now_s)
+    left = int((authority_ends_s - now_s) // DAY_S)
     if left < 1:
         raise RobotError(
             "the CA has expired; `t2 keys init --folder NEW` creates another, and every "
@@ -132,17 +126,9 @@ def _addresses(role: Role, given: Sequence[str]) -> Sequence[str]:
     return (*given, *LOCAL) if given else ()
 
 
-# --- the list -----------------------------------------------------------------------------------
-
-
-def of(members: Members, role: Role, name: str) -> tuple[Member, ...]:
-    """Return the certificates of a member that are not revoked, oldest first."""
-    return tuple(each for each in members.welcome if (each.role, each.name) == (role, name))
-
-
 def newest(members: Members, role: Role, name: str) -> Member:
     """Return the latest certificate of a member; raise ``RobotError`` without one."""
-    found = newest_of_each(members).get((role, name))
+    found = _newest(members).get((role, name))
     if found is None:
         raise RobotError(
             f"{role} {name} has no certificate, or a revoked one; "
@@ -151,25 +137,19 @@ def newest(members: Members, role: Role, name: str) -> Member:
     return found
 
 
-def newest_of_each(members: Members) -> Mapping[tuple[Role, str], Member]:
-    """Return the latest certificate of each admitted member, by role and name."""
-    return {(member.role, member.name): member for member in members.welcome}
-
-
 def routers(members: Members) -> list[Member]:
     """Return the latest certificate of each admitted router."""
-    newest = newest_of_each(members)
-    return [newest[who] for who in sorted(newest) if newest[who].listens]
+    return [each for _, each in sorted(_newest(members).items()) if each.listens]
 
 
 def check_free(members: Members, role: Role, name: str, now_s: float) -> None:
     """Raise ``RobotError`` if a member of that name has a valid certificate."""
-    good = [each for each in of(members, role, name) if each.expires.timestamp() > now_s]
-    if good:
-        raise RobotError(
-            f"{role} {name} has a certificate until {good[-1].expires:%Y-%m-%d}; "
-            f"`t2 keys renew {role} {name}` makes another, `revoke` revokes it"
-        )
+    for each in members.welcome:
+        if (each.role, each.name) == (role, name) and each.expires.timestamp() > now_s:
+            raise RobotError(
+                f"{role} {name} has a certificate until {each.expires:%Y-%m-%d}; "
+                f"`t2 keys renew {role} {name}` makes another, `revoke` revokes it"
+            )
 
 
 def revoked(
@@ -177,7 +157,11 @@ def revoked(
 ) -> tuple[Members, Sequence[Member]]:
     """Return the list with revoked certificates of a member, and the revoked ones."""
     ends = "" if serial is None else f".{serial}"
-    matching = [each for each in of(members, role, name) if each.common_name.endswith(ends)]
+    matching = [
+        each
+        for each in members.welcome
+        if (each.role, each.name) == (role, name) and each.common_name.endswith(ends)
+    ]
     if not matching:
         with_serial = "" if serial is None else f" with the serial {serial!r}"
         raise RobotError(f"{role} {name} has no certificate{with_serial} that could be revoked")
@@ -203,7 +187,7 @@ def as_table(members: Members, now_s: float) -> str:
         (
             member.role,
             member.name,
-            robots(member),
+            " ".join(member.robots) or "-",
             " ".join(member.sources) or "-",
             f"{member.expires:%Y-%m-%d}",
             state(member, now_s),
@@ -214,27 +198,6 @@ def as_table(members: Members, now_s: float) -> str:
     return output.table(HEAD, rows)
 
 
-def advice(members: Members, ca_ends_s: float, now_s: float) -> Iterator[str]:
-    """Yield what expires, with the command to renew it; skip renewed certificates."""
-    left = days_left(ca_ends_s, now_s)
-    if left < DAYS:
-        yield f"the CA {_expiry(left)}: create another with `t2 keys init --folder NEW`"
-    for member in newest_of_each(members).values():
-        if state(member, now_s) in ("expires soon", "expired"):
-            name = f"{member.role} {member.name}"
-            left = days_left(member.expires.timestamp(), now_s)
-            yield f"{name} {_expiry(left)}: `t2 keys renew {name}`"
-
-
-def robots(member: Member) -> str:
-    """Return the robots of a member as text."""
-    return "every" if EVERY_ROBOT in member.robots else " ".join(member.robots) or "-"
-
-
-def days_left(ends_s: float, now_s: float) -> int:
-    """Return the number of whole days left; negative after the expiry."""
-    return int((ends_s - now_s) // DAY_S)
-
-
-def _expiry(left: int) -> str:
-    return f"expires in {left} days" if left >= 0 else "has expired"
+def _newest(members: Members) -> Mapping[tuple[Role, str], Member]:
+    """Return the latest certificate of each admitted member, by role and name."""
+    return {(member.role, member.name): member for member in members.welcome}

@@ -26,7 +26,7 @@ def init(options: argparse.Namespace) -> int:
     with locked(options.folder, create=True) as folder:
         folder.create_authority(authority, Members(site=site), passphrase)
     until = f"{authority.certificate.not_valid_after_utc:%Y-%m-%d}"
-    _print(instructions.authority_created(str(options.folder), site, until, bool(passphrase)))
+    _print(instructions.authority_created(str(options.folder), site, until))
     return 0
 
 
@@ -73,8 +73,6 @@ def show(options: argparse.Namespace) -> int:
     ends_s = certificate_from(folder.certificate()).not_valid_after_utc.timestamp()
     print(f"site {members.site}, CA until {datetime.fromtimestamp(ends_s, UTC):%Y-%m-%d}\n")
     print(member_list.as_table(members, now_s))
-    for line in member_list.advice(members, ends_s, now_s):
-        print(f"\n{line}")
     return 0
 
 

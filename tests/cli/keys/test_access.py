@@ -31,18 +31,6 @@ def test_no_member_may_write_motion_commands() -> None:
             assert not may(given, "write", keys.MOTION.on(MINE)), role
 
 
-@pytest.mark.parametrize("role", ["viewer", "fleet"])
-def test_viewer_and_fleet_cannot_move_a_robot(role: str) -> None:
-    given = ROLES[role]
-    for key in (keys.DRIVE.on(MINE, source="x"), keys.DRIVE.on("*", source="*"), "**"):
-        assert not may(given, "write", key)
-    for call in keys.CALLS:
-        assert not may(given, "ask", call.on(MINE))
-    assert may(given, "write", keys.estop_key(MINE)) is (role == "fleet")
-    for topic in keys.TOPICS:
-        assert may(given, "read", topic.on(MINE, service="x", side="left", source="x"))
-
-
 def test_a_driver_is_limited_to_its_robots() -> None:
     given = driver((MINE,), ("teleop",))
     for wanted, robot in ((True, MINE), (False, OTHER), (False, "*")):
@@ -95,13 +83,13 @@ def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> Non
 
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "device lidar of 001", "fleet"])
-@pytest.mark.parametrize("service", ON_BOARD)
-def test_a_member_cannot_publish_as_an_on_board_service(role: str, service: str) -> None:
+def test_a_member_cannot_publish_as_an_on_board_service(role: str) -> None:
     given = ROLES[role]
-    assert not may(given, "write", keys.HEALTH.on(MINE, service=service))
-    assert not may(given, "write", keys.EVENTS.on(MINE, service=service))
-    assert not may(given, "serve", keys.info_key(MINE, service, "config"))
-    assert not may(given, "live", keys.live_key(MINE, service, "1"))
+    for service in ON_BOARD:
+        assert not may(given, "write", keys.HEALTH.on(MINE, service=service))
+        assert not may(given, "write", keys.EVENTS.on(MINE, service=service))
+        assert not may(given, "serve", keys.info_key(MINE, service, "config"))
+        assert not may(given, "live", keys.live_key(MINE, service, "1"))
 
 
 @pytest.mark.parametrize("role", ["viewer", "driver of 001", "device lidar of 001", "fleet"])
@@ -135,12 +123,6 @@ def test_a_ros_computer_has_rights_at_the_routers_of_its_robots_only() -> None:
     for robots, wanted in (((MINE,), True), (("*",), True), ((OTHER,), False), ((), False)):
         given = rights(member("ros", "laptop", robots), ROUTER)
         assert given == (ROLES["ros of 001"] if wanted else {})
-
-
-def test_a_ros_computer_has_no_rights_on_keys_of_t2() -> None:
-    for expressions in ROLES["ros of 001"].values():
-        for expression in expressions:
-            assert expression.startswith(("0/", "@ros2_lv/0/")), expression
 
 
 def test_a_ros_computer_writes_only_keys_of_fixed_length() -> None:

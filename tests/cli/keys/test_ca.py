@@ -101,15 +101,6 @@ def test_a_routers_addresses_are_in_its_certificate(authority: CertificateAuthor
         issued(authority, DRIVER).extensions.get_extension_for_class(x509.SubjectAlternativeName)
 
 
-def test_an_encrypted_key_needs_its_passphrase(authority: CertificateAuthority) -> None:
-    certificate = certificate_pem(authority.certificate)
-    encrypted = key_pem(authority.key, b"correct horse")
-    assert b"ENCRYPTED" in encrypted
-    CertificateAuthority.load(certificate, encrypted, lambda: b"correct horse")
-    with pytest.raises(RobotError, match="wrong passphrase, or not a key"):
-        CertificateAuthority.load(certificate, encrypted, lambda: b"wrong")
-
-
 def test_invalid_keys(authority: CertificateAuthority) -> None:
     certificate = certificate_pem(authority.certificate)
     stranger = CertificateAuthority.create("berlin", SPAN)

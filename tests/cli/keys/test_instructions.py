@@ -13,20 +13,9 @@ from tools.docs import DOCS
 ROBOT = certified(profile("robot", "001"))
 SITE = certified(profile("site", "berlin", addresses=("site.example",)))
 ANNA = certified(profile("driver", "anna", ("001", "002")))
-NAV = certified(profile("driver", "anna", ("*",), sources=("nav",)))
-LIDAR = certified(profile("device", "lidar", ("001",), sources=("lidar",)))
+NAV = certified(profile("driver", "nav", ("*",), sources=("nav",)))
 VIEWER = certified(profile("viewer", "v"))
 LAPTOP = certified(profile("ros", "laptop", ("001",)))
-
-
-@pytest.mark.parametrize(
-    ("encrypted", "message"), [(False, "it is not encrypted"), (True, "it is encrypted")]
-)
-def test_a_new_authority(encrypted: bool, message: str) -> None:
-    printed = "\n".join(instructions.authority_created("keys", "berlin", "2036-11-18", encrypted))
-    assert "keys holds the certificate authority of site berlin, until 2036-11-18" in printed
-    assert message in printed
-    assert "t2 keys issue robot 001" in printed
 
 
 @pytest.mark.parametrize(
@@ -41,24 +30,15 @@ def test_a_new_authority(encrypted: bool, message: str) -> None:
             "     scp -p keys/members.json site.example:/etc/t2/keys/members.json  # site berlin",
         ]),
         (ANNA, "other/driver.anna", [ROBOT], [
-            "  may move robot 001, robot 002",
-            "     t2 drive --config driver.anna/bus.toml",
+            "  for robots 001, 002",
+            "     t2 doctor --config driver.anna/bus.toml",
             "     scp -p other/members.json 192.168.201.1:/etc/t2/keys/members.json  # robot 001",
         ]),
         (NAV, "k/d", [], [
-            "  may move every robot",
-            "  drives as nav; no other source is allowed",
+            "  for robots all as nav only",
             "  may not reset, release or set the brake switches: no operator's source",
         ]),
-        (LIDAR, "k/d", [ROBOT], [
-            "  limits robot 001 as lidar; no other source is allowed",
-            "     t2 doctor --config d/bus.toml",
-        ]),
-        (VIEWER, "viewer.v", [], [
-            "     t2 dashboard --config viewer.v/bus.toml",
-            "3. Copy ./members.json to each router and restart it.",
-        ]),
-        (LAPTOP, "keys/ros.laptop", [SITE, ROBOT], ["  may move robot 001"]),
+        (VIEWER, "viewer.v", [], ["2. Copy ./members.json to each router and restart it:"]),
     ],
 )  # fmt: skip
 def test_an_issued_certificate(
@@ -67,7 +47,6 @@ def test_an_issued_certificate(
     printed = list(instructions.certificate_issued(who, target, routers))
     for line in lines:
         assert line in printed, printed
-    assert any("drives as" in line for line in printed) is (who is NAV)
 
 
 def test_the_first_router_needs_no_list_update() -> None:
@@ -91,28 +70,14 @@ def test_a_ros_computers_environment() -> None:
     )
 
 
-def test_the_previous_certificate() -> None:
+def test_after_a_renewal_and_a_revocation() -> None:
     printed = list(instructions.certificate_renewed(member("driver", "anna", "3f2a91bc", 10)))
-    assert "until 2026-12-01" in printed[0]
     assert printed[1] == "     t2 keys revoke driver anna --serial 3f2a91bc"
-
-
-@pytest.mark.parametrize("routers", [[], [ROBOT]])
-def test_a_revocation_needs_every_router(routers: list[Member]) -> None:
-    printed = list(instructions.certificates_revoked([ANNA], "keys/driver.anna", routers))
-    assert printed[0] == "driver.anna.00000001 is revoked"
-    assert "takes effect when every router" in printed[1]
-    copies = [line for line in printed if line.startswith("     scp -p keys/members.json ")]
-    assert len(copies) == len(routers)
-    assert printed[-1].strip() == instructions.IN_CONTAINERS
-
-
-def test_a_router_in_a_container_needs_new_settings() -> None:
+    revoked = list(instructions.certificates_revoked([ANNA], "keys/driver.anna", [ROBOT]))
+    assert revoked[0] == "driver.anna.00000001 is revoked"
+    assert any(line.startswith("     scp -p keys/members.json ") for line in revoked)
+    (_, *_, warning) = instructions.certificates_revoked([ROBOT], "keys/robot.001", [])
+    assert warning.startswith("Clients still accept")
     compose = (DOCS.parent / "compose.yaml").read_text(encoding="utf-8")
     for service in instructions.IN_CONTAINERS.partition("--force-recreate ")[2].split():
         assert f"\n  {service}:\n" in compose
-
-
-def test_a_stolen_router_has_a_warning() -> None:
-    printed = list(instructions.certificates_revoked([ROBOT], "keys/robot.001", []))
-    assert printed[-1].startswith("Clients still accept")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.keys.machine_settings import SOCKET, bus_toml, endpoints
+from cli.keys.machine_settings import SOCKET, bus_toml
 from cli.keys.member_list import profile
 from cli.settings import Everything
 from common.config import Sources, load
@@ -41,7 +41,7 @@ def test_a_site_has_no_robot_id() -> None:
     ("who", "routers", "endpoints"),
     [
         (ANNA, [ROBOT, OTHER], ["tls/192.168.201.1:7447", "tls/10.7.5.220:7447"]),
-        (ANNA, [OTHER], ["tls/192.168.201.1:7447", "tls/10.7.5.220:7447"]),
+        (ANNA, [profile("site", "x", (), ("127.0.0.1",))], ["tls/localhost:7447"]),
         (ANNA, [ROBOT, SITE], ["tls/site.example:7447"]),
         (
             Profile(role="driver", name="b", robots=("*",), sources=OPERATORS_SOURCES),
@@ -53,30 +53,18 @@ def test_a_site_has_no_robot_id() -> None:
 )
 def test_other_members_connect(who: Profile, routers: list[Profile], endpoints: list[str]) -> None:
     text = bus_toml(who, routers)
-    assert tomllib.loads(text)["bus"] == {"connect": endpoints[:1], **FILES}
+    table = tomllib.loads(text)
+    assert table["bus"] == {"connect": endpoints[:1], **FILES}
+    assert table.get("robot") == ({"id": "001"} if who is ANNA else None)
     assert [line for line in text.splitlines() if line.startswith("# or: ")] == [
         f'# or: connect = ["{other}"]' for other in endpoints[1:]
     ]
 
 
 @pytest.mark.parametrize(
-    ("robots", "chosen"),
-    [(("001",), {"id": "001"}), (("001", "002"), None), (("*",), None), ((), None)],
-)
-def test_the_robot_id_is_set_for_a_single_robot(robots: tuple[str, ...], chosen: object) -> None:
-    assert (
-        tomllib.loads(
-            bus_toml(Profile(role="driver", name="b", robots=robots, sources=OPERATORS_SOURCES), [])
-        ).get("robot")
-        == chosen
-    )
-
-
-@pytest.mark.parametrize(
     ("sources", "expected"),
     [
         ((), {}),
-        (("teleop", "web", "checkout"), {}),
         (("teleop",), {"dashboard": {"source": "teleop"}}),
         (("nav", "x"), {"teleop": {"source": "nav"}, "dashboard": {"source": "nav"}}),
     ],
@@ -92,11 +80,3 @@ def test_screens_use_an_allowed_source(
     config = load(Everything, Sources(files=(file,))).config
     assert config.teleop.source == (sources[0] if "teleop" in expected else "teleop")
     load(Shared, Sources(files=(file,)))  # other programs accept it
-
-
-def test_a_device_drives_no_screen() -> None:
-    assert "source" not in bus_toml(profile("device", "x", ("001",), (), ("lidar",)), [ROBOT])
-
-
-def test_a_local_router_is_reached_on_localhost() -> None:
-    assert endpoints([profile("site", "x", (), ("127.0.0.1",))]) == ["tls/localhost:7447"]

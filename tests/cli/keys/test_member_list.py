@@ -1,4 +1,4 @@
-"""Profiles, validity, changes of the member list, and the output of ``t2 keys list``."""
+"""Profiles, validity, changes of the member list, and the table of ``t2 keys list``."""
 
 from typing import Any
 
@@ -6,9 +6,7 @@ import pytest
 
 from cli.keys import member_list
 from cli.keys.member_list import (
-    CA_DAYS,
     DAY_S,
-    DAYS,
     EARLY_S,
     LOCAL,
     VEHICLE,
@@ -17,7 +15,7 @@ from cli.keys.member_list import (
     span,
 )
 from common.errors import ConfigError, RobotError
-from common.members import ROLES, Member, Members, Profile, Role
+from common.members import ROLES, Member, Members, Profile
 from tests.cli.keys.site_fixture import NOW_S, member, members
 
 OLD = member("driver", "anna", "00000001", 10)
@@ -25,7 +23,6 @@ NEW = member("driver", "anna", "00000002")
 GONE = member("driver", "anna", "00000003", revoked=True)
 OTHER = member("driver", "ann", "00000001")
 SAME_NAME = member("viewer", "anna")
-LONG_S = NOW_S + 3000 * DAY_S
 SITE = members(OLD, NEW, GONE, OTHER, SAME_NAME)
 
 
@@ -44,20 +41,13 @@ SITE = members(OLD, NEW, GONE, OTHER, SAME_NAME)
         (("driver", "anna", ("*",)), {"robots": ("*",)}),
         (("driver", "planner", ("001",), (), ("nav", "nav-2", "nav")),
          {"robots": ("001",), "sources": ("nav", "nav-2")}),
-        (("driver", "anna", ("001",), (), ("n" * 32,)),
-         {"robots": ("001",), "sources": ("n" * 32,)}),
     ],
 )  # fmt: skip
 def test_valid_profiles(given: tuple[Any, ...], found: dict[str, tuple[str, ...]]) -> None:
     assert profile(*given) == Profile(role=given[0], name=given[1], **found)
 
 
-@pytest.mark.parametrize("role", ROLES)
-def test_routers_listen(role: Role) -> None:
-    assert Profile(role=role, name="x").listens is (role in ("robot", "site"))
-
-
-@pytest.mark.parametrize("source", ["", "*", "Nav", "nav/x", "1nav", "n" * 33, "nav\n", "**"])
+@pytest.mark.parametrize("source", ["*", "Nav", "n" * 33, "nav\n"])
 def test_invalid_sources(source: str) -> None:
     with pytest.raises(ConfigError, match="is not a source name"):
         profile("driver", "anna", ("001",), (), (source,))
@@ -68,17 +58,13 @@ def test_invalid_sources(source: str) -> None:
     [
         (("driver", "anna"), "a driver needs --robot ID"),
         (("viewer", "guest", ("001",)), "are for drivers, devices and ros, not for a viewer"),
-        (("robot", "001", ("002",)), "are for drivers, devices and ros, not for a robot"),
-        (("ros", "laptop"), "a ros needs --robot ID"),
         (("fleet", "control", (), ("10.0.0.1",)), "a fleet only connects"),
         (("site", "berlin"), "a site's router needs --address"),
         (("driver", "../anna", ("001",)), "'../anna' is not a name"),
         (("driver", "", ("001",)), "'' is not a name"),
-        (("driver", "a" * 49, ("001",)), "is not a name"),
         (("driver", "anna", ("0 1",)), "'0 1' is not a name"),
         (("driver", "anna\n", ("001",)), "'anna\\n' is not a name"),
         (("viewer", "hall", (), (), ("nav",)), "--source is for drivers and devices; a viewer"),
-        (("ros", "laptop", ("001",), (), ("ros2",)), "--source is for drivers and devices; a ros"),
     ],
 )
 def test_invalid_profiles(given: tuple[Any, ...], message: str) -> None:
@@ -88,16 +74,9 @@ def test_invalid_profiles(given: tuple[Any, ...], message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "address", ["robot", "robot-1", "r1.lan", "xn--bcher-kva.example", "10.7.5.220", "fd00::1"]
-)
-def test_addresses(address: str) -> None:
-    assert profile("site", "x", (), (address,)).addresses[0] == address
-
-
-@pytest.mark.parametrize(
     "address",
-    ["", "300.1.1.1", "10.7.5", "a b", "-a.example", "a..b", "a.", "tls/a", "a:7447", "*.a.example",
-     "a" * 64, "a\n", ".".join(["a" * 63] * 4)],
+    ["", "300.1.1.1", "a b", "-a.example", "a.", "a:7447", "*.a.example", "a" * 64, "a\n",
+     ".".join(["a" * 63] * 4)],
 )  # fmt: skip
 def test_invalid_addresses(address: str) -> None:
     with pytest.raises(ConfigError, match="is neither an IP address nor a host name"):
@@ -112,14 +91,9 @@ def test_the_common_name_ends_with_the_start_of_the_serial() -> None:
     assert longest <= 64  # RFC 5280, ub-common-name
 
 
-def test_validity_of_a_certificate() -> None:
-    now_s = 1e9
-    assert span(now_s, DAYS, now_s + CA_DAYS * DAY_S) == (now_s - EARLY_S, now_s + 365 * DAY_S)
-
-
 @pytest.mark.parametrize("days", [0, -1, 11])
 def test_a_certificate_never_exceeds_the_authority(days: int) -> None:
-    assert span(0.0, 10, 10.5 * DAY_S)[1] == 10 * DAY_S
+    assert span(0.0, 10, 10.5 * DAY_S) == (-EARLY_S, 10 * DAY_S)
     with pytest.raises(ConfigError, match=rf"--days {days}: allowed is 1..10, the remaining"):
         span(0.0, days, 10.5 * DAY_S)
 
@@ -178,7 +152,6 @@ def test_revoke_one_certificate_of_a_member() -> None:
     [
         ("ben", None, "driver ben has no certificate that could be revoked"),
         ("anna", "00000003", "has no certificate with the serial '00000003' that could be"),
-        ("anna", "1", "has no certificate with the serial '1' that could be"),
         ("anna", "", "has no certificate with the serial '' that could be"),
     ],
 )
@@ -195,11 +168,8 @@ def test_nothing_to_revoke(name: str, serial: str | None, message: str) -> None:
     [
         (member("viewer", "a", days=30), "valid"),
         (member("viewer", "a", days=29.99), "expires soon"),
-        (member("viewer", "a", days=0.01), "expires soon"),
         (member("viewer", "a", days=0), "expired"),
-        (member("viewer", "a", days=-5), "expired"),
         (member("viewer", "a", days=300, revoked=True), "revoked"),
-        (member("viewer", "a", days=-5, revoked=True), "revoked"),
     ],
 )
 def test_states(who: Member, expected: str) -> None:
@@ -212,33 +182,6 @@ def test_the_table() -> None:
     assert member_list.as_table(site, NOW_S).splitlines() == [
         "role    name   robots  sources       until  state    certificate",
         "driver  anna   001     -        2027-09-17  valid    driver.anna.00000001",
-        "driver  ben    every   nav web  2027-09-17  valid    driver.ben.00000002",
+        "driver  ben    *       nav web  2027-09-17  valid    driver.ben.00000002",
         "viewer  guest  -       -        2026-11-20  expired  viewer.guest.00000001",
     ]
-
-
-def test_advice_names_the_renewal_command() -> None:
-    site = members(
-        member("driver", "anna", days=12.5),
-        member("driver", "ben", days=-1),
-        member("viewer", "guest", days=31),
-        member("viewer", "gone", days=3, revoked=True),
-    )
-    assert list(member_list.advice(site, LONG_S, NOW_S)) == [
-        "driver anna expires in 12 days: `t2 keys renew driver anna`",
-        "driver ben has expired: `t2 keys renew driver ben`",
-    ]
-
-
-def test_renewed_certificates_need_no_advice() -> None:
-    site = members(member("driver", "anna", days=-2), member("driver", "anna", "00000002"))
-    assert list(member_list.advice(site, LONG_S, NOW_S)) == []
-
-
-@pytest.mark.parametrize(
-    ("left", "message"),
-    [(365, []), (364.5, ["the CA expires in 364 days"]), (-1, ["the CA has expired"])],
-)
-def test_advice_for_an_expiring_authority(left: float, message: list[str]) -> None:
-    lines = list(member_list.advice(members(), NOW_S + left * DAY_S, NOW_S))
-    assert [line.partition(":")[0] for line in lines] == message
