@@ -12,10 +12,6 @@ from services.metrics.config import MetricsConfig
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command line options; each sets a setting."""
     add_setting(
-        parser, "--host", "metrics.host", "address to listen on; only this machine by default"
-    )
-    add_setting(parser, "--port", "metrics.port", "port to listen on")
-    add_setting(
         parser,
         "--robots",
         "metrics.robots",

@@ -18,12 +18,12 @@ from common import clock, keys, members
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.errors import ConfigError, LinkError
-from common.freshness import Latest
 from common.service import Node
-from services.metrics.config import Metrics, MetricsConfig
+from services.metrics.config import MetricsConfig
 from services.metrics.robot import RobotState, prune
-from services.metrics.samples import certificate_expiry, metric_families
+from services.metrics.samples import STREAMS, certificate_expiry, metric_families
 
+HOST = "127.0.0.1"  # without authentication: Prometheus runs here, the bus crosses the network
 DEPTH = 2000  # pending samples of one stream, for all robots
 PATIENCE_S = 2.0  # for the loop; Prometheus waits 10 s
 CHECK_S = 60.0  # between two checks for expired robots, and of the member list
@@ -48,24 +48,20 @@ class Exporter(Collector):
         node.loop.every(CHECK_S, self._prune)
         if node.config.bus.members:
             node.loop.every(CHECK_S, lambda _: self._read_members(Path(node.config.bus.members)))
-        self._server = start_server(settings, self)
+        self._server = start_server(settings.port, self)
         node.on_exit = self._close
 
     def _subscribe(self) -> None:
         bus = self._bus
-        for topic in (keys.SAFETY, keys.LINK, keys.ODOMETRY):
-            bus.subscribe(topic, self._on_stream, depth=DEPTH)
-        bus.subscribe(keys.HEALTH, self._on_health, depth=DEPTH, service="*")
+        for topic in STREAMS.values():
+            bus.subscribe(topic, self._on_message, depth=DEPTH)
+        bus.subscribe(keys.HEALTH, self._on_message, depth=DEPTH, service="*")
         bus.subscribe(keys.EVENTS, self._on_event, depth=DEPTH, service="*")
         bus.watch_live(keys.live_key(bus.robot, "*", "*"), self._on_live)
 
-    def _on_stream(self, arrival: Arrival[Any]) -> None:
-        latest = Latest(arrival.message, arrival.received_ns)
-        self._robot(arrival.key).streams[type(arrival.message)] = latest
-
-    def _on_health(self, arrival: Arrival[m.Health]) -> None:
-        service = arrival.key.split("/")[-2]
-        self._robot(arrival.key).on_health(service, arrival.message, arrival.received_ns)
+    def _on_message(self, arrival: Arrival[Any]) -> None:
+        path = arrival.key.split("/", 3)[3]
+        self._robot(arrival.key).on_message(path, arrival.message, arrival.received_ns)
 
     def _on_event(self, arrival: Arrival[m.Event]) -> None:
         self._robot(arrival.key).on_event(arrival.key.split("/")[-1], arrival.message)
@@ -119,14 +115,11 @@ def call_in_loop(
     return answer.result(PATIENCE_S)
 
 
-def start_server(settings: Metrics, collector: Collector) -> WSGIServer:
+def start_server(port: int, collector: Collector) -> WSGIServer:
     """Start the web server; raise ``LinkError`` if the port is taken."""
     registry = CollectorRegistry()
     registry.register(collector)
     try:
-        server, _ = start_http_server(settings.port, settings.host, registry)
+        return start_http_server(port, HOST, registry)[0]
     except OSError as error:
-        raise LinkError(
-            f"metrics cannot listen on {settings.host}:{settings.port}: {error.strerror}"
-        ) from None
-    return server
+        raise LinkError(f"metrics cannot listen on {HOST}:{port}: {error.strerror}") from None

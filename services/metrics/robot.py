@@ -1,95 +1,77 @@
 """State of one robot, from its messages, for the exported samples. Pure.
 
-Only fresh values are exported, so that a dead robot does not look alive. Its age and its absence
-are exported until the robot expires.
+Only fresh values are exported, so that a dead robot does not look alive. Its absence is exported
+until the robot expires.
 """
 
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
+from common import keys
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Event, Health, Message
+from common.messages import Event
 
 FRESH_S = 3.0  # a value is exported for so long: the slowest streams have 1 Hz
 EXPIRY_S = 24 * 3600.0  # until an absent robot is removed: fleets change
 EXPECTED = ("bridge", "safety", "odom")  # needed to drive: exported even if never seen
 EVENT_NAMES_MAX = 500  # further names count as "other": this bounds the memory
-DISK_EVENTS = ("disk_full", "disk_room")  # of the recorder
-
-
-@dataclass(slots=True)
-class ServiceState:
-    """One service of a robot."""
-
-    instances: set[str] = field(default_factory=set)  # by liveliness
-    health: Latest[Health] | None = None
-    seen_ns: int = 0  # last message or liveliness change
-
-    def is_healthy(self, now_ns: int) -> bool:
-        """Return whether it is present and its health is fresh."""
-        return bool(self.instances) and fresh(self.health, now_ns, FRESH_S)
 
 
 @dataclass(slots=True)
 class RobotState:
-    """Everything received from one robot."""
+    """Everything received from one robot; paths are those below it, as ``tel/bridge/link``."""
 
-    services: dict[str, ServiceState] = field(
-        default_factory=lambda: {name: ServiceState() for name in EXPECTED}
+    messages: dict[str, Latest[Any]] = field(default_factory=dict)  # by path
+    instances: dict[str, set[str]] = field(  # by liveliness, of each service
+        default_factory=lambda: {name: set() for name in EXPECTED}
     )
-    streams: dict[type[Message], Latest[Any]] = field(default_factory=dict)  # by message
     events: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    disk: Event | None = None  # the recorder's latest disk event
+    is_robot: bool = False  # a robot's own service was seen, not only a laptop with its id
+    seen_ns: int = 0  # last message or liveliness change
 
-    def on_health(self, name: str, health: Health, now_ns: int) -> None:
-        """Handle a health message."""
-        self._service(name, now_ns).health = Latest(health, now_ns)
+    def on_message(self, path: str, message: object, now_ns: int) -> None:
+        """Handle a message of a stream, or a health message."""
+        self.messages[path] = Latest(message, now_ns)
+        service = path.split("/")[1]
+        self.instances.setdefault(service, set())
+        self._seen(service, now_ns)
 
-    def on_live(self, name: str, instance: str, alive: bool, now_ns: int) -> None:
+    def on_live(self, service: str, instance: str, alive: bool, now_ns: int) -> None:
         """Handle a liveliness token that appeared or disappeared."""
-        instances = self._service(name, now_ns).instances
+        instances = self.instances.setdefault(service, set())
         (instances.add if alive else instances.discard)(instance)
+        self._seen(service, now_ns)
 
-    def on_event(self, name: str, event: Event) -> None:
-        """Count an event; replayed events may arrive in any order."""
-        key = name, event.name, event.level
+    def on_event(self, service: str, event: Event) -> None:
+        """Count an event."""
+        key = service, event.name, event.level
         if key not in self.events and len(self.events) >= EVENT_NAMES_MAX:
-            key = name, "other", event.level
+            key = service, "other", event.level
         self.events[key] += 1
-        newer = self.disk is None or event.t_ns > self.disk.t_ns
-        if name == "recorder" and event.name in DISK_EVENTS and newer:
-            self.disk = event
 
-    @property
-    def is_robot(self) -> bool:
-        """Return whether a service of a robot was ever seen, not only a laptop with its id."""
-        return bool(self.streams) or any(self.services[name].seen_ns for name in EXPECTED)
+    def fresh(self, path: str, now_ns: int) -> Any:
+        """Return the newest message of a path; None without a fresh one."""
+        latest = self.messages.get(path)
+        return latest.value if latest and fresh(latest, now_ns, FRESH_S) else None
 
     def is_up(self, now_ns: int) -> bool:
         """Return whether the robot itself is alive; a laptop with its id does not count."""
-        is_fresh = any(fresh(latest, now_ns, FRESH_S) for latest in self.streams.values())
-        return is_fresh or any(self.services[name].is_healthy(now_ns) for name in EXPECTED)
+        own = (path for path in self.messages if path.split("/")[1] in EXPECTED)
+        return any(self.fresh(path, now_ns) for path in own)
 
-    def disk_full(self) -> bool:
-        """Return whether the running recorder has reported a full disk."""
-        recorder = self.services.get("recorder")
-        if recorder is None or recorder.health is None or self.disk is None:
-            return False
-        same_process = self.disk.boot == recorder.health.value.boot
-        return same_process and self.disk.name == "disk_full"
+    def is_healthy(self, service: str, now_ns: int) -> bool:
+        """Return whether a service is present and its health is fresh."""
+        health = self.fresh(keys.HEALTH.path.format(service=service), now_ns)
+        return bool(self.instances[service]) and health is not None
 
     def is_expired(self, now_ns: int) -> bool:
         """Return whether the robot has been absent for ``EXPIRY_S``."""
-        received = [latest.received_ns for latest in self.streams.values()]
-        seen_ns = max([*received, *(each.seen_ns for each in self.services.values())])
-        present = any(each.instances for each in self.services.values())
-        return not present and now_ns - seen_ns > EXPIRY_S * NS_PER_S
+        return not any(self.instances.values()) and now_ns - self.seen_ns > EXPIRY_S * NS_PER_S
 
-    def _service(self, name: str, now_ns: int) -> ServiceState:
-        service = self.services.setdefault(name, ServiceState())
-        service.seen_ns = now_ns
-        return service
+    def _seen(self, service: str, now_ns: int) -> None:
+        self.seen_ns = now_ns
+        self.is_robot = self.is_robot or service in EXPECTED
 
 
 def prune(robots: dict[str, RobotState], own: str, now_ns: int) -> None:

@@ -1,8 +1,8 @@
 """Prometheus samples of the robots.
 
 Each number of a stream is a gauge, ``t2_STREAM_FIELD`` with its base unit. Words and maps of
-numbers have the label ``name``. None and stale values have no sample; ``t2_robot_up``,
-``t2_service_up`` and the ages report them.
+numbers have the label ``name``. None and stale values have no sample; ``t2_robot_up`` and
+``t2_service_up`` report them.
 """
 
 import math
@@ -19,18 +19,21 @@ from prometheus_client.core import (
     Metric,
 )
 
-from common.freshness import fresh
-from common.keys import ROOT
+from common import keys
 from common.members import Members
-from common.messages import Durations, Link, LinkState, Message, Odometry, SafetyState, Verdict
-from services.metrics.robot import FRESH_S, RobotState, ServiceState
+from common.messages import Durations, LinkState, Message, Verdict
+from services.metrics.robot import RobotState
 
 KINDS = {
     "gauge": GaugeMetricFamily,
     "counter": CounterMetricFamily,
     "histogram": HistogramMetricFamily,
 }
-STREAMS: dict[type[Message], str] = {SafetyState: "safety", Link: "link", Odometry: "odometry"}
+STREAMS: dict[str, keys.Topic[Any]] = {
+    "safety": keys.SAFETY,
+    "link": keys.LINK,
+    "odometry": keys.ODOMETRY,
+}
 UNITS = {
     "x": "_meters", "y": "_meters", "residual": "_meters", "heading": "_radians",
     "linear": "_meters_per_second", "forward": "_meters_per_second",
@@ -62,17 +65,11 @@ FAMILIES = (
     Family("t2_certificate_expiry_timestamp_seconds", "gauge", ("role", "name"),
            "Expiry of a member's certificate"),
     Family("t2_robot_up", "gauge", ("robot",), "Whether the robot is alive"),
-    Family("t2_stream_age_seconds", "gauge", ("robot", "stream"),
-           "Time since a stream's latest message"),
     Family("t2_service_up", "gauge", OF_SERVICE, "Whether the service is present and healthy"),
     Family("t2_service_instances", "gauge", OF_SERVICE, "Processes of the service on the bus"),
-    Family("t2_service_health_age_seconds", "gauge", OF_SERVICE,
-           "Time since the latest health message"),
     Family("t2_reaction_seconds", "histogram", (*OF_SERVICE, "reaction"),
            "Reactions of the bridge to a hit, from its read: until BRAKE (reflex), until safety's "
            "BRAKE (judged_stop)"),
-    Family("t2_recorder_disk_full", "gauge", ("robot",),
-           "Whether the recorder stopped: the disk is full"),
     Family("t2_events_total", "counter", (*OF_SERVICE, "event", "level"),
            "Events received, including replayed ones"),
 )  # fmt: skip
@@ -143,40 +140,34 @@ def metric_families(
         scrape.add("t2_certificate_expiry_timestamp_seconds", expiry, *member)
     for name, robot in sorted(robots.items()):
         _robot(scrape, name, robot, now_ns)
-        for each, service in sorted(robot.services.items()):
-            _service(scrape, (name, each), service, now_ns)
+        for service in sorted(robot.instances):
+            _service(scrape, name, robot, service, now_ns)
     return list(scrape.families.values())
 
 
 def _robot(scrape: Scrape, name: str, robot: RobotState, now_ns: int) -> None:
     scrape.add("t2_robot_up", robot.is_up(now_ns), name)
-    for kind, latest in robot.streams.items():
-        stream = STREAMS[kind]
-        scrape.add("t2_stream_age_seconds", latest.age_s(now_ns), name, stream)
-        if fresh(latest, now_ns, FRESH_S):
-            scrape.add_fields(f"t2_{stream}", latest.value, {"robot": name})
-    recorder = robot.services.get("recorder")
-    if recorder and recorder.is_healthy(now_ns):
-        scrape.add("t2_recorder_disk_full", robot.disk_full(), name)
+    for stream, topic in STREAMS.items():
+        message = robot.fresh(topic.path, now_ns)
+        if message is not None:
+            scrape.add_fields(f"t2_{stream}", message, {"robot": name})
     for (service, event, level), count in sorted(robot.events.items()):
         scrape.add("t2_events_total", count, name, service, event, level)
 
 
-def _service(scrape: Scrape, labels: tuple[str, str], service: ServiceState, now_ns: int) -> None:
-    scrape.add("t2_service_up", service.is_healthy(now_ns), *labels)
-    scrape.add("t2_service_instances", len(service.instances), *labels)
-    if service.health is None:
+def _service(scrape: Scrape, name: str, robot: RobotState, service: str, now_ns: int) -> None:
+    scrape.add("t2_service_up", robot.is_healthy(service, now_ns), name, service)
+    scrape.add("t2_service_instances", len(robot.instances[service]), name, service)
+    health = robot.fresh(keys.HEALTH.path.format(service=service), now_ns)
+    if health is None:
         return
-    scrape.add("t2_service_health_age_seconds", service.health.age_s(now_ns), *labels)
-    if not fresh(service.health, now_ns, FRESH_S):
-        return
-    health, own = service.health.value, f"{ROOT}/{labels[0]}/"
+    own = f"{keys.ROOT}/{name}/"
     rates = {key.removeprefix(own): rate for key, rate in health.rates.items()}
-    own_labels = dict(zip(OF_SERVICE, labels, strict=True))
-    scrape.add_fields("t2_service", replace(health, rates=rates), own_labels)
+    labels = {"robot": name, "service": service}
+    scrape.add_fields("t2_service", replace(health, rates=rates), labels)
     for reaction, each in sorted(health.reactions.items()):
         if len(each.counts) == len(each.bounds) + 1:
-            scrape.add_durations("t2_reaction_seconds", each, *labels, reaction)
+            scrape.add_durations("t2_reaction_seconds", each, name, service, reaction)
 
 
 def certificate_expiry(listed: Members) -> dict[tuple[str, str], float]:

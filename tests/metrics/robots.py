@@ -1,19 +1,23 @@
-"""Messages and states of robots."""
+"""Messages and states of robots, and samples by name and labels."""
+
+from prometheus_client.core import Metric
 
 from common import messages as m
-from common.freshness import NS_PER_S, Latest
+from common.freshness import NS_PER_S
 from services.metrics.robot import RobotState
 
 NOW_NS = 1_000_000 * NS_PER_S  # any time but zero
+SAFETY, LINK, ODOMETRY = "tel/safety/state", "tel/bridge/link", "tel/odom/odometry"
+SERVICES = "bridge", "safety", "odom", "recorder"
+Values = dict[tuple[str, frozenset[tuple[str, str]]], float]
 
 
-def health(
-    service: str = "bridge", *, boot: int = 1, late_s: float = 0.0, **more: object
-) -> m.Health:
+def health(service: str = "bridge", **more: object) -> m.Health:
     given: dict[str, object] = {
         "version": "0.1.0", "uptime": 60.0, "rates": {}, "counters": {}, "rss": 50_000_000,
+        "lateness": 0.0,
     } | more  # fmt: skip
-    return m.Health(service=service, boot=boot, lateness=late_s, **given)  # type: ignore[arg-type]
+    return m.Health(service=service, **given)  # type: ignore[arg-type]
 
 
 def link(state: m.LinkState = "up", round_trip: float | None = 0.002) -> m.Link:
@@ -38,17 +42,29 @@ def safety(*latched: str, source: str | None = "teleop") -> m.SafetyState:
     )  # fmt: skip
 
 
-def event(name: str, *, t_ns: int = 0, boot: int = 1, level: m.Level = "error") -> m.Event:
-    return m.Event(name=name, level=level, text=name, t_ns=t_ns, boot=boot)
+def event(name: str) -> m.Event:
+    return m.Event(name=name, level="error", text=name)
 
 
 def whole(at_ns: int = NOW_NS) -> RobotState:
     """Return a robot whose messages all arrived at that time."""
     robot = RobotState()
-    for name in ("bridge", "safety", "odom", "recorder"):
+    for name in SERVICES:
         robot.on_live(name, "a", True, at_ns)
-        robot.on_health(name, health(name), at_ns)
-    robot.streams[m.SafetyState] = Latest(safety(), at_ns)
-    robot.streams[m.Link] = Latest(link(), at_ns)
-    robot.streams[m.Odometry] = Latest(odometry(), at_ns)
+        robot.on_message(f"tel/{name}/health", health(name), at_ns)
+    for path, message in {SAFETY: safety(), LINK: link(), ODOMETRY: odometry()}.items():
+        robot.on_message(path, message, at_ns)
     return robot
+
+
+def flat(families: list[Metric]) -> Values:
+    """Return the value of each sample by name and labels."""
+    return {
+        (sample.name, frozenset(sample.labels.items())): sample.value
+        for family in families
+        for sample in family.samples
+    }
+
+
+def names(found: Values) -> set[str]:
+    return {name for name, _ in found}

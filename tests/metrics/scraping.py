@@ -9,7 +9,7 @@ from pathlib import Path
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from tests.metrics.values import Values, flat
+from tests.metrics.robots import Values, flat
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 

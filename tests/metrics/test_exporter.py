@@ -22,9 +22,8 @@ from services.metrics import exporter
 from services.metrics.exporter import call_in_loop
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
-from tests.metrics.robots import event, health, link, odometry, safety
+from tests.metrics.robots import event, health, link, names, odometry, safety
 from tests.metrics.scraping import running, scraped, value
-from tests.metrics.values import names
 from verification.harness.bus import router_process
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
@@ -60,7 +59,8 @@ def test_all_robots_of_a_site_are_exported(buses: BusFixture, tmp_path: Path) ->
         only_named = f"{root}/{site}-3/tel/dashboard/health"
         stranger.put(only_named, codec.encode(health("dashboard")))
 
-    with running(buses.endpoint, tmp_path, f"metrics.robots={site}-$*") as port:
+    sets = f"metrics.robots={site}-$*", f"bus.members={tmp_path / 'none'}"
+    with running(buses.endpoint, tmp_path, *sets) as port:
         until_received(
             put,
             lambda: {
@@ -72,6 +72,7 @@ def test_all_robots_of_a_site_are_exported(buses: BusFixture, tmp_path: Path) ->
         )  # fmt: skip
         assert value(port, "t2_robot_up", robot="001") is None
         assert value(port, "t2_robot_up", robot=f"{site}-3") is None  # only a laptop has its id
+    assert "cannot read the member list" in (tmp_path / "metrics.log").read_text()
 
 
 def test_router_loss_is_exported(tmp_path: Path) -> None:
@@ -85,24 +86,16 @@ def test_router_loss_is_exported(tmp_path: Path) -> None:
             stack.close()
 
 
-def test_certificates_are_read_from_the_member_list(buses: BusFixture, tmp_path: Path) -> None:
+def test_certificates_are_exported_and_a_second_exporter_finds_the_port_taken(
+    buses: BusFixture, tmp_path: Path
+) -> None:
     members = tmp_path / "members.json"
     end = datetime(2030, 1, 1, tzinfo=UTC)
     one = Member(common_name="driver.anna.1", role="driver", name="anna", expires=end)
     members.write_bytes(msgspec.json.encode(Members(site="berlin", members=(one,))))
-    labels = {"role": "driver", "name": "anna"}
     name = "t2_certificate_expiry_timestamp_seconds"
     with running(buses.endpoint, tmp_path, f"bus.members={members}") as port:
-        assert value(port, name, **labels) == end.timestamp()
-    with running(buses.endpoint, tmp_path, f"bus.members={tmp_path / 'none'}") as port:
-        assert value(port, name, **labels) is None
-    assert "cannot read the member list" in (tmp_path / "metrics.log").read_text()
-
-
-def test_a_taken_port_is_an_error(
-    buses: BusFixture, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    with running(buses.endpoint, tmp_path) as port:
+        assert value(port, name, role="driver", name="anna") == end.timestamp()
         words = [f"bus.connect={buses.endpoint}", f"metrics.port={port}"]
         done = subprocess.run(
             [sys.executable, "-m", "services.metrics", *(w for t in words for w in ("--set", t))],

@@ -3,24 +3,31 @@
 import re
 from datetime import UTC, datetime
 
-import pytest
-
-from common import messages as m
-from common.freshness import NS_PER_S, Latest
-from common.members import Member, Members, Role
+from common.freshness import NS_PER_S
+from common.members import Member, Members
 from common.messages import Durations
 from services.metrics.robot import FRESH_S, RobotState
 from services.metrics.samples import certificate_expiry, metric_families
-from tests.metrics.robots import NOW_NS, event, health, link, odometry, safety, whole
-from tests.metrics.values import Values, flat, names
+from tests.metrics.robots import (
+    LINK,
+    NOW_NS,
+    ODOMETRY,
+    SAFETY,
+    Values,
+    event,
+    flat,
+    health,
+    link,
+    names,
+    odometry,
+    safety,
+    whole,
+)
 
-SOON, LATER = (datetime(2027, month, 1, tzinfo=UTC) for month in (1, 2))
+SOON, LATER, LAST = (datetime(2027, month, 1, tzinfo=UTC) for month in (1, 2, 3))
 LATE_NS = NOW_NS + round(FRESH_S * NS_PER_S) + 1
 # Exported for a robot without fresh values.
-ALWAYS = {
-    "t2_robot_up", "t2_stream_age_seconds", "t2_service_up", "t2_service_instances",
-    "t2_service_health_age_seconds", "t2_events_total",
-}  # fmt: skip
+ALWAYS = {"t2_bus_connected", "t2_robot_up", "t2_service_up", "t2_service_instances"}
 
 
 def values(robot: RobotState, now_ns: int = NOW_NS, *, connected: bool = True) -> Values:
@@ -37,7 +44,6 @@ def test_samples_of_a_healthy_robot() -> None:
     assert found["t2_bus_connected", frozenset()] == 1
     for name, expected in {
         "t2_robot_up": 1,
-        "t2_recorder_disk_full": 0,
         "t2_link_armed": 1,
         "t2_link_round_trip_seconds": 0.002,
         "t2_link_epoch": 2,
@@ -51,7 +57,6 @@ def test_samples_of_a_healthy_robot() -> None:
     for name, expected in {
         "t2_service_up": 1,
         "t2_service_instances": 1,
-        "t2_service_health_age_seconds": 0,
         "t2_service_uptime_seconds": 60,
         "t2_service_rss_bytes": 50_000_000,
     }.items():
@@ -69,7 +74,7 @@ def of_name(found: Values, wanted: str) -> dict[str, float]:
 
 def test_words_of_a_fixed_set_are_one_or_zero_and_others_are_one_while_they_hold() -> None:
     robot = whole()
-    robot.streams[m.SafetyState] = Latest(safety("contact", "estop"), NOW_NS)
+    robot.on_message(SAFETY, safety("contact", "estop"), NOW_NS)
     found = values(robot)
     verdicts = {"run": 0, "slow": 0, "stop": 0, "brake": 1, "inhibited": 0}
     assert of_name(found, "t2_safety_verdict") == verdicts
@@ -77,11 +82,7 @@ def test_words_of_a_fixed_set_are_one_or_zero_and_others_are_one_while_they_hold
     assert of_name(found, "t2_safety_latched") == {"contact": 1, "estop": 1}
     assert of_name(found, "t2_safety_causes") == {"contact": 1, "estop": 1}
     assert of_name(values(whole()), "t2_safety_latched") == {}
-
-
-def test_a_cause_that_is_listed_twice_has_one_sample() -> None:
-    robot = whole()
-    robot.streams[m.SafetyState] = Latest(safety("limit", "limit"), NOW_NS)
+    robot.on_message(SAFETY, safety("limit", "limit"), NOW_NS)  # listed twice
     assert of_name(values(robot), "t2_safety_causes") == {"limit": 1}
 
 
@@ -94,12 +95,9 @@ def test_stale_values_are_not_exported() -> None:
     robot = whole()
     robot.on_event("bridge", event("contact"))
     found = values(robot, LATE_NS)
-    assert names(found) == ALWAYS | {"t2_bus_connected"}
+    assert names(found) == {*ALWAYS, "t2_events_total"}
     assert value(found, "t2_robot_up") == 0
     assert value(found, "t2_service_up", service="bridge") == 0
-    for stream in ("safety", "link", "odometry"):
-        assert value(found, "t2_stream_age_seconds", stream=stream) > FRESH_S
-    assert value(found, "t2_service_health_age_seconds", service="bridge") > FRESH_S
 
 
 def test_an_unseen_robot_is_exported_as_down() -> None:
@@ -108,16 +106,14 @@ def test_an_unseen_robot_is_exported_as_down() -> None:
     assert value(found, "t2_robot_up") == 0
     for service in ("bridge", "safety", "odom"):
         assert value(found, "t2_service_up", service=service) == 0
-    assert names(found) == {
-        "t2_bus_connected", "t2_robot_up", "t2_service_up", "t2_service_instances",
-    }  # fmt: skip
+    assert names(found) == ALWAYS
 
 
 def test_unknown_values_have_no_sample() -> None:
     robot = whole()
-    robot.streams[m.Link] = Latest(link(round_trip=None), NOW_NS)
-    robot.streams[m.Odometry] = Latest(odometry(residual=None), NOW_NS)
-    robot.streams[m.SafetyState] = Latest(safety(source=None), NOW_NS)
+    robot.on_message(LINK, link(round_trip=None), NOW_NS)
+    robot.on_message(ODOMETRY, odometry(residual=None), NOW_NS)
+    robot.on_message(SAFETY, safety(source=None), NOW_NS)
     found = names(values(robot))
     assert "t2_link_state" in found
     for name in ("t2_link_round_trip_seconds", "t2_odometry_residual_meters", "t2_safety_source"):
@@ -128,8 +124,7 @@ def test_rates_by_key_and_counters_by_name() -> None:
     robot = whole()
     other = "t2/v1/008/tel/bridge/link"  # of another robot
     message = health(rates={"t2/v1/007/tel/bridge/link": 5.0, other: 4.0}, counters={"overrun": 2})
-    robot.services = {}
-    robot.on_health("bridge", message, NOW_NS)
+    robot.on_message("tel/bridge/health", message, NOW_NS)
     found = values(robot)
     assert of_name(found, "t2_service_rates_hertz") == {"tel/bridge/link": 5, other: 4}
     assert of_name(found, "t2_service_counters") == {"overrun": 2}
@@ -141,7 +136,7 @@ def test_reactions_are_cumulative_histograms() -> None:
         "reflex": Durations(bounds=(0.001, 0.01), counts=(5, 0, 2), worst=1.0),
         "of another version": Durations(bounds=(0.001, 0.01), counts=(1, 2), worst=1.0),
     }
-    robot.on_health("bridge", health(reactions=reactions), NOW_NS)
+    robot.on_message("tel/bridge/health", health(reactions=reactions), NOW_NS)
     found = {
         (dict(labels)["reaction"], dict(labels)["le"]): count
         for (name, labels), count in values(robot).items()
@@ -150,42 +145,12 @@ def test_reactions_are_cumulative_histograms() -> None:
     assert found == {("reflex", "0.001"): 5, ("reflex", "0.01"): 5, ("reflex", "+Inf"): 7}
 
 
-def test_disk_full_is_exported_while_the_recorder_runs() -> None:
-    robot = whole()
-    robot.on_event("recorder", event("disk_full", t_ns=1))
-    assert value(values(robot), "t2_recorder_disk_full") == 1
-    robot.on_live("recorder", "a", False, NOW_NS)
-    assert "t2_recorder_disk_full" not in names(values(robot))
-    del robot.services["recorder"]
-    assert "t2_recorder_disk_full" not in names(values(robot))
-
-
-def test_certificates_by_role_and_name() -> None:
-    found = flat(
-        metric_families({}, NOW_NS, connected=True, certificates={("driver", "anna"): 5.0})
-    )
+def test_the_latest_valid_certificate_of_a_member_counts() -> None:
+    listed = [
+        Member(common_name=f"driver.anna.{n}", role="driver", name="anna", expires=end, revoked=off)
+        for n, (end, off) in enumerate([(SOON, False), (LATER, False), (SOON, False), (LAST, True)])
+    ]
+    certificates = certificate_expiry(Members(site="berlin", members=tuple(listed)))
+    found = flat(metric_families({}, NOW_NS, connected=True, certificates=certificates))
     labels = frozenset({("role", "driver"), ("name", "anna")})
-    assert found["t2_certificate_expiry_timestamp_seconds", labels] == 5
-
-
-def member(role: Role, name: str, expires: datetime, *, revoked: bool = False) -> Member:
-    number = f"{expires:%m}"
-    return Member(
-        common_name=f"{role}.{name}.{number}", role=role, name=name, expires=expires,
-        revoked=revoked,
-    )  # fmt: skip
-
-
-def listed(*members: Member) -> Members:
-    return Members(site="berlin", members=members)
-
-
-@pytest.mark.parametrize("dates", [(SOON, LATER), (LATER, SOON)])
-def test_the_latest_certificate_of_a_member_counts(dates: tuple[datetime, datetime]) -> None:
-    made = listed(*(member("driver", "anna", each) for each in dates))
-    assert certificate_expiry(made) == {("driver", "anna"): LATER.timestamp()}
-
-
-def test_revoked_certificates_are_ignored() -> None:
-    made = listed(member("driver", "anna", SOON), member("driver", "anna", LATER, revoked=True))
-    assert certificate_expiry(made) == {("driver", "anna"): SOON.timestamp()}
+    assert found["t2_certificate_expiry_timestamp_seconds", labels] == LATER.timestamp()
