@@ -17,20 +17,16 @@ id     name                        payload
 """
 
 from enum import IntEnum
-from struct import Struct
-from typing import ClassVar, Self
 
 from common.wire.frame import (
-    SIGNED_15_BITS,
+    OCTET,
+    SIDE,
+    SWITCH,
+    VELOCITY,
+    Field,
     Frame,
-    Limits,
     Side,
-    Switch,
     by_opening,
-    chosen,
-    from_sign_magnitude,
-    side_of,
-    to_sign_magnitude,
 )
 
 
@@ -42,32 +38,18 @@ class MotionKind(IntEnum):
     BREAK = 2  # stops at once; the manual's own spelling
 
 
-MOTION_KINDS = {kind.value: kind for kind in MotionKind}
+KIND = Field(meaning={kind.value: kind for kind in MotionKind})
 
 
 class MotionCommand(Frame, frozen=True):
     """PC to board: stop, run or break (manual 2.2)."""
 
     ID = 0x7426
-    LAYOUT = Struct("<BHH")
-    LIMITS: ClassVar[Limits] = {"linear_mmps": SIGNED_15_BITS, "angular_raw": SIGNED_15_BITS}
+    FIELDS = (KIND, VELOCITY, VELOCITY)
 
     kind: MotionKind
     linear_mmps: int = 0  # forward positive
     angular_raw: int = 0  # counter-clockwise positive; the unit is a setting, 0.1 deg/s by default
-
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        linear, angular = to_sign_magnitude(self.linear_mmps), to_sign_magnitude(self.angular_raw)
-        return self.LAYOUT.pack(self.kind, linear, angular)
-
-    @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Decode kind and velocities; raise ``WireError`` for an unknown kind."""
-        kind, linear, angular = values
-        velocities = from_sign_magnitude(linear), from_sign_magnitude(angular)
-        allowed = "0 STOP, 1 RUN, 2 BREAK"
-        return cls(chosen("motion command", kind, MOTION_KINDS, allowed), *velocities)
 
 
 class DistanceQuery(Frame, frozen=True):
@@ -88,37 +70,38 @@ class BumperQuery(Frame, frozen=True):
     ID = 0x7602
 
 
-class UltrasonicBrakeSet(Switch, frozen=True):
+class UltrasonicBrakeSet(Frame, frozen=True):
     """PC to board: the board's own stop on a near echo, on or off (manual 2.5)."""
 
     ID = 0x7603
+    FIELDS = (SWITCH,)
+
+    on: bool
 
 
-class BumperBrakeSet(Switch, frozen=True):
+class BumperBrakeSet(Frame, frozen=True):
     """PC to board: the board's own stop on a bumper hit, on or off (manual 2.6)."""
 
     ID = 0x7604
+    FIELDS = (SWITCH,)
+
+    on: bool
 
 
 class DriverQuery(Frame, frozen=True):
     """PC to board: the faults of one motor driver (manual 2.7)."""
 
     ID = 0x7605
-    LAYOUT = Struct("<B")
+    FIELDS = (SIDE,)
 
     side: Side
-
-    @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Decode the side; raise ``WireError`` for an unknown one."""
-        return cls(side_of(values[0]))
 
 
 class LedSet(Frame, frozen=True):
     """PC to board: setting of one lamp channel; times and speed in the board's own units."""
 
     ID = 0x7503
-    LAYOUT = Struct("<9B")
+    FIELDS = (OCTET, OCTET, Field("B", 0, 10), *[OCTET] * 6)
 
     channel: int
     mode: int
@@ -130,8 +113,6 @@ class LedSet(Frame, frozen=True):
     lightness_min: int
     lightness_max: int
 
-
-LedSet.LIMITS = dict.fromkeys(LedSet.__struct_fields__, (0, 0xFF)) | {"on_lightness": (0, 10)}
 
 # All frames to the board, by their opening.
 TO_BOARD = by_opening(

@@ -1,4 +1,4 @@
-"""Frame base class: header, payload layout, and number formats of this wire.
+"""Frame base class: header, and the fields of a payload.
 
 Velocities are sign and magnitude: bit 15 is the sign, bits 14..0 the magnitude (manual 2.2).
 A frame object holds only values that the wire can carry: its constructor raises ``WireError`` for
@@ -19,10 +19,10 @@ offset bytes   field
 The bytes before the CRC are the same in all frames of a kind: the *opening* identifies the kind.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from enum import IntEnum
 from struct import Struct
-from typing import ClassVar, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Self
 
 import msgspec
 from msgspec.structs import astuple
@@ -36,37 +36,37 @@ CRC_OFFSET, PAYLOAD_OFFSET = 6, 8
 
 SIGN_BIT = 0x8000
 MAGNITUDE_MAX = 0x7FFF
-SIGNED_15_BITS = (-MAGNITUDE_MAX, MAGNITUDE_MAX)
-
-T = TypeVar("T")
-Limits = Mapping[str, tuple[int, int]]  # lowest and highest value by field
 
 
-def to_sign_magnitude(value: int) -> int:
-    """Encode a velocity that a frame holds; zero is always 0x0000, never 0x8000."""
-    return value if value >= 0 else SIGN_BIT - value
+class Field(msgspec.Struct, frozen=True):
+    """A number of a payload: its code in ``struct``, its limits, and its meaning if it has few."""
+
+    code: str = "B"
+    lowest: int = 0
+    highest: int = 0xFF
+    meaning: Mapping[int, Any] = {}  # by the number on the wire
+
+    def decode(self, name: str, number: int) -> Any:
+        """Return the value of the field of this name; raise ``WireError`` for an unknown one."""
+        if self.meaning and number not in self.meaning:
+            raise refusal(name, number, ", ".join(map(str, self.meaning)))
+        return self.meaning.get(number, number)
+
+    def encode(self, value: Any) -> int:
+        """Return the number on the wire."""
+        return next((number for number, one in self.meaning.items() if one == value), value)
 
 
-def from_sign_magnitude(raw: int) -> int:
-    """Decode a u16 velocity; 0x8000 reads as zero."""
-    return raw if raw < SIGN_BIT else SIGN_BIT - raw
+class Velocity(Field, frozen=True):
+    """Sign and magnitude; 0x8000 is read as zero and never sent."""
 
+    def decode(self, name: str, number: int) -> int:
+        """Return the signed value."""
+        return number if number < SIGN_BIT else SIGN_BIT - number
 
-def refusal(field: str, value: object, allowed: str) -> WireError:
-    """Return the error that names a field, its value and what is allowed."""
-    return WireError(f"{field} is {value}, allowed is {allowed}")
-
-
-def chosen(field: str, value: int, choices: Mapping[int, T], allowed: str) -> T:
-    """Decode a byte that has a few values; raise ``WireError`` for others."""
-    if value not in choices:
-        raise refusal(field, value, allowed)
-    return choices[value]
-
-
-def side_of(value: int) -> "Side":
-    """Decode the side byte of a motor driver frame."""
-    return chosen("motor driver", value, SIDES, "0 left, 1 right")
+    def encode(self, value: int) -> int:
+        """Return sign and magnitude."""
+        return value if value >= 0 else SIGN_BIT - value
 
 
 class Side(IntEnum):
@@ -76,66 +76,52 @@ class Side(IntEnum):
     RIGHT = 1
 
 
-# By the byte on the wire; this lookup takes a fifth of ``Side(value)``.
-SIDES = {side.value: side for side in Side}
+OCTET = Field()
+SWITCH = Field(meaning={0: False, 1: True})
+SIDE = Field(meaning={side.value: side for side in Side})
+VELOCITY = Velocity("H", -MAGNITUDE_MAX, MAGNITUDE_MAX)
 
 
 class Frame(msgspec.Struct, frozen=True, gc=False):
-    """A frame without payload; subclasses with fields define the layout of these."""
+    """A frame without payload; subclasses have a row of ``FIELDS`` for each attribute."""
 
     ID: ClassVar[int] = 0  # placeholder; no frame has this id
-    LAYOUT: ClassVar[Struct] = Struct("<")
-    LIMITS: ClassVar[Limits] = {}
+    FIELDS: ClassVar[tuple[Field, ...]] = ()
+    LAYOUT: ClassVar[Struct]  # of the payload
+    SIZE: ClassVar[int]  # of the whole frame, header included
     OPENING: ClassVar[bytes]  # of its header
 
     def __init_subclass__(cls) -> None:
-        cls.OPENING = OPENING.pack(MAGIC, HEADER.size + cls.LAYOUT.size, cls.ID)
+        cls.LAYOUT = Struct("<" + "".join(field.code for field in cls.FIELDS))
+        cls.SIZE = HEADER.size + cls.LAYOUT.size
+        cls.OPENING = OPENING.pack(MAGIC, cls.SIZE, cls.ID)
 
     def __post_init__(self) -> None:
-        for field, (lowest, highest) in self.LIMITS.items():
-            if not lowest <= getattr(self, field) <= highest:
-                raise refusal(field, getattr(self, field), f"{lowest}..{highest}")
+        for name, field in zip(self.__struct_fields__, self.FIELDS, strict=True):
+            value = getattr(self, name)
+            if not (field.meaning or field.lowest <= value <= field.highest):
+                raise refusal(name, value, f"{field.lowest}..{field.highest}")
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
-        return self.LAYOUT.pack(*astuple(self))
+        values = zip(self.FIELDS, astuple(self), strict=True)
+        return self.LAYOUT.pack(*[field.encode(value) for field, value in values])
 
     @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Decode the values of ``LAYOUT``; raise ``WireError`` for invalid ones."""
-        return cls(*values)
+    def from_wire(cls, numbers: tuple[int, ...]) -> Self:
+        """Decode the numbers of ``LAYOUT``; raise ``WireError`` for invalid ones."""
+        rows = zip(cls.FIELDS, cls.__struct_fields__, numbers, strict=True)
+        return cls(*[field.decode(name, number) for field, name, number in rows])
 
 
-class Switch(Frame, frozen=True):
-    """A payload of one byte: 0 off, 1 on."""
-
-    LAYOUT = Struct("<B")
-
-    on: bool
-
-    @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Decode its byte; raise ``WireError`` for values other than 0 and 1."""
-        return cls(chosen(cls.__name__, values[0], {0: False, 1: True}, "0 or 1"))
-
-
-class Kind(NamedTuple):
-    """A frame class with precomputed decoding functions."""
-
-    frame: type[Frame]
-    size: int  # of the whole frame, header included
-    unpack: Callable[[bytes], tuple[int, ...]]
-    from_wire: Callable[[tuple[int, ...]], Frame]
-
-
-Kinds = Mapping[bytes, Kind]
+Kinds = Mapping[bytes, type[Frame]]  # by their opening
 
 
 def by_opening(*frames: type[Frame]) -> Kinds:
     """Index frame classes by their opening."""
-    return {
-        frame.OPENING: Kind(
-            frame, HEADER.size + frame.LAYOUT.size, frame.LAYOUT.unpack, frame.from_wire
-        )
-        for frame in frames
-    }
+    return {frame.OPENING: frame for frame in frames}
+
+
+def refusal(field: str, value: object, allowed: str) -> WireError:
+    """Return the error that names a field, its value and what is allowed."""
+    return WireError(f"{field} is {value}, allowed is {allowed}")

@@ -85,10 +85,10 @@ class Framing:
         """Return the frame that begins at ``start``, or the run of invalid bytes."""
         try:
             opening, crc = unpack_header(datagram, start)
-            _, size, unpack, from_wire = kinds[opening]
-            raw = datagram[start : start + size]
+            kind = kinds[opening]
+            raw = datagram[start : start + kind.SIZE]
             payload = raw[PAYLOAD_OFFSET:]
-            values = unpack(payload)
+            numbers = kind.LAYOUT.unpack(payload)
         except (struct.error, KeyError):  # truncated, or no known frame begins here
             return _reject(datagram, start, *_fault(datagram, start, kinds))
         checksum = self._checksum
@@ -97,7 +97,7 @@ class Framing:
             detail = f"header says 0x{crc:04x}, the bytes give 0x{computed:04x}"
             return _reject(datagram, start, Reason.BAD_CRC, detail)
         try:
-            return Received(from_wire(values), raw)
+            return Received(kind.from_wire(numbers), raw)
         except WireError as error:
             return _reject(datagram, start, Reason.BAD_VALUE, str(error))
 
@@ -122,12 +122,12 @@ def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:
     if left < HEADER.size:
         return Reason.TRUNCATED, f"{left} bytes of an 8-byte header"
     _, size, command_id = OPENING.unpack_from(datagram, start)
-    kind = {kind.frame.ID: kind for kind in kinds.values()}.get(command_id)
+    kind = {kind.ID: kind for kind in kinds.values()}.get(command_id)
     if kind is None:
         return Reason.UNKNOWN_ID, f"id 0x{command_id:04x}"
-    if size != kind.size:
-        name = kind.frame.__name__
-        return Reason.BAD_SIZE, f"{name} has {kind.size} bytes, its header says {size}"
+    if size != kind.SIZE:
+        text = f"{kind.__name__} has {kind.SIZE} bytes, its header says {size}"
+        return Reason.BAD_SIZE, text
     return Reason.TRUNCATED, f"{left} of {size} bytes"
 
 

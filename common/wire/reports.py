@@ -20,54 +20,37 @@ fault; the others answer a query.
 """
 
 import struct
-from struct import Struct
-from typing import ClassVar, Self
+from typing import Self
 
 from common.wire.frame import (
-    SIGNED_15_BITS,
+    SIDE,
+    SWITCH,
+    VELOCITY,
+    Field,
     Frame,
-    Limits,
     Side,
-    Switch,
     by_opening,
-    chosen,
-    from_sign_magnitude,
     refusal,
-    side_of,
-    to_sign_magnitude,
 )
 
 SONAR_FAULT_MM = 0xFFFF
-LED_DONE, LED_FAILED = 0x55, 0xAA
 
 
 class VelocityReport(Frame, frozen=True):
     """Board to PC, unsolicited and continuous: the measured velocity (manual 2.2)."""
 
     ID = 0x7426
-    LAYOUT = Struct("<HH")
-    LIMITS: ClassVar[Limits] = {"linear_mmps": SIGNED_15_BITS, "angular_raw": SIGNED_15_BITS}
+    FIELDS = (VELOCITY, VELOCITY)
 
     linear_mmps: int
     angular_raw: int
-
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        linear, angular = to_sign_magnitude(self.linear_mmps), to_sign_magnitude(self.angular_raw)
-        return self.LAYOUT.pack(linear, angular)
-
-    @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Decode both velocities."""
-        return cls(*map(from_sign_magnitude, values))
 
 
 class DistanceReport(Frame, frozen=True):
     """Board to PC: distance and heading counted since power-on (manual 2.3)."""
 
     ID = 0x7600
-    LAYOUT = Struct("<ii")
-    LIMITS: ClassVar[Limits] = {"distance_mm": (-(2**31), 2**31 - 1), "heading_ddeg": (-1800, 1800)}
+    FIELDS = (Field("i", -(2**31), 2**31 - 1), Field("i", -1800, 1800))
 
     distance_mm: int  # forward positive
     heading_ddeg: int  # 0.1 deg, counter-clockwise positive
@@ -77,7 +60,7 @@ class UltrasonicReport(Frame, frozen=True):
     """Board to PC: eight ranges, counted clockwise from the left; 0xFFFF is a faulty sensor."""
 
     ID = 0x7601
-    LAYOUT = Struct("<8H")
+    FIELDS = (Field("H", 0, 0xFFFF),) * 8
 
     # left, front-left, front, front-right, right, rear-right, rear, rear-left
     ranges_mm: tuple[int, ...]
@@ -93,35 +76,44 @@ class UltrasonicReport(Frame, frozen=True):
         return self.LAYOUT.pack(*self.ranges_mm)
 
     @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
+    def from_wire(cls, numbers: tuple[int, ...]) -> Self:
         """Decode the eight ranges."""
-        return cls(values)
+        return cls(numbers)
 
 
-class BumperReport(Switch, frozen=True):
+class BumperReport(Frame, frozen=True):
     """Board to PC: on while the bumper is pressed (manual 2.4).
 
     The manual defines 0 and 1. Any other byte counts as pressed, the safe side.
     """
 
     ID = 0x7602
+    FIELDS = (SWITCH,)
+
+    on: bool
 
     @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
+    def from_wire(cls, numbers: tuple[int, ...]) -> Self:
         """Decode it from its byte."""
-        return cls(values[0] != 0)
+        return cls(numbers[0] != 0)
 
 
-class UltrasonicBrakeReport(Switch, frozen=True):
+class UltrasonicBrakeReport(Frame, frozen=True):
     """Board to PC: the echo of ``UltrasonicBrakeSet`` (manual 2.5)."""
 
     ID = 0x7603
+    FIELDS = (SWITCH,)
+
+    on: bool
 
 
-class BumperBrakeReport(Switch, frozen=True):
+class BumperBrakeReport(Frame, frozen=True):
     """Board to PC: the echo of ``BumperBrakeSet`` (manual 2.6)."""
 
     ID = 0x7604
+    FIELDS = (SWITCH,)
+
+    on: bool
 
 
 class DriverReport(Frame, frozen=True):
@@ -131,36 +123,19 @@ class DriverReport(Frame, frozen=True):
     """
 
     ID = 0x7605
-    LAYOUT = Struct("<BI")
-    LIMITS: ClassVar[Limits] = {"fault_bits": (0, 2**32 - 1)}
+    FIELDS = (SIDE, Field("I", 0, 2**32 - 1))
 
     side: Side
     fault_bits: int
-
-    @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Decode side and bits; raise ``WireError`` for an unknown side."""
-        side, bits = values
-        return cls(side_of(side), bits)
 
 
 class LedReport(Frame, frozen=True):
     """Board to PC: whether the lamp was set."""
 
     ID = 0x7503
-    LAYOUT = Struct("<B")
+    FIELDS = (Field(meaning={0x55: True, 0xAA: False}),)
 
     done: bool
-
-    def to_bytes(self) -> bytes:
-        """Return the payload, without the header."""
-        return self.LAYOUT.pack(LED_DONE if self.done else LED_FAILED)
-
-    @classmethod
-    def from_wire(cls, values: tuple[int, ...]) -> Self:
-        """Decode the answer; raise ``WireError`` for an unknown one."""
-        answers = {LED_DONE: True, LED_FAILED: False}
-        return cls(chosen("LED answer", values[0], answers, "85 done, 170 failed"))
 
 
 # All frames from the board, by their opening.
