@@ -144,7 +144,7 @@ def routers(members: Members) -> list[Member]:
 
 def check_free(members: Members, role: Role, name: str, now_s: float) -> None:
     """Raise ``RobotError`` if a member of that name has a valid certificate."""
-    for each in members.welcome:
+    for each in reversed(members.welcome):
         if (each.role, each.name) == (role, name) and each.expires.timestamp() > now_s:
             raise RobotError(
                 f"{role} {name} has a certificate until {each.expires:%Y-%m-%d}; "
