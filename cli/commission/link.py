@@ -24,37 +24,33 @@ EXPECTED_HZ = {
 }
 
 
-def judge_link(links: Sequence[Link], switches: Switches | None) -> Verdict:
-    """Return the verdict on consecutive link messages, at least one."""
+def judge_link(
+    links: Sequence[Link], switches: Switches | None, frames: int, nonzero: int
+) -> Verdict:
+    """Return the verdict on consecutive link messages, at least one, and counted frames.
+
+    ``frames`` counts accepted frames, ``nonzero`` those with a payload that is not all zeros.
+    """
     last = links[-1]
     rates = {name: median(link.rates.get(name, 0.0) for link in links) for name in EXPECTED_HZ}
+    bad = rejected(links).get(BAD_CRC, 0)
     data = [
         ("state", last.state),
-        *((f"{name}, Hz", _rate(rates[name], name)) for name in rates),
+        *(
+            (f"{name}, Hz", f"{rate:.0f} of {EXPECTED_HZ[name]:.0f}")
+            for name, rate in rates.items()
+        ),
         ("switches echoed on", _switches(switches)),
         ("received at port", _listed(last.ports)),
         ("relay", _relay(last.relay)),
         ("round trip", "unknown" if last.round_trip is None else f"{last.round_trip * 1e3:.1f} ms"),
-        ("rejected since the bridge's start", _listed(last.rejected)),
+        ("accepted frames", f"{frames}, {nonzero} of these with a nonzero payload"),
         ("rejected in this step", _listed(rejected(links))),
+        ("rejected since the bridge's start", _listed(last.rejected)),
         ("waiting for", last.waiting or "nothing"),
     ]
-    return judged(_link_problems(links, switches, rates), "The board's link is up.", data)
-
-
-def judge_crc(links: Sequence[Link], frames: int, nonzero: int) -> Verdict:
-    """Return the verdict on the CRC, from consecutive link messages and frame counts.
-
-    ``frames`` counts accepted frames, ``nonzero`` those with a payload that is not all zeros.
-    """
-    bad = rejected(links).get(BAD_CRC, 0)
-    data = [
-        ("accepted frames", str(frames)),
-        ("of these with a nonzero payload", str(nonzero)),
-        ("bad CRCs in this step", str(bad)),
-        ("bad CRCs since the bridge's start", str(links[-1].rejected.get(BAD_CRC, 0))),
-    ]
-    return judged(_crc_problems(bad, frames, nonzero), f"{frames} frames, no bad CRC.", data)
+    problems = [*_link_problems(links, switches, rates), _crc_problem(bad, frames, nonzero)]
+    return judged(problems, f"The board's link is up: {frames} frames, no bad CRC.", data)
 
 
 def rejected(links: Sequence[Link]) -> dict[str, int]:
@@ -88,24 +84,20 @@ def _link_problems(
             yield f"{count} frames rejected as {reason}: `t2 wire decode` shows them."
 
 
-def _crc_problems(bad: int, frames: int, nonzero: int) -> Iterator[str]:
+def _crc_problem(bad: int, frames: int, nonzero: int) -> str:
     if bad and bad >= MOST_BAD * (bad + frames):
-        yield (
+        return (
             f"{bad} bad CRCs against {frames} good frames: this firmware has another CRC. Capture "
             "the board's frames, run `t2 wire identify-crc capture.pcap`, and set wire.crc."
         )
-    elif bad:
-        yield f"{bad} bad CRCs against {frames} good frames: check the cable and its connectors."
-    elif frames < CRC_FRAMES or nonzero < NONZERO_FRAMES:
-        yield (
+    if bad:
+        return f"{bad} bad CRCs against {frames} good frames: check the cable and its connectors."
+    if frames < CRC_FRAMES or nonzero < NONZERO_FRAMES:
+        return (
             f"Too few frames for a verdict: {frames} of {CRC_FRAMES}, of these {nonzero} of "
             f"{NONZERO_FRAMES} with a nonzero payload."
         )
-
-
-def _rate(rate: float, name: str) -> str:
-    least = "at least" if name == "VelocityReport" else "requested"
-    return f"{rate:.0f} ({least} {EXPECTED_HZ[name]:.0f})"
+    return ""
 
 
 def _switches(switches: Switches | None) -> str:

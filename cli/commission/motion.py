@@ -75,7 +75,6 @@ class Measured:
     commanded: float
     velocity: float
     counted: float
-    across: float  # counted on the other axis, in its own unit
     seconds: float
 
 
@@ -125,7 +124,6 @@ def measure(run: Run) -> Measured | None:
         commanded=mean(run.part(m.linear, m.angular) for m in motions),
         velocity=mean(run.part(v.linear, v.angular) for v in velocities),
         counted=run.part(way, turn) / span_s,
-        across=run.part(turn, way) / span_s,
         seconds=span_s,
     )
 
@@ -190,13 +188,12 @@ def _not_granted(run: Run) -> str:
 
 
 def _data(run: Run, it: Measured, stood_s: float | None) -> list[Row]:
-    unit, other = run.unit_of_rate, "m/s" if run.turns else "rad/s"
+    unit = run.unit_of_rate
     return [
         ("measured over", f"{it.seconds:.2f} s"),
         (f"commanded, {unit}", f"{it.commanded:.3f}"),
         (f"counted, {unit}", f"{it.counted:.3f}"),
         (f"measured velocity, {unit}", f"{it.velocity:.3f}"),
         ("counted / commanded", f"{it.counted / it.commanded:.3f}"),
-        (f"counted on the other axis, {other}", f"{it.across:.3f}"),
         ("standstill after", seconds(stood_s)),
     ]

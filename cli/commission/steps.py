@@ -3,12 +3,7 @@
 from functools import partial
 
 from cli.commission.latches import LatchTest, judge_latch
-from cli.commission.link import (
-    CRC_FRAMES,
-    NONZERO_FRAMES,
-    judge_crc,
-    judge_link,
-)
+from cli.commission.link import CRC_FRAMES, NONZERO_FRAMES, judge_link
 from cli.commission.motion import Run, judge_motion
 from cli.commission.operator import Step, confirm, show
 from cli.commission.report import Verdict, failed
@@ -27,7 +22,7 @@ from common.messages import SONAR_NAMES
 from common.motion import Command, Twist
 
 LINK_S = 5.0
-CRC_S = 30.0
+FRAMES_S = 30.0  # at most, for enough frames
 REST_S = 1.0
 HAND_S = 60.0  # to walk around the vehicle and hold a hand there
 AWAY_S = 20.0
@@ -36,27 +31,20 @@ CLEAR_S = 0.3  # the bridge needs three clear samples, and safety three samples 
 DRIVE_S = 2.0
 FORWARD, TURN = Twist(linear=0.1), Twist(angular=0.2)
 RESET_PHRASE, PHRASE = "reset", "wheels off the ground"
-NO_LINK = "No link message from the bridge."
 
 
 def link(session: CheckoutSession) -> Verdict:
-    """Check the link for some seconds."""
+    """Check the link for some seconds, and until there are enough frames for a verdict."""
     session.mark()
     session.listen(LINK_S)
+    session.until(
+        lambda: session.frames >= CRC_FRAMES and session.nonzero >= NONZERO_FRAMES, FRAMES_S
+    )
     if not (links := session.of(keys.LINK)):
-        return failed(NO_LINK)
+        return failed("No link message from the bridge.")
     switches = session.of(keys.SWITCHES)
     newest = switches[-1].value if switches else None
-    return judge_link([one.value for one in links], newest)
-
-
-def crc(session: CheckoutSession) -> Verdict:
-    """Count frames until there are enough, or until the time limit."""
-    session.mark()
-    session.until(lambda: session.frames >= CRC_FRAMES and session.nonzero >= NONZERO_FRAMES, CRC_S)
-    if not (links := session.of(keys.LINK)):
-        return failed(NO_LINK)
-    return judge_crc([one.value for one in links], session.frames, session.nonzero)
+    return judge_link([one.value for one in links], newest, session.frames, session.nonzero)
 
 
 def sonars(session: CheckoutSession) -> Verdict:
@@ -185,8 +173,7 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
 
 
 STEPS = (
-    Step("link", "Link", f"No action needed: the link is measured for {LINK_S:g} s.", link),
-    Step("crc", "CRC", f"No action needed: {CRC_FRAMES} frames are counted.", crc),
+    Step("link", "Link", f"No action needed: {CRC_FRAMES} frames are counted.", link),
     Step(
         "sonar",
         "Sonars",

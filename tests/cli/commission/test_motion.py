@@ -32,7 +32,6 @@ class Vehicle:
 
     counted: float = 1.0
     measured: float = 1.0
-    across: float = 0.0  # counted on the other axis, in its unit per second
     driven_s: float = 2.0
     granted: float = 1.0  # by safety
     starts_at: float = 3.1  # heading, rad: it wraps on the way
@@ -47,7 +46,7 @@ class Vehicle:
         turns = requested.angular != 0
         speed = (angular if turns else linear) * self.counted
         way = [speed * min(t, end_ns) / NS_PER_S for t in times]
-        aside = [self.across * min(t, end_ns) / NS_PER_S for t in times]
+        aside = [0.0] * len(times)
         distances, headings = (aside, way) if turns else (way, aside)
         return Run(
             requested=requested,
@@ -134,7 +133,7 @@ def test_the_allowed_deviation(off: float) -> None:
         (FORWARD, Vehicle(measured=2.0), "2.00 times the velocity of the counter."),
         (FORWARD, Vehicle(stands_after_s=5.0), "It did not stand within 2 s"),
         (FORWARD, Vehicle(driven_s=0.8), "did not grant the full speed for long enough"),
-        (FORWARD, Vehicle(granted=0.5), "Safety reports: blocked"),
+        (FORWARD, Vehicle(granted=0.5), "Measured at most 0.05 m/s of 0.10 requested. Safety rep"),
     ],
 )
 def test_problems_are_named(requested: Twist, vehicle: Vehicle, phrase: str) -> None:
@@ -177,10 +176,6 @@ def test_the_feedback_unit_is_recognized_by_the_counter(
     assert "command_angular_unit" not in verdict.text
 
 
-def test_unit_hints_only_for_turns() -> None:
-    assert "angular_unit" not in judge(Vehicle(counted=MRAD, measured=MRAD)).text
-
-
 @pytest.mark.parametrize(("ratio", "matches"), [(0.573, True), (0.5, True), (0.48, False)])
 def test_a_unit_must_match(ratio: float, matches: bool) -> None:
     assert ("angular_unit" in judge(Vehicle(counted=ratio, measured=ratio), LEFT).text) is matches
@@ -199,22 +194,13 @@ def test_no_measurement_across_a_pause() -> None:
     assert measure(replace(run, motions=motions)) is None
 
 
-def test_the_peak_velocity_is_reported() -> None:
-    verdict = judge(Vehicle(driven_s=0.4, measured=-6.0), LEFT)
-    assert "Measured at most -1.20 rad/s of 0.20 requested." in verdict.text
-    assert "Safety reports: blocked" in verdict.text
-
-
 def test_no_measurement_without_messages() -> None:
     run = Vehicle().run(FORWARD)
     parts = run.unit, run.feedback, run.released_ns, run.motions
     assert measure(Run(FORWARD, *parts, [], run.mileages, [])) is None
     assert measure(Run(FORWARD, *parts, run.velocities, run.mileages[:1], [])) is None
     verdict = judge_motion(Run(FORWARD, *parts[:3], [], [], [], []))
-    assert verdict.text == (
-        "Safety did not grant the full speed for long enough to measure. "
-        "Measured at most 0.00 m/s of 0.10 requested."
-    )
+    assert verdict.text.endswith("Measured at most 0.00 m/s of 0.10 requested.")
     assert verdict.data == (("standstill after", "never"),)
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from cli.commission.report import Checked, Report, Verdict, failed, judged, render, seconds
+from cli.commission.report import Checked, Report, Verdict, failed, judged, render
 
 GOOD = Checked("Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
 SKIPPED = Checked("Turn", Verdict("skipped", "no blocks | today\nsorry"))
@@ -86,7 +86,3 @@ def test_a_verdict_is_failed_by_any_problem() -> None:
     assert judged(["", "A.", "B."], "good") == Verdict("failed", "A. B.")
     assert failed("A.") == judged(["A."], "good")
     assert judged(["", ""], "good") == Verdict("passed", "good")
-
-
-def test_a_time_as_text() -> None:
-    assert [seconds(None), seconds(1.234), seconds(1.234, 3)] == ["never", "1.23 s", "1.234 s"]

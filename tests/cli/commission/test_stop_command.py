@@ -126,14 +126,6 @@ def test_unsuitable_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     text.write_text("no recording")
     assert "is not an MCAP file" in refused(capsys, "stop", text)
     assert "cannot be read" in refused(capsys, "stop", tmp_path / "none.mcap")
-    blind = driven(0.5)
-    blind.velocities = []
-    error = refused(capsys, "stop", record(tmp_path / "blind.mcap", blind))
-    assert "blind.mcap: has no tel/bridge/velocity: record all keys with `t2 record`" in error
-    coarse = driven(0.5)
-    coarse.velocities = coarse.velocities[::5]
-    error = refused(capsys, "stop", record(tmp_path / "coarse.mcap", coarse))
-    assert "has a velocity each 0.10 s, too coarse" in error
     error = refused(capsys, "stop", record(tmp_path / "robots.mcap", driven(0.5), "002"))
     assert "has several robots (001, 002): record one" in error
     two = driven(0.5)

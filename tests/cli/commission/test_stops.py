@@ -115,20 +115,6 @@ def test_a_slow_stop_is_left_out() -> None:
     assert len(found) == 1
 
 
-def test_reasons_are_counted() -> None:
-    found, left_out = find_stops(StopMaker().stop(0.05).stop(0.05).stop(0.5).streams)
-    assert left_out == {"slower than 0.1 m/s": 2}
-    assert [stop.file for stop in found] == [""]
-
-
-def test_speed_and_direction_are_those_at_the_command() -> None:
-    """The velocities before and after it may be others."""
-    other = {-0.015: 0.79, 0.005: -0.7}
-    made = changed(streams(), lambda v, now: replace(v, linear=other.get(round(now, 3), v.linear)))
-    (stop,), _ = find_stops(made)
-    assert (stop.speed, stop.direction) == (0.79, "forward")
-
-
 def test_a_turning_vehicle_is_left_out() -> None:
     def turned(rate: float) -> Streams:
         return changed(streams(), lambda v, now: replace(v, angular=rate if now < 0.01 else 0.0))
@@ -152,11 +138,6 @@ def test_an_accelerating_vehicle_is_left_out(off: float, seconds: float, steady:
     assert (len(find_stops(made)[0]) == 1) is steady
     if not steady:
         assert left(made) == "not at a steady speed"
-
-
-def test_a_velocity_that_changes_at_the_command_is_not_steady() -> None:
-    newest = changed(streams(), lambda v, now: replace(v, linear=0.9) if -0.02 < now < 0 else v)
-    assert left(newest) == "not at a steady speed"
 
 
 def test_a_slow_vehicle_may_scatter_by_3_cm_a_second() -> None:
