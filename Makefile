@@ -59,10 +59,13 @@ SECOND_RUN = out/second-run.txt
 # Each worker imports each file that it is given: the timed tests get theirs only.
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
-test: $(STAMP) ## all tests except campaigns and search, which `make check` adds
+test: $(STAMP) ## all tests except search and campaigns
 	@rm -f $(SECOND_RUN)
 	$(TESTS) $(TIMED) -m "timed and not campaign"
 	$(TESTS) $(WITHOUT_SEARCH) $(MANY) -m "not timed and not campaign"
+
+campaigns: $(STAMP) ## short runs of all campaigns and benchmarks, the tour, the programs of docs/integrate.md
+	$(BIN)/pytest tests -m campaign
 
 fuzz: $(STAMP) ## feed hostile bytes to every parser, SECONDS=60 for each target
 	$(BIN)/python -m verification.fuzz --seconds $(or $(SECONDS),60) $(TARGET)
@@ -95,7 +98,7 @@ ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz and older versions o
 check: $(STAMP) ## what CI runs: lint, types, tests, coverage of the cores, search, mutants of changed cores
 	@rm -f $(SECOND_RUN)
 	@$(MAKE) --no-print-directory -j2 --output-sync lint types
-	@$(MAKE) --no-print-directory cover search mutants CHANGED=1; code=$$?; \
+	@$(MAKE) --no-print-directory test cover search mutants CHANGED=1; code=$$?; \
 	  cat $(SECOND_RUN) 2> /dev/null; exit $$code
 
 lint: $(STAMP)
@@ -105,7 +108,8 @@ lint: $(STAMP)
 	$(BIN)/codespell
 	$(BIN)/python -m tools.docs --check
 
-search: $(STAMP) ## search for violations: random events, 200 random vehicles, mutations of the protections
+# Random events, 200 random vehicles, and mutations of the protections.
+search: $(STAMP)
 	$(BIN)/pytest -n 2 $(SEARCH)
 
 # All tests except the search. Not a branch of a core is untested.

@@ -56,9 +56,3 @@ def test_safety_answers_as_the_steps_expect() -> None:
     assert shown[0][1].startswith("refused: ")
     assert shown[-1][0] == "reset"
     assert shown[-1][1].startswith("granted: ")
-
-
-def test_the_same_lap_twice_is_the_same() -> None:
-    first = driven()[0].vehicle.records
-    driven.cache_clear()
-    assert driven()[0].vehicle.records == first

@@ -19,6 +19,11 @@ RUST_MARKS = pytest.mark.skipif(
     not (TARGET / "debug" / "drive").exists(), reason="not compiled: make rust-example"
 )
 
+PROGRAMS = [
+    "plain",
+    pytest.param("sdk", marks=pytest.mark.campaign),
+    pytest.param("rust", marks=RUST_MARKS),
+]
 Programs = dict[str, str]
 
 
@@ -28,7 +33,7 @@ def it(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Integrator]:
         yield it
 
 
-@pytest.fixture(scope="module", params=["plain", "sdk", pytest.param("rust", marks=RUST_MARKS)])
+@pytest.fixture(scope="module", params=PROGRAMS)
 def programs(request: pytest.FixtureRequest) -> Programs:
     """Return the three programs in one language."""
     names = ("read", "drive", "limit")
