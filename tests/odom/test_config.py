@@ -18,7 +18,3 @@ def loaded(*sets: str) -> OdomConfig:
 def test_nonsense_is_refused_by_name(bad: str) -> None:
     with pytest.raises(ConfigError, match=f"odom.{bad.split('=')[0]}"):
         loaded(f"odom.{bad}")
-
-
-def test_a_setting_that_is_given_wins() -> None:
-    assert loaded("odom.hold=0.2").odom.hold == 0.2

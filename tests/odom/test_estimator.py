@@ -10,13 +10,11 @@ from common.freshness import NS_PER_S
 from common.messages import Velocity
 from services.odom.config import Odom
 from services.odom.core.estimator import SEGMENTS_MAX, START, Estimator, SlipDetector
-from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, NoiseModel
-from services.odom.core.pose import ArcSegment, Pose, PoseEstimate
+from services.odom.core.pose import ArcSegment, Pose
 from tests.odom.odom_fixture import (
     EXACT,
     TICK_NS,
     Board,
-    OdomFixture,
     apart,
     driving,
     parts,
@@ -28,16 +26,6 @@ from tests.odom.odom_fixture import (
 Parts = list[tuple[float, float, list[tuple[bool, bool]]]]
 
 # --- arcs and lost samples ------------------------------------------------------------------
-
-
-@given(speeds, turnings, st.integers(1, 4))
-def test_velocities_carry_the_pose_to_now(linear: float, angular: float, ticks: int) -> None:
-    odom = started()
-    odom.board.linear, odom.board.angular = linear, angular
-    odom.update(counters=False)
-    odom.board.tick(ticks)
-    assert odom.off() == EXACT
-    assert odom.odometry(10_000_000) == odom.odometry(10_000_000)
 
 
 @given(parts, st.booleans())
@@ -70,21 +58,6 @@ def test_lost_counters_leave_no_error_while_velocities_come(way: Parts) -> None:
         for counters, _ in received:
             odom.board.tick()
             odom.update(counters=counters)
-    assert odom.off() == EXACT
-
-
-@given(speeds, turnings, st.lists(st.tuples(st.booleans(), st.booleans()), max_size=60))
-def test_any_loss_on_a_constant_arc_leaves_no_error(
-    linear: float, angular: float, received: list[tuple[bool, bool]]
-) -> None:
-    odom = started()
-    odom.board.linear, odom.board.angular = linear, angular
-    odom.update(counters=False)
-    for counters, velocity in received:
-        odom.board.tick()
-        odom.update(counters=counters, velocity=velocity)
-    odom.board.tick()
-    odom.update()
     assert odom.off() == EXACT
 
 
@@ -153,24 +126,6 @@ def test_covariance_grows_by_way_and_gap_whatever_the_rate() -> None:
     assert areas[2] > 2 * areas[0]
 
 
-def test_time_before_and_after_a_valid_velocity_is_unseen() -> None:
-    estimator, noise = Estimator(Odom()), NoiseModel(Odom())
-    start = PoseEstimate(Pose(0.0, 0.0, 0.0), START)
-    assert (START.xx, START.yy, START.hh) == (1e-6, 1e-6, COUNTER_STEP_RAD**2)
-    assert COUNTER_STEP_M == 0.001
-    estimator.on_mileage(Board().mileage(), NS_PER_S)
-    estimator.on_velocity(Velocity(linear=0.5, angular=0.3), 2 * NS_PER_S)
-    estimator.on_velocity(Velocity(linear=0.0, angular=0.0), 3 * NS_PER_S)
-    for segment in (
-        ArcSegment(0.0, 0.0, 1.0, seen=False),
-        ArcSegment(0.05, 0.03, 0.1, seen=True),
-        ArcSegment(0.0, 0.0, 0.9, seen=False),
-    ):
-        start = start.moved(segment.distance, segment.turn, noise.extrapolated(segment))
-    assert estimator._predicted == start
-    assert [segment.seen for segment in estimator._segments] == [False, True, False]
-
-
 def test_a_velocity_that_is_over_adds_no_time_before_the_last_input() -> None:
     estimator = Estimator(Odom())
     estimator.on_velocity(Velocity(linear=0.5, angular=0.0), NS_PER_S)
@@ -208,12 +163,6 @@ def test_a_restart_does_not_move_the_pose(changes: dict[str, float], pause: int)
     odom.drive(100)
     assert odom.off() == EXACT
     assert odom.odometry().epoch == 0
-
-
-def test_the_start_is_zero_whatever_the_counters_show() -> None:
-    odom = OdomFixture(Board(distance=123.0, heading=-3.0))
-    assert odom.update() is False
-    assert odom.pose() == Pose(0.0, 0.0, 0.0)
 
 
 poses = st.builds(Pose, st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9))
@@ -264,14 +213,6 @@ def test_slip_by_distance_or_by_turn(sign: int, counted: float, turned: float, s
     detector = compared(10, arc(0.5 + sign * counted, 0.3 + sign * turned), arc(0.5, 0.3))
     assert detector.slip is slip
     assert detector.residual == pytest.approx(10 * sign * counted)
-
-
-def test_the_limits_of_slip_are_exclusive() -> None:
-    detector = SlipDetector(Odom(slip_distance=0.125, slip_turn=0.25))
-    assert (detector.residual, detector.slip) == (None, False)
-    detector.add(0, arc(0.125, 0.25), arc(0.0))
-    detector.update(0)
-    assert not detector.slip
 
 
 def test_only_the_last_second_is_compared() -> None:

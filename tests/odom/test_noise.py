@@ -111,20 +111,6 @@ def test_the_place_of_a_standstill_moves_with_the_vehicle() -> None:
     assert seen == [False, True, False, True, False, True, True]
 
 
-def test_a_standstill_gives_its_step_in_parts_and_the_next_one_gives_another() -> None:
-    model, part = NoiseModel(Odom()), ArcSegment(-0.4 * COUNTER_STEP_M, 0.0, 0.1, seen=True)
-    for distance in (0.0, 0.1):
-        for _ in range(2):
-            model.update(mileage(distance), [])
-        given = []
-        for _ in range(4):
-            given.append(model.counted(part).distance / ONE_STEP[0])
-            model.update(mileage(distance), [])
-        assert given == pytest.approx([0.4, 0.4, 0.2, 0.0])
-        turned = model.counted(ArcSegment(0.0, -1.0, 0.5, seen=False))
-        assert (turned.turn, turned.place) == pytest.approx((ONE_STEP[1] - 1e-7, 0.0), abs=1e-12)
-
-
 # --- through the estimator ------------------------------------------------------------------
 
 

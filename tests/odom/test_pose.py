@@ -8,14 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.odom.core.pose import (
-    SMALL_TURN,
     ArcSegment,
     Covariance,
     Pose,
     PoseEstimate,
     ProcessNoise,
     Trajectory,
-    chord_ratio,
     fitted,
     halved,
     total,
@@ -70,12 +68,6 @@ def test_an_arc_equals_its_parts_and_lies_on_its_circle(
         assert (whole.x, whole.y) == pytest.approx((x, y), abs=1e-6)
 
 
-def test_series_and_closed_form_meet() -> None:
-    below, above = chord_ratio(SMALL_TURN * 0.999), chord_ratio(SMALL_TURN * 1.001)
-    assert below[0] == pytest.approx(above[0], abs=1e-11)
-    assert below[1] == pytest.approx(above[1], abs=1e-7)
-
-
 def derivative(start: Pose, distance: float, turn: float) -> np.ndarray:
     """Return d(x, y, heading) after the arc by (x, y, heading, distance, turn), numerically."""
     step = 1e-6
@@ -104,15 +96,6 @@ def test_covariance_follows_the_derivatives(
 
 
 # --- segments -------------------------------------------------------------------------------
-
-
-@given(ways, st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
-def test_fitted_segments_sum_up_to_the_counters(
-    way: list[ArcSegment], distance: float, turn: float
-) -> None:
-    fit = total(fitted(way, distance, turn))
-    assert (fit.distance, fit.turn) == pytest.approx((distance, turn), abs=1e-9)
-    assert fit.time_s == pytest.approx(total(way).time_s)
 
 
 SEEN, UNSEEN = (ArcSegment(1.0, 0.0, 1.0, seen) for seen in (True, False))

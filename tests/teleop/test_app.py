@@ -126,28 +126,7 @@ def test_a_control_character_reaches_no_panel(screen: Screen) -> None:
     play(screen, act)
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
-def test_an_unconfirmed_emergency_stop_is_shown_until_it_is_latched(
-    screen: Screen, size: tuple[int, int]
-) -> None:
-    async def act(pilot: Pilot[None]) -> None:
-        await pilot.press("e")
-        for _ in range(70):
-            screen.controller.tick(screen.now_ns)
-        await until(lambda: "EMERGENCY STOP NOT CONFIRMED" in screen.text_of("safety"), "it")
-        await until(lambda: screen.fits("safety", "motion", "around", "hints"), "all to fit")
-        state = safety_state(verdict="brake", latched=("estop",))
-        screen.node.fake.deliver(keys.SAFETY, state, received_ns=screen.now_ns)
-        screen.controller.tick(screen.now_ns)
-        await until(lambda: "NOT CONFIRMED" not in screen.text_of("safety"), "its end")
-
-    play(screen, act, *size)
-
-
-@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
-def test_a_contact_shows_its_release_without_clipping(
-    screen: Screen, size: tuple[int, int]
-) -> None:
+def test_a_contact_shows_its_release_without_clipping(screen: Screen) -> None:
     async def act(pilot: Pilot[None]) -> None:
         screen.tell_contact()
         await until(lambda: "LATCHED" in screen.text_of("safety"), "the cause")
@@ -160,7 +139,7 @@ def test_a_contact_shows_its_release_without_clipping(
             lambda: " ".join(screen.text_of("events").split())[16:] == refusal.strip(), "all of it"
         )
 
-    play(screen, act, *size)
+    play(screen, act)
 
 
 def test_received_values_are_shown(screen: Screen) -> None:

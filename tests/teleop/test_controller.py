@@ -128,35 +128,6 @@ def test_a_gamepad_drives_while_the_screen_is_redrawn(operator: Operator) -> Non
     assert sent[20:] == [0.0, 0.0, 0.0, None]  # the screen is not redrawn any more
 
 
-def test_a_gamepad_that_freezes_is_released_and_reported(operator: Operator) -> None:
-    pad = FakeGamepad()
-    operator.controller.use_gamepad(pad)
-    pad.stick = stick(deadman=False)
-    speeds: list[float | None] = []
-    hinted = 0
-    for tick in range(70):
-        operator.controller.screen_drawn(operator.now_ns)
-        speeds += operator.speeds(1)
-        hinted += operator.controller.view.move_stick
-        pad.stick = stick(events=min(tick, 10))
-    assert speeds.count(0.2) == 10 + 40
-    assert speeds[-10:] == [None] * 10
-    assert hinted == 20
-    assert [line for line in operator.lines if "gamepad released" in line] == [
-        "gamepad released: deflected, and no event for 2 s; release the deadman, "
-        "then press it again"
-    ]
-
-
-def test_a_gamepad_change_is_reported(operator: Operator) -> None:
-    pad = FakeGamepad()
-    operator.controller.use_gamepad(pad)
-    operator.ticks(1)
-    pad.read = lambda: setattr(pad, "status", "none")  # type: ignore[method-assign]
-    operator.ticks(2)
-    assert operator.lines == ["gamepad: none"]
-
-
 def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -> None:
     def hold(ticks: int, source: str | None) -> list[float | None]:
         speeds: list[float | None] = []
@@ -299,17 +270,6 @@ def test_an_unanswered_reset_without_the_right_is_not_allowed(
     assert operator.lines[-1] == (not_allowed("safety") if denied else no_answer("safety"))
 
 
-def test_a_new_reset_replaces_one_that_waits_for_its_state(operator: Operator) -> None:
-    operator.tell_contact()
-    operator.press("r")
-    operator.node.fake.answers[0][0](DONE)
-    operator.press("r")
-    assert len(operator.node.fake.asked) == 2
-    operator.node.fake.answers[0][1]("late")  # of the first one
-    operator.press("r")
-    assert len(operator.node.fake.asked) == 2
-
-
 @pytest.mark.parametrize("shown", [True, False])
 def test_a_reset_is_not_sent_without_a_fresh_state(operator: Operator, shown: bool) -> None:
     operator.tell_contact()
@@ -346,15 +306,3 @@ def test_events_of_others_are_shown_and_own_ones_only_once(operator: Operator) -
     fake.deliver(keys.EVENTS, mine, declared=everyone, service="teleop")
     (line,) = operator.node.event_log.lines()
     assert (line.t_ns, line.service, line.level) == (7, "safety", "error")
-
-
-def test_a_denied_operator_is_notified_once(
-    operator: Operator, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Publisher, "passed_on", False)
-    for _ in range(15):
-        operator.tell_safety()
-        operator.ticks(1)
-    assert [line for line in operator.lines if "NOT ALLOWED" in line] == [
-        "NOT ALLOWED: the router drops our requests; this certificate may only watch"
-    ]

@@ -73,21 +73,6 @@ def test_a_key_counts_by_its_age_and_the_round_trip(
     assert Operator().press(key, waited_s=0.5) is accepted
 
 
-@pytest.mark.parametrize(
-    ("key", "waited_s", "took_s"),
-    [
-        *((key, 0.51, 0.0) for key in ("w", "left", "f", "b", "r", "5")),
-        *((key, 0.0, 0.42) for key in ("w", "left", "f", "b", "r")),
-    ],
-)
-def test_a_refused_key_changes_nothing(
-    operator: Operator, key: str, waited_s: float, took_s: float
-) -> None:
-    operator.press(key, waited_s, took_s)
-    assert operator.ticks(3) == [None] * 3
-    assert operator.controls.gear == 1
-
-
 @pytest.mark.parametrize(("waited_s", "ticks"), [(0.0, 11), (0.3, 5)])
 def test_a_tap_is_a_zero_the_twist_and_three_zeros(
     operator: Operator, waited_s: float, ticks: int
@@ -110,14 +95,6 @@ def test_a_stop_ends_a_hold_at_once_and_sends_zeros_in_any_case(
         assert operator.ticks(5) == [NEUTRAL] * 3 + [None] * 2
 
 
-@pytest.mark.parametrize("key", ["x", "enter", "6", "0", "t", "["])
-def test_an_unknown_key_moves_nothing(operator: Operator, key: str) -> None:
-    assert operator.press(key) is Action.NONE
-    assert operator.controls.is_gamepad_silent is False
-    assert operator.controls.is_gamepad_due(operator.now_ns) is False
-    assert operator.ticks(3) == [None] * 3
-
-
 def test_gears_are_chosen_by_number(operator: Operator) -> None:
     assert operator.controls.top() == Twist(0.2, 0.3)
     operator.press("5")
@@ -125,12 +102,6 @@ def test_gears_are_chosen_by_number(operator: Operator) -> None:
     assert operator.ticks(2)[-1] == request(-0.8)
     assert operator.controls.top() == Twist(0.8, 0.9)
     assert list(SETTINGS.gears_linear) == sorted(set(SETTINGS.gears_linear))
-
-
-def test_two_keys_that_are_held_add_up(operator: Operator) -> None:
-    operator.press("w")
-    operator.press("a")
-    assert operator.ticks(2)[-1] == request(0.2, 0.3)
 
 
 @pytest.mark.parametrize(("key", "direction"), [("f", "forward"), ("b", "backward")])
@@ -167,12 +138,6 @@ def test_after_a_stop_or_a_release_the_deadman_must_come_up(operator: Operator, 
     assert FIRST_GEAR not in operator.ticks(20, DOWN)
     operator.ticks(1, UP)
     assert operator.ticks(2, DOWN)[-1] == FIRST_GEAR
-
-
-def test_keys_have_priority_over_the_gamepad(operator: Operator) -> None:
-    operator.ticks(1, UP)
-    operator.press("s")
-    assert operator.ticks(2, DOWN)[-1] == request(-0.2)
 
 
 def test_a_gamepad_that_freezes_while_it_drives_is_released(operator: Operator) -> None:

@@ -9,7 +9,7 @@ from common.client import NEUTRAL, ZEROS
 from common.freshness import NS_PER_S
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
-from services.teleop.core.hold import RULES, Deadman, Keys, Press
+from services.teleop.core.hold import RULES, Keys, Press
 
 
 def at(seconds: float) -> int:
@@ -35,47 +35,6 @@ def test_deadlines_of_keys(
     for at_s, names in held.items():
         assert keys.held(at(at_s)) == list(names)
     assert keys.held(at(released)) == []
-
-
-def test_other_keys_are_released_and_a_kept_one_repeats() -> None:
-    keys = Keys(first_s=0.6, repeat_s=0.3)
-    keys.press("f", at(10))
-    for at_s in (10.1, 10.5):
-        keys.keep({"b"})
-        keys.press("b", at(at_s))
-        assert keys.held(at(at_s)) == ["b"]
-    assert keys.held(at(10.8)) == []
-
-
-def test_the_age_of_a_press() -> None:
-    assert Press("w", at(10)).age_s(at(12.5)) == 2.5
-
-
-def test_a_deadman_counts_after_it_was_up() -> None:
-    deadman = Deadman(2.0)
-    held = [deadman.is_held]
-    for down in (True, True, False, True, None, True, False, True):
-        if down is None:
-            deadman.drop()
-        else:
-            deadman.update(down, 0, at(10))
-        held.append(deadman.is_held)
-    assert held == [False, False, False, False, True, False, False, False, True]
-
-
-@pytest.mark.parametrize(
-    ("quiet_s", "due", "silent"),
-    [(0.0, False, False), (1.0, False, False), (1.05, True, False), (2.0, True, False),
-     (2.05, True, True), (60.0, True, True)],
-)  # fmt: skip
-def test_the_limits_of_a_quiet_gamepad(quiet_s: float, due: bool, silent: bool) -> None:
-    deadman, now_ns = Deadman(2.0), at(10 + quiet_s)
-    deadman.update(True, 5, at(10))
-    deadman.update(True, 5, now_ns)
-    assert (deadman.is_due(now_ns), deadman.is_silent(now_ns)) == (due, silent)
-    for events in (6, 0):
-        deadman.update(True, events, now_ns)
-        assert not deadman.is_due(now_ns)
 
 
 # When keys count again, and whether the deadman must come up, by rule.

@@ -180,19 +180,9 @@ def test_a_missing_terminal_is_reported(
     assert "needs a terminal" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (["--set", "teleop.hold=9"], "teleop.hold"),
-        (["--source", "No Name"], "teleop.source"),
-        (["--robot", "a/b"], "robot.id"),
-    ],
-)
-def test_an_invalid_setting_ends_the_start(
-    words: list[str], named: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert teleop.main(words) == 78
-    assert named in capsys.readouterr().err
+def test_an_invalid_setting_ends_the_start(capsys: pytest.CaptureFixture[str]) -> None:
+    assert teleop.main(["--source", "No Name"]) == 78
+    assert "teleop.source" in capsys.readouterr().err
 
 
 def test_a_missing_extra_is_reported(

@@ -26,32 +26,6 @@ SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too ol
 IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.")
 
 
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        (
-            {"link": link(), "bumper": Bumper(pressed=False)},
-            "T2 001  ● bus  ● board  ● bumper  gear 1/5  0.20 m/s 0.30 rad/s",
-        ),
-        ({"connected": False}, "○ no router yet  ○ no bridge  ○ bumper  gear"),
-        ({"link": link(state="never")}, "○ board never seen"),
-        ({"bumper": Bumper(pressed=True), "gear": 5}, "● bumper PRESSED  gear 5/5"),
-    ],
-)
-def test_the_header_shows_connections_and_gear(fields: dict[str, Any], words: str) -> None:
-    shown = panels.header(view(**fields)).plain
-    assert words in shown
-    assert len(shown) <= 78
-
-
-def test_the_hints_explain_key_repeats_and_fit() -> None:
-    keys, limit = panels.hints(view(), 0.6, 0.3).plain.split("\n")
-    assert "E ESTOP" in keys
-    assert "FB release" in keys
-    assert "a tap drives 0.6 s, a hold 0.3 s past its last repeat" in limit
-    assert max(len(keys), len(limit)) <= 78
-
-
 @pytest.mark.parametrize("reason", ["terminal too slow: 10.42 s, allowed 0.15 s", UNKNOWN])
 def test_on_a_slow_terminal_the_hints_give_the_reason_and_the_accepted_keys(reason: str) -> None:
     keys, advice = panels.hints(view(keys_refused=reason), 0.6, 0.3).plain.split("\n")
@@ -162,14 +136,6 @@ def test_the_release_shows_directions_and_distance(
 def test_a_free_bumper_needs_no_release(pressed: bool) -> None:
     of = view(safety=contact_state(release=release()), bumper=Bumper(pressed=pressed))
     assert ("RELEASE" in panels.safety(of, 6).plain) == pressed
-
-
-def test_the_release_fits() -> None:
-    rows = contact_rows(
-        believed_free="forward", age=7000.0, travelled=-0.999, forbidden=("forward", "backward")
-    )
-    assert len(rows) == 4
-    assert max(map(len, rows)) <= 76
 
 
 # --- sonars ---------------------------------------------------------------------------------

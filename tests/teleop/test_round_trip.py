@@ -74,20 +74,6 @@ def test_answers_out_of_order_and_unknown_ones_are_ignored(trip: RoundTrip) -> N
     assert "1.70 s" in trip.refusal(at(12))
 
 
-def test_a_reused_number_is_the_new_query(trip: RoundTrip) -> None:
-    for question in range(2 * NUMBERS):
-        trip.sent(question % NUMBERS, at(10 + question * PROBE_S))
-    last_s = 10 + (2 * NUMBERS - 1) * PROBE_S
-    trip.answered(NUMBERS - 1, at(last_s + 0.1))
-    assert trip.refusal(at(last_s + 0.1)) == ""
-
-
-def test_stored_answers_are_bounded(trip: RoundTrip) -> None:
-    for number in range(3 * NUMBERS):
-        probe(trip, number, 10 + number, 0.01)
-    assert len(trip._answers) == NUMBERS
-
-
 DELAYS = st.lists(st.floats(0.0, 2.0) | st.floats(0.0, 0.1), min_size=5, max_size=60)
 
 
@@ -109,3 +95,9 @@ def test_no_key_that_counts_is_older_than_the_limit_allows(
         trip.answered(number, at(received_s))
         if age_s > LIMIT_S + 2 * PROBE_S + 0.001:
             assert refused_before
+
+
+def test_stored_answers_are_bounded(trip: RoundTrip) -> None:
+    for number in range(3 * NUMBERS):
+        probe(trip, number, 10 + number, 0.01)
+    assert len(trip._answers) == NUMBERS
