@@ -53,11 +53,3 @@ def with_accepted_joined(sets: Iterable[str]) -> list[str]:
         else:
             others.append(given)
     return [*(f"{name}={','.join(values)}" for name, values in accepted.items()), *others]
-
-
-def warning(stall_s: float) -> str:
-    """Return the warning that the lap is not driven with the shipped limits."""
-    return (
-        f"This host has scheduling stalls of up to {stall_s:.2f} s. "
-        f"The demo uses longer time limits and drives slower."
-    )

@@ -12,12 +12,11 @@ def limits(stall_s: float) -> Everything:
     return load(Everything, Sources(environ={}, sets=host_stalls.settings(stall_s))).config
 
 
-@pytest.mark.parametrize("stall_s", [0.0, 0.02, host_stalls.LIMIT_S])
-def test_short_stalls_keep_the_shipped_limits(stall_s: float) -> None:
-    assert host_stalls.settings(stall_s) == []
+def test_short_stalls_keep_the_shipped_limits() -> None:
+    assert host_stalls.settings(host_stalls.LIMIT_S) == []
 
 
-@pytest.mark.parametrize("stall_s", [0.051, 0.1, 0.25, 0.34, 0.5, 0.7, 1.0, 1.5, 2.0, 3.3, 5.0])
+@pytest.mark.parametrize("stall_s", [0.051, 0.34, 1.0, 5.0])
 def test_settings_of_every_stall_are_accepted(stall_s: float) -> None:
     config = limits(stall_s)
     assert config.safety.stall == config.bridge.stall == min(1.0, max(0.3, stall_s))
@@ -33,11 +32,6 @@ def test_every_limit_is_longer(stall_s: float) -> None:
         }
     assert safety.leased["nav"].lease == 0.2 + 3 * stall_s
     assert safety.reaction == 0.25 + 2 * stall_s
-
-
-def test_measurement_and_warning() -> None:
-    assert 0.0 <= host_stalls.measured(0.02) < 60.0
-    assert "0.34 s" in host_stalls.warning(0.34)
 
 
 def test_the_longest_excess_of_a_sleep_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:

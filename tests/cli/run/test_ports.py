@@ -10,18 +10,12 @@ from pathlib import Path
 import pytest
 
 from cli.run import ports
-from cli.run.ports import Port, claimed, routers, wanted
+from cli.run.ports import Port, check_free, routers, wanted
 from cli.settings import Everything
 from common import settings
 from common.bus.session import router
-from common.cli_args import EXIT_LINK
 from common.errors import LinkError
-from tests.cli.processes import PATIENCE_S, ran, running, sets, t2
-from tests.cli.stack import ports as own_ports
-from tests.cli.stack import starts
 from verification.harness.bus import listening
-from verification.harness.ports import free_port
-from verification.harness.waiting import wait_until
 
 ALL = ("router", "sim", "bridge", "safety", "odom", "recorder")
 
@@ -77,11 +71,11 @@ def test_a_taken_port_is_named_with_advice(
     with held(kind) as number:
         port = of(number)
         with pytest.raises(LinkError) as raised:
-            claimed([port], 0.0)
+            check_free([port], 0.0)
     message = str(raised.value)
     assert f"127.0.0.1:{number} ({port.setting}): used by another program" in message
     assert "is a stack already running?" in message
-    claimed([port], 0.0).close()  # free again
+    check_free([port], 0.0)  # free again
 
 
 def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
@@ -91,17 +85,10 @@ def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
         router(listening(f"unixsock-stream/{path}")),
         pytest.raises(LinkError, match="used by another"),
     ):
-        claimed([port], 0.0)
+        check_free([port], 0.0)
     with socket.socket(socket.AF_UNIX) as stale:
         stale.bind(f"{path}.2")
-    with claimed([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0):
-        pass
-
-
-def test_of_two_concurrent_starts_one_continues() -> None:
-    port = udp(free_port(socket.SOCK_DGRAM))
-    with claimed([port], 0.0), pytest.raises(LinkError, match="used by another program"):
-        claimed([port], 0.0)
+    check_free([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0)
 
 
 def test_ports_of_a_killed_stack_are_awaited() -> None:
@@ -109,22 +96,5 @@ def test_ports_of_a_killed_stack_are_awaited() -> None:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
         threading.Timer(3 * ports.LOOK_S, leaving.close).start()
         began_s = time.monotonic()
-        claimed([udp(number)]).close()
+        check_free([udp(number)])
         assert time.monotonic() - began_s >= 2 * ports.LOOK_S
-
-
-# --- a whole stack -------------------------------------------------------------------------------
-
-
-def test_a_second_stack_starts_nothing(tmp_path: Path) -> None:
-    log, words = tmp_path / "log", [*own_ports(), "log.format=json"]
-    words = sets(*words, f"recorder.folder={tmp_path}")
-    with running(t2("up", *words), log):
-        wait_until(lambda: starts(log, "bridge") and starts(log, "safety"), "a stack", PATIENCE_S)
-        for more in ([], ["--no-sim"], ["--no-router"]):
-            second = ran("up", *words, *more)
-            assert second.returncode == EXIT_LINK
-            assert "used by another program; is a stack already running?" in second.stderr
-            assert "started" not in second.stderr
-            assert "Traceback" not in second.stderr
-        assert starts(log, "safety") == 1

@@ -9,22 +9,28 @@ import pytest
 
 from cli.__main__ import main
 from cli.run import up
-from cli.run.up import commands, driving, run, selected
-from common.cli_args import EXIT_CONFIG
+from cli.run.up import commands, driving, selected
+from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
-from tests.cli.processes import PATIENCE_S, children, running, sets, t2, wait_gone
+from tests.cli.processes import PATIENCE_S, children, ran, running, sets, t2, wait_gone
 from tests.cli.stack import STACK, ports, starts
 from verification.harness.waiting import wait_until
 
 
 def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with running(
-        t2("up", *sets(*ports(), "log.format=json", f"recorder.folder={tmp_path}")), log
-    ) as up:
+    words = sets(*ports(), "log.format=json", f"recorder.folder={tmp_path}")
+    with running(t2("up", *words), log) as up:
         wait_until(lambda: all(starts(log, name) for name in STACK), "all six", PATIENCE_S)
         first = children(up.pid)
         assert set(first) == STACK
+
+        # A second stack starts nothing.
+        for more in ([], ["--no-router"]):
+            second_up = ran("up", *words, *more)
+            assert second_up.returncode == EXIT_LINK
+            assert "used by another program; is a stack already running?" in second_up.stderr
+            assert "started" not in second_up.stderr
 
         # The ports of the killed router and bridge are bound again.
         for victim in ("router", "bridge"):
@@ -60,8 +66,8 @@ def test_the_hint_reaches_the_same_bus(
     ("words", "message"),
     [
         (sets("board.port=0"), "board.port = 0"),
-        (sets("safety.margin=0"), "margin"),
-        (["--config", "no/such.toml"], "no/such.toml"),
+        (["--profile", "moon"], "known profiles are"),
+        (["--profile", "slope", "--no-sim"], "leave --no-sim or --profile out"),
     ],
 )
 def test_an_invalid_setting_starts_nothing(
@@ -113,22 +119,6 @@ def test_settings_sources_are_passed_to_all_processes() -> None:
         assert command[-len(passed) :] == passed, name
     assert " ".join(made["sim"][1:6]) == "-P -m sim --world x"
     assert " ".join(made["router"][1:5]) == "-P -m cli router"
-
-
-def test_profiles_are_those_of_the_simulated_vehicle_alone() -> None:
-    made = dict(commands(options(profile=["slope", "one-port"])))
-    assert " ".join(made["sim"][1:8]) == "-P -m sim --profile slope --profile one-port"
-    assert not [name for name, command in made.items() if name != "sim" and "slope" in command]
-
-
-def test_an_unknown_profile_starts_nothing() -> None:
-    with pytest.raises(ConfigError, match="known profiles are"):
-        run(options(profile=["moon"]))
-
-
-def test_a_real_vehicle_has_no_profile() -> None:
-    with pytest.raises(ConfigError, match="leave --no-sim or --profile out"):
-        run(options(profile=["slope"], no_sim=True))
 
 
 def test_the_gateway_only_if_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
