@@ -8,9 +8,8 @@ from common import messages as m
 from common.client import reset_request
 from common.freshness import NS_PER_S
 from common.service import Node
-from services.ros2.attachment import Attachment
 from services.ros2.call_age import reset_refusal, switch_refusal
-from services.ros2.cdr import Value
+from services.ros2.cdr import Attachment, Value
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Answer, Endpoints, Serve
 

@@ -1,15 +1,15 @@
-"""Payloads of ROS 2: XCDR1, little-endian, by the table of interfaces. Pure.
+"""Payloads and attachments of ROS 2 samples, requests and replies. Pure.
 
-A message is a tuple of its fields' values in the order of ``definitions``: nested messages are
-tuples, arrays are tuples. Strings carry their length with a closing zero byte. Every value is
-aligned to its size, counted from the end of the four bytes of the encapsulation header.
+A payload is XCDR1, little-endian, by the table of interfaces. A message is a tuple of its fields'
+values in the order of ``definitions``: nested messages are tuples, arrays are tuples. Strings carry
+their length with a closing zero byte. Every value is aligned to its size, counted from the end of
+the four bytes of the encapsulation header. rmw_zenoh drops a sample without an attachment.
 """
 
 import re
 import struct
-from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from services.ros2.definitions import FIELDS
 
@@ -20,21 +20,43 @@ PRIMITIVES = {
 }  # fmt: skip
 ARRAY = re.compile(r"(.+)\[(\d*)\]")
 MAX_ITEMS = 10_000  # of one sequence that is read; ours are short
+ATTACHMENT = struct.Struct("<qqB16s")
+GID_SIZE = 16
 
 Value = Any  # a primitive, a string, or a tuple of values
-Write = Callable[[bytearray, Value], None]
-Read = Callable[["Reader"], Value]
 
 
 class CdrError(ValueError):
-    """Bytes that are no message of the expected type."""
+    """Bytes that are no message of the expected type, or no attachment."""
+
+
+class Attachment(NamedTuple):
+    """The 33 bytes of an attachment."""
+
+    sequence: int  # from 1 for each sender
+    source_ns: int  # the sender's wall clock
+    gid: bytes  # 16 bytes that identify the sender
+
+    def encode(self) -> bytes:
+        """Return the bytes."""
+        return ATTACHMENT.pack(self.sequence, self.source_ns, GID_SIZE, self.gid)
+
+
+def attachment(raw: bytes) -> Attachment:
+    """Return the attachment of these bytes; raise ``CdrError``."""
+    if len(raw) != ATTACHMENT.size:
+        raise CdrError(f"an attachment has {ATTACHMENT.size} bytes, not {len(raw)}")
+    sequence, source_ns, size, gid = ATTACHMENT.unpack(raw)
+    if size != GID_SIZE:
+        raise CdrError(f"a GID has {GID_SIZE} bytes, not {size}")
+    return Attachment(sequence, source_ns, gid)
 
 
 def encode(name: str, value: Value) -> bytes:
     """Return the payload of a message of this type."""
-    out = bytearray(HEADER)
-    _writer(name)(out, value)
-    return bytes(out)
+    out = bytearray()
+    _write(out, name, value)
+    return HEADER + bytes(out)
 
 
 def decode(name: str, payload: bytes) -> Value:
@@ -46,9 +68,8 @@ def decode(name: str, payload: bytes) -> Value:
         raise CdrError(f"{name}: not plain little-endian CDR: {payload[:4].hex(' ')}")
     if len(payload) < len(HEADER):
         raise CdrError(f"{name}: {len(payload)} bytes are no message")
-    reader = Reader(payload[len(HEADER) :])
     try:
-        return _reader(name)(reader)
+        return Reader(payload[len(HEADER) :]).read(name)
     except (struct.error, UnicodeDecodeError, CdrError) as error:
         raise CdrError(f"{name}: {error}") from None
 
@@ -60,17 +81,25 @@ class Reader:
         self.payload = payload
         self.at = 0
 
-    def take(self, code: str) -> Value:
-        """Return the next primitive."""
-        size = struct.calcsize(code)
+    def read(self, name: str) -> Value:
+        """Return the next value of this type."""
+        item, count = _split(name)
+        if count is not None:
+            items = count or self.read("uint32")
+            if items > MAX_ITEMS:
+                raise CdrError(f"a sequence of {items} items")
+            return tuple([self.read(item) for _ in range(items)])
+        if name == "string":
+            return self._text(self.read("uint32"))
+        if name not in PRIMITIVES:
+            return tuple([self.read(kind) for _, kind in FIELDS[name]])
+        size = struct.calcsize(PRIMITIVES[name])
         self.at += -self.at % size
-        (value,) = struct.unpack_from(f"<{code}", self.payload, self.at)
+        (value,) = struct.unpack_from(f"<{PRIMITIVES[name]}", self.payload, self.at)
         self.at += size
         return value
 
-    def text(self) -> str:
-        """Return the next string."""
-        size = self.take("I")
+    def _text(self, size: int) -> str:
         raw = self.payload[self.at : self.at + size]
         if len(raw) != size or not raw.endswith(b"\0"):
             raise CdrError(f"a string of {size} bytes does not end")
@@ -78,74 +107,29 @@ class Reader:
         return raw[:-1].decode()
 
 
-@cache
-def _writer(name: str) -> Write:
-    """Return the function that appends a value of this type."""
+def _write(out: bytearray, name: str, value: Value) -> None:
+    """Append a value of this type."""
     item, count = _split(name)
     if count is not None:
-        return _write_items(_writer(item), count)
-    if name == "string":
-        return _write_string
-    if name in PRIMITIVES:
-        code = PRIMITIVES[name]
-        size = struct.calcsize(code)
-
-        def write(out: bytearray, value: Value) -> None:
-            out += b"\0" * (-(len(out) - len(HEADER)) % size) + struct.pack(f"<{code}", value)
-
-        return write
-    fields = [_writer(kind) for _, kind in FIELDS[name]]
-
-    def write_all(out: bytearray, values: Value) -> None:
-        for write_field, value in zip(fields, values, strict=True):
-            write_field(out, value)
-
-    return write_all
-
-
-def _write_string(out: bytearray, value: str) -> None:
-    raw = value.encode() + b"\0"
-    _writer("uint32")(out, len(raw))
-    out += raw
-
-
-def _write_items(write: Write, count: int) -> Write:
-    def write_items(out: bytearray, values: Value) -> None:
-        if count and len(values) != count:
-            raise CdrError(f"{len(values)} values instead of {count}")
+        if count and len(value) != count:
+            raise CdrError(f"{len(value)} values instead of {count}")
         if not count:
-            _writer("uint32")(out, len(values))
-        for value in values:
-            write(out, value)
-
-    return write_items
+            _write(out, "uint32", len(value))
+        for each in value:
+            _write(out, item, each)
+    elif name == "string":
+        raw = value.encode() + b"\0"
+        _write(out, "uint32", len(raw))
+        out += raw
+    elif name in PRIMITIVES:
+        packed = struct.pack(f"<{PRIMITIVES[name]}", value)
+        out += b"\0" * (-len(out) % len(packed)) + packed
+    else:
+        for (_, kind), each in zip(FIELDS[name], value, strict=True):
+            _write(out, kind, each)
 
 
 @cache
-def _reader(name: str) -> Read:
-    """Return the function that reads a value of this type."""
-    item, count = _split(name)
-    if count is not None:
-        return _read_items(_reader(item), count)
-    if name == "string":
-        return Reader.text
-    if name in PRIMITIVES:
-        code = PRIMITIVES[name]
-        return lambda reader: reader.take(code)
-    fields = [_reader(kind) for _, kind in FIELDS[name]]
-    return lambda reader: tuple([read(reader) for read in fields])
-
-
-def _read_items(read: Read, count: int) -> Read:
-    def read_items(reader: Reader) -> Value:
-        items = count or reader.take("I")
-        if items > MAX_ITEMS:
-            raise CdrError(f"a sequence of {items} items")
-        return tuple([read(reader) for _ in range(items)])
-
-    return read_items
-
-
 def _split(name: str) -> tuple[str, int | None]:
     """Return the type of an array's items and their number, 0 for any; None for no array."""
     found = ARRAY.fullmatch(name)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from services.ros2.attachment import Attachment
+from services.ros2.cdr import Attachment
 
 HELD_BACK_NS = NS_PER_S // 5
 SETTLE_NS = NS_PER_S // 2

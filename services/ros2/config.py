@@ -7,7 +7,6 @@ from msgspec import Meta
 from common import settings
 from services.ros2.names import is_valid
 
-Rate = Annotated[float, Meta(ge=0.1, le=50.0)]
 Frame = Annotated[str, Meta(pattern=r"^([A-Za-z_][A-Za-z0-9_/]*)?\Z", max_length=60)]
 
 
@@ -22,7 +21,6 @@ class Ros2(settings.Section, frozen=True, kw_only=True):
     publish_clock: bool = False  # for a replay with use_sim_time
     no_echo: Literal["max_range", "inf"] = "max_range"  # the range of a sonar without an echo
     sonar_fov: Annotated[float, Meta(gt=0.0, le=3.2)] = 0.5  # rad, the whole opening
-    sonar_rate: Rate = 10.0  # Hz at most, of each sonar
 
     def __post_init__(self) -> None:
         if not is_valid(self.namespace):

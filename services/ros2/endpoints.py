@@ -19,9 +19,8 @@ from common.bus.bus import OverwritingQueue
 from common.bus.session import client
 from common.loop import Post
 from common.settings import BusSettings
-from services.ros2 import attachment, cdr, names
-from services.ros2.attachment import Attachment
-from services.ros2.cdr import CdrError, Value
+from services.ros2 import cdr, names
+from services.ros2.cdr import Attachment, CdrError, Value
 
 Take = Callable[[Attachment, Value, int], None]  # sender, message, receive time (monotonic, ns)
 Answer = Callable[[Value], None]
@@ -118,10 +117,9 @@ class Endpoints:
         def read(stamped: tuple[zenoh.Sample, int]) -> None:
             sample, received_ns = stamped
             try:
-                raw = sample.attachment.to_bytes() if sample.attachment else b""
-                about = attachment.decode(raw)
+                about = _attachment(sample)
                 message = cdr.decode(interface, sample.payload.to_bytes())
-            except (CdrError, ValueError) as error:
+            except CdrError as error:
                 self.counters["undecodable"] += 1
                 refused(str(error))
             else:
@@ -161,9 +159,8 @@ class Endpoints:
 
     def _answer(self, query: zenoh.Query, key: str, interface: str, handle: Serve) -> None:
         try:
-            raw = query.attachment.to_bytes() if query.attachment else b""
-            about = attachment.decode(raw)
-        except ValueError:  # no answer would reach the client
+            about = _attachment(query)
+        except CdrError:  # no answer would reach the client
             self.counters["undecodable"] += 1
             query.drop()
             return
@@ -206,3 +203,7 @@ class Endpoints:
     def _next(self) -> int:
         self._number += 1
         return self._number
+
+
+def _attachment(sent: zenoh.Sample | zenoh.Query) -> Attachment:
+    return cdr.attachment(sent.attachment.to_bytes() if sent.attachment else b"")

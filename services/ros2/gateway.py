@@ -6,12 +6,10 @@ from common import clock
 from common.service import Node
 from common.source import DriveSource
 from services.ros2 import names, translate
-from services.ros2.attachment import Attachment
 from services.ros2.calls import Calls
-from services.ros2.cdr import Value
+from services.ros2.cdr import Attachment, Value
 from services.ros2.command import MAX_PUBLISHERS, Commands, Refusal, Twist
 from services.ros2.config import Ros2Config
-from services.ros2.diagnostics import Diagnostics
 from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
 
@@ -25,7 +23,7 @@ class Gateway:
     def __init__(self, node: Node[Ros2Config]) -> None:
         settings = node.config.ros2
         self._node, self._namespace = node, settings.namespace
-        self._commands, self._diagnostics = Commands(), Diagnostics(clock.now_ns)
+        self._commands, self._diagnostics = Commands(), translate.Diagnostics()
         self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
         self._reported: dict[bytes, str] = {}  # the last decision about each, as reported
         ros = names.Node(settings.domain, "", settings.namespace, NODE)
@@ -70,20 +68,21 @@ class Gateway:
         return is_new
 
     def _note(self, level: int, text: str, values: dict[str, str]) -> None:
-        self._diagnostics.note(translate.status(level, "cmd_vel", text, values))
+        status = translate.status(level, "cmd_vel", text, values)
+        self._diagnostics.note(status, clock.now_ns())
 
     def _sender(self, publisher: bytes) -> str:
         return self._publishers.get(publisher, "unknown")
 
     def _on_token(self, token: str, appeared: bool) -> None:
         """Keep the nodes that publish commands."""
-        peer = names.peer(token)
-        if peer is None or peer.kind != "publisher" or peer.topic != self._absolute("cmd_vel"):
+        node, topic = names.publisher(token) or ("", "")
+        if topic != self._absolute("cmd_vel"):
             return
         publisher = gid(token)
         if appeared:
             if len(self._publishers) < MAX_PUBLISHERS:
-                self._publishers[publisher] = peer.node
+                self._publishers[publisher] = node
             return
         self._publishers.pop(publisher, None)
         self._reported.pop(publisher, None)

@@ -14,13 +14,13 @@ from common.settings import sonar_mounts
 from services.ros2 import translate, urdf
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2Config
-from services.ros2.diagnostics import Diagnostics
 from services.ros2.endpoints import Publisher
 
 SIDES = ("left", "right")
 Declare = Callable[..., Publisher]  # topic, interface, latched
 BOOL, TRANSFORMS = "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage"
 ODOM_HZ = 25.0  # at most, as the bridge counts the distance
+SONAR_HZ = 10.0  # at most, of each
 BUMPER_HZ = 10.0  # at most; a change is passed on at once
 DIAGNOSTICS_S = 1.0
 
@@ -29,7 +29,7 @@ class Streams:
     """Subscribes to the robot's streams and publishes them."""
 
     def __init__(
-        self, node: Node[Ros2Config], publisher: Declare, diagnostics: Diagnostics
+        self, node: Node[Ros2Config], publisher: Declare, diagnostics: translate.Diagnostics
     ) -> None:
         self._state: Latest[m.SafetyState] | None = None
         self._node, self._publisher, self._diagnostics = node, publisher, diagnostics
@@ -73,7 +73,7 @@ class Streams:
             for index, (sonar, mount) in enumerate(zip(sonars, mounts, strict=True)):
                 sonar.put(translate.sonar_range(message, index, mount, vehicle, settings))
 
-        self._pass_on(keys.ULTRASONIC, settings.sonar_rate, publish)
+        self._pass_on(keys.ULTRASONIC, SONAR_HZ, publish)
 
     def _stops(self) -> None:
         bumper = self._publisher("bumper", BOOL)
@@ -136,6 +136,6 @@ class Streams:
         """Note the diagnostic status of each message."""
 
         def note(arrival: Arrival[Any]) -> None:
-            self._diagnostics.note(status(arrival.message))
+            self._diagnostics.note(status(arrival.message), arrival.received_ns)
 
         self._node.bus.subscribe(topic, note, depth=32, **names)

@@ -16,7 +16,9 @@ from services.ros2.config import Ros2
 
 ULTRASOUND = 0
 PLANAR = 1e-6  # variance of what a vehicle on a floor does not do: z, roll, pitch, sideways
-OK, WARN, ERROR = 0, 1, 2
+OK, WARN, ERROR, STALE = 0, 1, 2, 3
+STALE_NS = 3 * NS_PER_S
+ONCE = "t2: cmd_vel"  # noted on a change, not periodically
 NO_TURN = (0.0, 0.0, 0.0, 1.0)
 WORST: Mapping[str, int] = {"run": OK, "slow": WARN, "stop": WARN, "brake": ERROR}
 
@@ -131,3 +133,23 @@ def health_status(service: str, health: m.Health) -> Value:
     """Return the status of a service by its health message."""
     values = {"version": health.version, "uptime": f"{health.uptime:.0f} s", **health.counters}
     return status(OK, f"service {service}", "It runs.", values)
+
+
+class Diagnostics:
+    """The newest diagnostic status of each part; a silent part is stale."""
+
+    def __init__(self) -> None:
+        self._statuses: dict[str, tuple[Value, int]] = {}
+
+    def note(self, status: Value, now_ns: int) -> None:
+        """Replace the status of the same name."""
+        self._statuses[status[1]] = (status, now_ns)
+
+    def statuses(self, now_ns: int) -> tuple[Value, ...]:
+        """Return all statuses, the silent ones as stale."""
+        return tuple(
+            (STALE, name, f"Silent. Last: {status[2]}", *status[3:])
+            if now_ns - noted_ns > STALE_NS and name != ONCE
+            else status
+            for name, (status, noted_ns) in sorted(self._statuses.items())
+        )

@@ -35,11 +35,11 @@ class RosPeer:
         )  # fmt: skip
         return came
 
-    def commands(self, interface: str, type_hash: str = "") -> "CommandPublisher":
+    def commands(self, interface: str) -> "CommandPublisher":
         """Return a publisher of cmd_vel."""
         made = ROS2Publisher(
             topic="/cmd_vel", msg_type=interface, msg_definition=definition(interface),
-            type_hash=type_hash or oracle.STORE.hash_rihs01(interface), router_port=self._port,
+            type_hash=oracle.STORE.hash_rihs01(interface), router_port=self._port,
         )  # fmt: skip
         self._open.append(made)
         return CommandPublisher(made, interface)

@@ -6,8 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.ros2.attachment import Attachment
-from services.ros2.command import MAX_PUBLISHERS, Commands, Refusal, Request, Twist
+from services.ros2.cdr import Attachment
+from services.ros2.command import (
+    FASTER_NS,
+    HELD_BACK_NS,
+    IDLE_NS,
+    MAX_PUBLISHERS,
+    OWNER_NS,
+    SETTLE_NS,
+    Commands,
+    Refusal,
+    Request,
+    Twist,
+)
 
 S = 10**9
 MS = 10**6
@@ -63,31 +74,6 @@ def test_what_was_held_back_after_a_silence_is_refused(idle_s: float, delay_s: f
     begin_s = 1.0 + idle_s
     burst = [sender.send(begin_s + n / 20, delay_s - n / 20) for n in range(int(delay_s * 20))]
     assert Request(0.3, 0.0) not in burst[: int((delay_s - 0.25) * 20)]
-
-
-def test_a_publisher_that_was_silent_for_long_begins_anew() -> None:
-    sender = Sender(Commands()).settle()
-    assert sender.send(60.5) == Request(0.3, 0.0)
-    assert sender.send(121.0) == "settling"
-    assert sender.send(121.6) == "not_neutral"
-    assert sender.commands.owner is None
-
-
-def test_what_waited_in_a_busy_host_is_refused() -> None:
-    commands = Commands()
-    sender = Sender(commands).settle()
-    sender.send(1.0)
-    about = Attachment(99, CLOCK + 2 * S, NAV)
-    late = commands.judge(about, twist(0.3), 2 * S + 10 * MS, 2 * S + 220 * MS)
-    assert isinstance(late, Refusal)
-    assert late.name == "held_back"
-
-
-@pytest.mark.parametrize(("delay_s", "held"), [(0.2, False), (0.22, True), (5.0, True)])
-def test_what_the_network_held_back_is_refused(delay_s: float, held: bool) -> None:
-    sender = Sender(Commands()).settle()
-    decided = sender.send(1.0, delay_s)
-    assert decided == ("held_back" if held else Request(0.3, 0.0))
 
 
 def test_a_burst_after_a_gap_is_refused_and_the_next_live_command_taken() -> None:
@@ -160,23 +146,16 @@ def test_a_command_that_is_repeated_or_late_is_refused() -> None:
     assert sender.send(1.1) == "out_of_order"
 
 
-@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("axis", range(6))
-def test_numbers_that_are_not_finite(number: float, axis: int) -> None:
-    axes = [0.0] * 6
-    axes[axis] = number
+def test_numbers_that_are_not_finite_and_other_axes(axis: int) -> None:
     sender = Sender(Commands()).settle()
-    motion = Twist((axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5]))
-    assert sender.send(1.0, motion=motion) == "not_finite"
-
-
-@pytest.mark.parametrize("axis", [1, 2, 3, 4])
-def test_other_axes(axis: int) -> None:
-    axes = [0.0] * 6
-    axes[axis] = 0.01
-    sender = Sender(Commands()).settle()
-    motion = Twist((axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5]))
-    assert sender.send(1.0, motion=motion) == "other_axes"
+    for number in (math.nan, math.inf, -math.inf, 0.01):
+        axes = [0.0] * 6
+        axes[axis] = number
+        motion = Twist((axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5]))
+        taken = "other_axes" if axis in (1, 2, 3, 4) else Request(axes[0], axes[5])
+        expected = taken if math.isfinite(number) else "not_finite"
+        assert sender.send(1.0, motion=motion) == expected
 
 
 def test_a_refused_command_does_not_make_an_owner() -> None:
@@ -192,6 +171,57 @@ def test_many_publishers_are_not_remembered() -> None:
     for number in range(3 * MAX_PUBLISHERS):
         Sender(commands, number.to_bytes(16, "big")).send(number / 100)
     assert len(commands._known) == MAX_PUBLISHERS
+
+
+START_NS = 10**12  # our clock; the senders' clocks are 0 then
+TAKEN, NEUTRAL = Request(0.3, 0.0), Request(0.0, 0.0)
+
+
+def at(
+    commands: Commands, sequence: int, at_ns: int, *, late_ns: int = 0, waited_ns: int = 0,
+    speed: float = 0.3, gid: bytes = NAV,
+) -> object:  # fmt: skip
+    """Judge a command that was sent ``late_ns`` before it arrives; return it, or why not."""
+    about, now_ns = Attachment(sequence, at_ns - late_ns, gid), START_NS + at_ns
+    decided = commands.judge(about, twist(speed), now_ns, now_ns + waited_ns)
+    return decided.name if isinstance(decided, Refusal) else decided
+
+
+@pytest.fixture
+def commands() -> Commands:
+    """Return a judge that has just taken a command of NAV, at 1 s."""
+    made = Commands()
+    assert at(made, 0, 0, speed=0.0) == "settling"
+    assert at(made, 1, SETTLE_NS - 1, speed=0.0) == "settling"
+    assert at(made, 2, SETTLE_NS, speed=0.0) == NEUTRAL
+    assert at(made, 3, S) == TAKEN
+    return made
+
+
+def test_the_limit_of_a_faster_delivery_that_settles_anew() -> None:
+    made = Commands()
+    at(made, 1, 0, late_ns=FASTER_NS, speed=0.0)
+    assert at(made, 2, SETTLE_NS, speed=0.0) == NEUTRAL  # exactly so much faster
+    assert at(made, 3, SETTLE_NS, late_ns=-1) == "settling"
+
+
+@pytest.mark.parametrize("where", ["late_ns", "waited_ns"])  # in the network, in a busy host
+def test_the_limit_of_what_was_held_back(commands: Commands, where: str) -> None:
+    assert at(commands, 4, S, **{where: HELD_BACK_NS}) == TAKEN  # type: ignore[arg-type]
+    assert at(commands, 5, S, **{where: HELD_BACK_NS + 1}) == "held_back"  # type: ignore[arg-type]
+
+
+def test_the_limit_of_the_owners_silence(commands: Commands) -> None:
+    at(commands, 1, S - SETTLE_NS, speed=0.0, gid=JOY)
+    assert at(commands, 2, S + OWNER_NS - 1, gid=JOY) == "second_publisher"
+    assert at(commands, 3, S + OWNER_NS, gid=JOY) == "not_neutral"
+
+
+def test_the_limit_of_a_silence_after_which_a_publisher_is_new(commands: Commands) -> None:
+    assert at(commands, 4, S + IDLE_NS) == TAKEN
+    assert at(commands, 5, S + 2 * IDLE_NS + 1) == "settling"
+    assert commands.owner is None
+    commands.gone(JOY)  # unknown
 
 
 @given(

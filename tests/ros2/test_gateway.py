@@ -7,15 +7,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-import zenoh
 
-from common import child_process, codec, keys
-from common.bus.session import client_config
-from common.messages import Health
-from services.ros2.rihs import HASHES
+from common import child_process
+from services.ros2.definitions import HASHES
 from sim.requests import Bumper
 from tests.ros2.peer import LATCHED, RosPeer, peer
-from verification.harness.bus import at, set_options
+from verification.harness.bus import set_options
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
@@ -82,19 +79,16 @@ def test_latched_topics_reach_who_comes_later(node: RosPeer) -> None:
     assert len([frame for frame in frames if frame.startswith("sonar_")]) == 8
 
 
-@pytest.mark.parametrize("interface", [STAMPED, PLAIN])
-def test_commands_move_the_vehicle_until_they_end(
-    node: RosPeer, stack: RunningStack, interface: str
-) -> None:
+def test_commands_move_the_vehicle_until_they_end(node: RosPeer, stack: RunningStack) -> None:
     wait_until(lambda: reset(node), "a reset")
-    commands, odom = node.commands(interface), node.subscribe("/odom", "nav_msgs/msg/Odometry")
-    commands.send(1.5)
+    commands, odom = node.commands(STAMPED), node.subscribe("/odom", "nav_msgs/msg/Odometry")
+    commands.send(1.0)
     wait_until(lambda: odom, "odometry")
     start = odom[-1].pose.pose.position
-    commands.send(2.0, 0.2)
+    commands.send(1.5, 0.2)
     wait_until(lambda: abs(odom[-1].twist.twist.linear.x) < 0.01, "a standstill")
     end = odom[-1].pose.pose.position
-    assert math.dist((start.x, start.y), (end.x, end.y)) > 0.15
+    assert math.dist((start.x, start.y), (end.x, end.y)) > 0.1
 
 
 def test_an_emergency_stop_latches_until_a_reset(node: RosPeer, stack: RunningStack) -> None:
@@ -134,31 +128,6 @@ def test_a_contact_is_seen_at_once_and_its_reset_is_refused(
     wait_until(lambda: reset(node), "a reset")
 
 
-def test_the_diagnostics_list_only_services_that_exist(node: RosPeer, stack: RunningStack) -> None:
-    diagnostics = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-    with zenoh.open(client_config(at(stack.endpoint))) as session:
-
-        def put(service: str, named: str) -> None:
-            health = Health(
-                service=named, version="invented", uptime=0, rates={}, counters={}, lateness=0,
-                rss=0,
-            )  # fmt: skip
-            session.put(keys.HEALTH.on("001", service=service), codec.encode(health))
-
-        for number in range(200):
-            put("dashboard", f"name-{number}")
-            put(f"key-{number}", "name")
-
-        def received() -> bool:
-            put("dashboard", "dashboard")
-            one = statuses(diagnostics).get("t2: service dashboard")
-            return one is not None and one.values[0].value == "invented"
-
-        wait_until(received, "the dashboard's status")
-        services = {name for name in statuses(diagnostics) if name.startswith("t2: service ")}
-        assert services <= {f"t2: service {name}" for name in keys.SERVICES}
-
-
 def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> None:
     diagnostics = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
     commands = node.commands(STAMPED)
@@ -171,22 +140,12 @@ def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> 
     assert stack.speed() == 0
 
 
-def test_another_type_hash_receives_nothing_and_breaks_nothing(
-    node: RosPeer, stack: RunningStack
-) -> None:
-    wrong = node.commands(STAMPED, "RIHS01_" + "0" * 64)
-    wrong.send(1.0)
-    wrong.send(0.5, 0.3)
-    assert stack.speed() == 0
-    assert stack.processes["ros2"].poll() is None
-
-
 def test_a_killed_gateway_stops_the_vehicle_and_nothing_else(
     node: RosPeer, stack: RunningStack
 ) -> None:
     wait_until(lambda: reset(node), "a reset")
-    commands = node.commands(STAMPED)
-    commands.send(1.5)
+    commands = node.commands(PLAIN)
+    commands.send(1.0)
     commands.send(0.7, -0.2)
     assert stack.speed() < -0.05
     stack.kill("ros2")

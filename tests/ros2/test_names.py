@@ -2,7 +2,11 @@
 
 import pytest
 
+from common.config import Sources, load
+from common.errors import ConfigError
 from services.ros2 import names
+from services.ros2.config import Ros2Config
+from services.ros2.definitions import HASHES
 from services.ros2.endpoints import gid
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -31,44 +35,23 @@ def test_a_namespace_is_one_chunk() -> None:
     token = node.endpoint_token(
         3, "SS", "/site/t2/hardware/e_stop_reset", "std_srvs/srv/Trigger", ""
     )
-    peer = names.peer(token)
-    assert peer is not None
-    assert (peer.kind, peer.node, peer.topic, peer.type) == (
-        "service", "/site/t2/t2", "/site/t2/hardware/e_stop_reset", "std_srvs/srv/Trigger",
-    )  # fmt: skip
-
-
-def test_a_captured_token_is_read() -> None:
-    peer = names.peer(CAPTURED)
-    assert peer == names.Peer(
-        ZID, "publisher", "/_ros2cli_10327", "/cmd_vel", STAMPED, HASH, "::,10:,:,:,,"
+    assert token == (
+        "@ros2_lv/7/ab/0/3/SS/%/%site%t2/t2/%site%t2%hardware%e_stop_reset/"
+        f"std_srvs::srv::dds_::Trigger_/{HASHES['std_srvs/srv/Trigger']}/"
     )
-    assert names.peer(f"{CAPTURED}/backends:cpu") == peer  # Lyrical and newer
 
 
-def test_every_token_names_its_node() -> None:
-    assert names.node(CLI.token) == names.node(CAPTURED) == CLI
-    assert CLI.path == "/_ros2cli_10327"
-    inner = names.Node(7, "ab", "/site/t2", "t2")
-    assert names.node(inner.token) == inner
-    assert inner.path == "/site/t2/t2"
+def test_the_token_of_a_publisher_is_read() -> None:
+    assert names.publisher(CAPTURED) == ("/_ros2cli_10327", "/cmd_vel")
+    assert names.publisher(f"{CAPTURED}/backends:cpu") == names.publisher(CAPTURED)  # Lyrical
+    inner = names.Node(7, "ab", "/site/t2", "nav")
+    token = inner.endpoint_token(3, "MP", "/site/t2/cmd_vel", STAMPED, names.QOS)
+    assert names.publisher(token) == ("/site/t2/nav", "/site/t2/cmd_vel")
 
 
-@pytest.mark.parametrize("token", ["a/b", "x" + CLI.token, CLI.token.replace("/0/", "/x/", 1)])
-def test_other_keys_are_no_node(token: str) -> None:
-    assert names.node(token) is None
-
-
-def test_durability() -> None:
-    assert names.is_latched(names.QOS_LATCHED)
-    assert names.is_latched("2:1:,5:,:,:,,")
-    assert not names.is_latched(names.QOS)
-    assert not names.is_latched("")
-
-
-@pytest.mark.parametrize("token", [CLI.token, "a/b", f"{CAPTURED[:40]}", "x" + CAPTURED])
-def test_other_keys_are_no_endpoint(token: str) -> None:
-    assert names.peer(token) is None
+@pytest.mark.parametrize("token", [CLI.token, "a/b", CAPTURED[:40], CAPTURED.replace("MP", "MS")])
+def test_other_tokens_are_of_no_publisher(token: str) -> None:
+    assert names.publisher(token) is None
 
 
 def test_the_captured_gid_is_that_of_its_token() -> None:
@@ -83,6 +66,11 @@ def test_ros_names(name: str) -> None:
 @pytest.mark.parametrize("name", ["", "t2", "/1", "/a//b", "/a/", "/a-b", "/a\n", "//"])
 def test_other_names(name: str) -> None:
     assert not names.is_valid(name)
+
+
+def test_another_name_is_refused_as_a_namespace() -> None:
+    with pytest.raises(ConfigError, match="allowed is / or a name such as /t2_001"):
+        load(Ros2Config, Sources(environ={}, sets=["ros2.namespace=/t2/"]))
 
 
 def test_names_of_a_namespace() -> None:

@@ -141,6 +141,20 @@ def test_the_status_of_a_service() -> None:
     assert dict(made[4]) == {"version": "1.2", "uptime": "60 s", "resets": "3"}
 
 
+def test_the_newest_status_of_each_name_and_a_silent_part_is_stale() -> None:
+    diagnostics = translate.Diagnostics()
+    link = translate.status(translate.OK, "link", "Up.", {"a": 1})
+    command = translate.status(translate.OK, "cmd_vel", "Taken.", {})
+    safety = translate.status(translate.OK, "safety", "Runs.", {})
+    for each in (translate.status(translate.WARN, "link", "Before.", {}), link, command):
+        diagnostics.note(each, T_NS)
+    late_ns = T_NS + translate.STALE_NS
+    diagnostics.note(safety, late_ns)
+    assert diagnostics.statuses(late_ns) == (command, link, safety)
+    stale = (translate.STALE, "t2: link", "Silent. Last: Up.", "t2", (("a", "1"),))
+    assert diagnostics.statuses(late_ns + 1) == (command, stale, safety)
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

@@ -11,7 +11,7 @@ from common import keys
 from common.members import Member, Role
 from services.ros2 import names
 from services.ros2.config import Ros2
-from services.ros2.rihs import HASHES
+from services.ros2.definitions import HASHES
 from tools.rights_table import MINE, OTHER, ROLES, may
 
 UNTIL = datetime(2030, 1, 1, tzinfo=UTC)
