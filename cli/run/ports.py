@@ -1,12 +1,15 @@
 """Ports of ``t2 up``, checked before it starts any process.
 
-A second stack on the same ports would add a second safety service to the robot's bus.
+A second stack on the same ports would add a second safety service to the robot's bus. Each port is
+bound once and released, then claimed while ``t2 up`` runs: of two concurrent starts, one continues.
 """
 
 import errno
 import socket
+import sys
 import time
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import ExitStack
 from typing import Literal, NamedTuple
 
 from cli.settings import Everything
@@ -61,20 +64,30 @@ def routers(bus: BusSettings) -> Iterator[Port]:
         yield Port(kind, host.strip("[]"), int(number), "router", "bus.listen")
 
 
-def check_free(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> None:
-    """Raise ``LinkError`` with the first port that is still taken after ``patience_s``."""
+def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
+    """Check that all ports are free and return the claims on them, to close at the end.
+
+    Raise ``LinkError`` with the first port that is still taken after ``patience_s``.
+    """
+    claims = ExitStack()
     end_s = time.monotonic() + patience_s
-    for port in ports:
-        while reason := _taken(port):
-            if time.monotonic() > end_s:
-                raise LinkError(f"{port}: {reason}; {_advice(port)}")
-            time.sleep(LOOK_S)
+    try:
+        for port in ports:
+            while reason := _taken(port, claims):
+                if time.monotonic() > end_s:
+                    raise LinkError(f"{port}: {reason}; {_advice(port)}")
+                time.sleep(LOOK_S)
+    except BaseException:
+        claims.close()
+        raise
+    return claims
 
 
-def _taken(port: Port) -> str:
-    """Return why a port is not available, or an empty text."""
+def _taken(port: Port, claims: ExitStack) -> str:
+    """Claim a port; return why it is not available, or an empty text."""
     try:
         (_connect if port.kind == "unix" else _bind)(port)
+        _claim(port, claims)
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             return "used by another program"
@@ -100,6 +113,13 @@ def _connect(port: Port) -> None:
         except OSError:  # no socket, or a stale one of a killed router
             return
     raise OSError(errno.EADDRINUSE, "used by another program")
+
+
+def _claim(port: Port, claims: ExitStack) -> None:
+    """Claim a name in Linux's abstract namespace; it is released when the process ends."""
+    if sys.platform == "linux":
+        sock = claims.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+        sock.bind(f"\0t2-up {port.kind} {port.host} {port.number}")
 
 
 def _advice(port: Port) -> str:

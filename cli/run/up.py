@@ -9,7 +9,7 @@ import signal
 from collections.abc import Sequence
 from importlib.util import find_spec
 
-from cli.run.ports import check_free, wanted
+from cli.run.ports import claimed, wanted
 from cli.run.router import add_insecure
 from cli.run.supervisor import Supervisor
 from cli.settings import Everything
@@ -50,8 +50,8 @@ def run(options: argparse.Namespace) -> int:
         realtime.request(realtime.SUPERVISOR, alone=True)
     log.configure(config.log, "up")
     started = selected([*commands(options), *recorder(options), *ros2(options)], options.only)
-    check_free(wanted(config, [name for name, _ in started]))
-    return supervised(started, config, driving(options), simulated=not options.no_sim)
+    with claimed(wanted(config, [name for name, _ in started])):
+        return supervised(started, config, driving(options), simulated=not options.no_sim)
 
 
 def driving(options: argparse.Namespace) -> str:

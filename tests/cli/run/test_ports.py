@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from cli.run import ports
-from cli.run.ports import Port, check_free, routers, wanted
+from cli.run.ports import Port, claimed, routers, wanted
 from cli.settings import Everything
 from common import settings
 from common.bus.session import router
 from common.errors import LinkError
 from verification.harness.bus import listening
+from verification.harness.ports import free_port
 
 ALL = ("router", "sim", "bridge", "safety", "odom", "recorder")
 
@@ -71,11 +72,11 @@ def test_a_taken_port_is_named_with_advice(
     with held(kind) as number:
         port = of(number)
         with pytest.raises(LinkError) as raised:
-            check_free([port], 0.0)
+            claimed([port], 0.0)
     message = str(raised.value)
     assert f"127.0.0.1:{number} ({port.setting}): used by another program" in message
     assert "is a stack already running?" in message
-    check_free([port], 0.0)  # free again
+    claimed([port], 0.0).close()  # free again
 
 
 def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
@@ -85,10 +86,17 @@ def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
         router(listening(f"unixsock-stream/{path}")),
         pytest.raises(LinkError, match="used by another"),
     ):
-        check_free([port], 0.0)
+        claimed([port], 0.0)
     with socket.socket(socket.AF_UNIX) as stale:
         stale.bind(f"{path}.2")
-    check_free([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0)
+    with claimed([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0):
+        pass
+
+
+def test_of_two_concurrent_starts_one_continues() -> None:
+    port = udp(free_port(socket.SOCK_DGRAM))
+    with claimed([port], 0.0), pytest.raises(LinkError, match="used by another program"):
+        claimed([port], 0.0)
 
 
 def test_ports_of_a_killed_stack_are_awaited() -> None:
@@ -96,5 +104,5 @@ def test_ports_of_a_killed_stack_are_awaited() -> None:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
         threading.Timer(3 * ports.LOOK_S, leaving.close).start()
         began_s = time.monotonic()
-        check_free([udp(number)])
+        claimed([udp(number)]).close()
         assert time.monotonic() - began_s >= 2 * ports.LOOK_S

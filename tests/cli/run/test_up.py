@@ -17,7 +17,7 @@ from tests.cli.stack import STACK, ports, starts
 from verification.harness.waiting import wait_until
 
 
-def test_start_restart_and_ctrl_c(tmp_path: Path) -> None:
+def test_a_second_stack_starts_nothing_and_killed_services_start_again(tmp_path: Path) -> None:
     log = tmp_path / "log"
     words = sets(*ports(), "log.format=json", f"recorder.folder={tmp_path}")
     with running(t2("up", *words), log) as up:
