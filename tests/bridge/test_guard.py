@@ -22,7 +22,6 @@ from common.config import Sources, load
 from common.settings import Board as BoardSettings
 from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
-from services.bridge import bridge as child
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard, Heartbeat
 from services.bridge.udp import Sockets
@@ -236,16 +235,6 @@ def test_a_guard_that_does_not_read_delays_no_beat(pipe: tuple[int, int]) -> Non
         heartbeat.beat(0)
 
 
-def test_a_dead_guard_is_noticed_once(pipe: tuple[int, int]) -> None:
-    gone: list[None] = []
-    heartbeat = Heartbeat(pipe[1], lambda: gone.append(None))
-    heartbeat.beat(0)
-    os.close(pipe[0])
-    for _ in range(3):
-        heartbeat.beat(0)
-    assert gone == [None]
-
-
 # --- the program --------------------------------------------------------------------------------
 
 
@@ -253,14 +242,6 @@ def test_a_wrong_setting_ends_it_before_anything_opens(capsys: pytest.CaptureFix
     assert program.main(["--set", "bridge.stall=0.1"]) == EXIT_CONFIG
     assert "stall" in capsys.readouterr().err
     assert program.main(["--set", "bridge.stall=-1"]) == EXIT_CONFIG
-
-
-def test_the_bridge_alone_says_how_it_is_started(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.delenv("T2_BRIDGE_DESCRIPTORS", raising=False)
-    assert child.main() == 2
-    assert "python -m services.bridge" in capsys.readouterr().err
 
 
 def test_a_port_that_becomes_free_is_taken(made: Board) -> None:

@@ -70,14 +70,6 @@ def test_run_carries_the_motion_slowed_to_the_limits(
     assert b"\x00\x80" not in frame.to_bytes()
 
 
-def test_the_angular_unit_is_a_setting_both_ways(
-    by_manual: Translator, by_driver: Translator
-) -> None:
-    assert by_driver.command(Command.RUN, run(0.0, 0.3)).angular_raw == 300
-    assert by_driver.velocity(VelocityReport(0, 300)).angular == pytest.approx(0.3)
-    assert by_manual.velocity(VelocityReport(0, 300)).angular == pytest.approx(math.radians(30))
-
-
 @pytest.mark.parametrize(
     ("command", "feedback", "raw", "angular"),
     [("milliradian", "decidegree", 300, math.radians(30)), ("decidegree", "milliradian", 172, 0.3)],

@@ -10,16 +10,9 @@ from hypothesis import strategies as st
 
 from common import codec
 from common.cli_codec import decode, encode
-from common.messages import Bumper, Drive, PoseRequest
+from common.messages import Drive, PoseRequest
 
 KEY = "t2/v1/001/@cmd/drive/web"
-
-
-def test_a_message_becomes_a_line_of_json() -> None:
-    line = decode(KEY, codec.encode(Bumper(seq=4, pressed=True)))
-    header = {"seq": 4, "boot": 0, "t_ns": 0, "mono_ns": 0, "host": 0}
-    assert json.loads(line) == {**header, "pressed": True, "lost": 0}
-    assert "\n" not in line
 
 
 def test_a_delete_shows_as_null() -> None:

@@ -66,11 +66,6 @@ def test_a_stray_put_does_not_reach_the_wheels(topic: Topic[Message], stray: str
     assert not zenoh.KeyExpr(stray).intersects(zenoh.KeyExpr(whole(topic)))
 
 
-@pytest.mark.parametrize("expression", ["t2/v1/*/estop", "t2/v1/001/estop", "t2/**"])
-def test_one_put_stops_a_fleet(expression: str) -> None:
-    assert zenoh.KeyExpr(expression).intersects(zenoh.KeyExpr(keys.estop_key("001")))
-
-
 @pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.path)
 def test_what_moves_the_wheels_goes_first(topic: Topic[Message]) -> None:
     commands = topic.path.startswith("@cmd/")

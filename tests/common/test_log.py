@@ -18,7 +18,6 @@ import pytest
 
 from common import log
 from common.settings import Log
-from verification.harness.bus import Lines
 from verification.harness.waiting import wait_until
 
 
@@ -120,11 +119,6 @@ def test_text_has_the_local_time_and_the_fields() -> None:
     assert datetime.fromisoformat(stamp).tzinfo is None
     assert line == "[error  ] ended" + 26 * " " + "service=up code=1 why='no room' world=''"
     assert "'a\\x1b[2J'" in log.Formatter("up").format(record(logging.INFO, "a\x1b[2J"))
-
-
-def test_a_logger_adds_its_own_fields(lines: Lines) -> None:
-    log.Logger(robot="007").info("stopped", asked_by="hall")
-    assert lines == [("info", "stopped", {"robot": "007", "asked_by": "hall"})]
 
 
 @pytest.mark.parametrize(

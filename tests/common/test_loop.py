@@ -108,17 +108,6 @@ def test_posted_calls_are_made_before_timers_judge_their_age(loop: Loop, clock: 
     assert order == ["posted", "timer"]
 
 
-def test_an_idle_loop_sleeps_until_the_next_timer(loop: Loop, clock: Clock) -> None:
-    assert loop._until_due_s() is None
-    loop.every(2.0, lambda _: None)
-    assert loop._until_due_s() == 0
-    turn(loop)
-    clock.pass_s(0.5)
-    assert loop._until_due_s() == 1.5
-    clock.pass_s(9.0)
-    assert loop._until_due_s() == 0
-
-
 def test_a_call_that_posts_again_does_not_starve_timers(loop: Loop) -> None:
     def again() -> None:
         loop.post(again)
@@ -149,12 +138,6 @@ def test_a_stop_from_another_thread_ends_an_idle_loop(loop: Loop) -> None:
     assert not thread.is_alive()
 
 
-def test_an_error_of_a_call_ends_the_run(loop: Loop) -> None:
-    loop.post(lambda: [][0])
-    with pytest.raises(IndexError):
-        loop.run()
-
-
 # --- other threads, sockets ---------------------------------------------------------------------
 
 
@@ -182,17 +165,6 @@ def test_posts_of_many_threads_arrive_all_and_in_order_in_one_thread() -> None:
     assert len(homes) == 1
     for sender in range(3):
         assert [number for who, number in seen if who == sender] == list(range(2000))
-
-
-def test_many_posts_wake_the_loop_once(loop: Loop, monkeypatch: pytest.MonkeyPatch) -> None:
-    wakes: list[int] = []
-    monkeypatch.setattr(loop, "_wake", lambda: wakes.append(1))
-    loop.post(lambda: None)
-    assert wakes == []  # it does not sleep: it sees the call before it does
-    loop._sleeps = True
-    loop.post(lambda: None)
-    loop.post(lambda: None)
-    assert wakes == [1]
 
 
 def test_a_socket_is_read_when_there_is_something(loop: Loop) -> None:

@@ -4,7 +4,7 @@ import json
 import os
 import signal
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
@@ -56,18 +56,6 @@ def test_a_long_text_of_an_event_is_cut() -> None:
     (sent,) = (each.last for each in node.bus.publishers if isinstance(each.last, Event))
     assert codec.decode(codec.encode(sent), Event) == sent
     assert (len(sent.text), sent.about) == (MAX_TEXT, {"folder": "y" * MAX_TEXT})
-    node.loop.close()
-
-
-def test_the_schema_and_the_settings_are_encoded_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A flood of queries for them takes no time from the loop."""
-    node = Node("odom", load(Shared, Sources(environ={})))
-    made: dict[str, Callable[[], bytes]] = {}
-    monkeypatch.setattr(node.bus, "answer", lambda key, make, _: made.update({key: make}))
-    node.announce()
-    for part in ("schema", "config"):
-        make = made[keys.info_key(node.config.robot.id, "odom", part)]
-        assert make() is make()
     node.loop.close()
 
 

@@ -13,7 +13,6 @@ from common.settings import (
     Limits,
     ProtectedSection,
     Robot,
-    Section,
     Vehicle,
     Wire,
     sonar_mounts,
@@ -150,20 +149,10 @@ def test_a_board_that_cannot_be_reached_is_refused(given: dict[str, object], sen
         msgspec.convert(given, Board)
 
 
-def test_on_the_vehicle_both_sides_have_the_same_port() -> None:
-    assert Board(address="10.7.5.224", port=4002, listen_address="10.7.5.220").port == 4002
-
-
 @pytest.mark.parametrize("name", ["crc-32", "nonsense", ""])
 def test_a_crc_must_be_one_of_16_bits(name: str) -> None:
     with pytest.raises(ValueError, match="crc"):
         Wire(crc=name)
-
-
-@pytest.mark.parametrize("section", [Robot, BusSettings, Board, Wire, Vehicle])
-def test_sections_refuse_what_they_do_not_know(section: type[Section]) -> None:
-    with pytest.raises(msgspec.ValidationError, match="unknown field `colour`"):
-        msgspec.convert({"colour": "blue"}, section)
 
 
 def test_sonars_are_on_the_edge_clockwise_from_the_left_and_look_outward() -> None:

@@ -21,11 +21,6 @@ def bus() -> FakeBus:
     return FakeBus()
 
 
-def test_the_echo_is_zero_before_the_first_state_of_safety(bus: FakeBus) -> None:
-    sent = DriveSource(bus, "demo").request(0.2, -0.1)
-    assert (sent.linear, sent.angular, sent.echo, sent.seq) == (0.2, -0.1, 0, 1)
-
-
 def test_the_newest_heartbeat_is_echoed(bus: FakeBus) -> None:
     source = DriveSource(bus, "demo")
     for heartbeat in (7, 8):

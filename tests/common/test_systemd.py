@@ -34,13 +34,6 @@ def test_ready_is_said_once_and_beats_when_they_are_due(manager: Manager) -> Non
     assert manager.read() == ["READY=1", beat, beat, beat, "STOPPING=1"]
 
 
-def test_a_beat_alone_does_not_notify_ready_and_children_notify_nothing(manager: Manager) -> None:
-    environ = manager.environ | {"PATH": "/bin"}
-    Systemd(environ).beat(NS_PER_S)
-    assert manager.read() == ["WATCHDOG=1"]
-    assert environ == {"PATH": "/bin"}
-
-
 def test_an_abstract_socket_is_found_by_its_name() -> None:
     name = f"@t2-test-{os.getpid()}"
     with contextlib.closing(Manager(name)) as manager:

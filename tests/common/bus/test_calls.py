@@ -88,15 +88,6 @@ def test_a_call_is_replied_to_or_refused_with_a_reason(
     assert (client.replies, client.refusals) == (([], [refusal]) if refusal else ([DONE], []))
 
 
-def test_a_reply_may_come_later(client: Client, server: Server) -> None:
-    client.send(LATER)
-    wait_until(lambda: server.waiting, "the request")
-    assert client.answers == 0
-    server.waiting.pop().reply(ResetDone(text="at last"))
-    wait_until(lambda: client.answers, "an answer")
-    assert client.replies == [ResetDone(text="at last")]
-
-
 def test_a_flood_of_queries_is_answered_one_at_a_time(
     buses: BusFixture, client: Client, server: Server
 ) -> None:
@@ -151,21 +142,13 @@ def test_answers_of_others_are_refusals(buses: BusFixture, answer: object, reaso
     assert client.replies == []
 
 
-@pytest.mark.parametrize(
-    ("payload", "reason"),
-    [
-        (b"\xc1", "not a ResetRequest: "),
-        (msgpack.packb({"echo": "1"}), "Expected `int | null`, got `str` - at `$.echo`"),
-    ],
-    ids=["no msgpack", "wrong type"],
-)
 def test_an_undecodable_request_is_refused_with_its_fault(
-    buses: BusFixture, server: Server, client: Client, payload: bytes, reason: str
+    buses: BusFixture, server: Server, client: Client
 ) -> None:
     count = len(server.requests)
-    (reply,) = buses.session().get(keys.RESET.on(buses.robot), payload=payload)
+    (reply,) = buses.session().get(keys.RESET.on(buses.robot), payload=b"\xc1")
     assert reply.err is not None
-    assert reason in reply.err.payload.to_bytes().decode()
+    assert "not a ResetRequest: " in reply.err.payload.to_bytes().decode()
     assert len(server.requests) == count
 
 

@@ -167,13 +167,6 @@ def test_a_second_bridge_waits_and_says_why(ends: Ends, lines: Lines) -> None:
     assert not link.connected
 
 
-def test_a_link_that_never_opened_closes(buses: BusFixture) -> None:
-    bus = Bus(at(buses.endpoint), buses.robot, buses.loop.post)
-    publisher = DriveLink(bus, listens=False).publisher(keys.MOTION)
-    bus.close()
-    publisher.put(Motion(command=Command.STOP))
-
-
 class FakeLink:
     other, socket, connected = "safety", Path("/run/t2/d.sock"), False
 

@@ -3,8 +3,6 @@
 from collections import Counter
 from collections.abc import Callable
 
-import pytest
-
 from common.bus.bus import OverwritingQueue
 
 
@@ -26,20 +24,6 @@ class Owner:
         calls, self.posted[:] = self.posted[:], []
         for call in calls:
             call()
-
-
-@pytest.mark.parametrize("depth", [1, 3])
-def test_newer_items_overwrite_the_oldest_and_wake_the_owner_once(depth: int) -> None:
-    owner = Owner(depth)
-    for number in range(10):
-        owner.queue.put(number)
-    assert len(owner.posted) == 1
-    owner.turn()
-    assert owner.taken == list(range(10 - depth, 10))
-    assert owner.counters["overrun"] == 10 - depth
-    owner.queue.put(10)
-    owner.turn()
-    assert owner.taken[-1] == 10
 
 
 def test_an_item_that_comes_during_a_turn_is_of_the_next_turn() -> None:

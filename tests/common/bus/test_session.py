@@ -49,15 +49,6 @@ def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return made
 
 
-def test_a_client_never_scouts_and_notices_a_silent_partition() -> None:
-    config = client_config(at("tcp/127.0.0.1:1", lease=0.5))
-    assert json.loads(config.get_json("mode")) == "client"
-    assert json.loads(config.get_json("scouting/multicast/enabled")) is False
-    assert json.loads(config.get_json("scouting/gossip/enabled")) is False
-    assert json.loads(config.get_json("transport/link/tx/lease")) == 500
-    assert json.loads(config.get_json("transport/shared_memory/enabled")) is False
-
-
 def test_without_a_router_it_warns_once_a_period(
     monkeypatch: pytest.MonkeyPatch, lines: Lines, tries: list[float]
 ) -> None:

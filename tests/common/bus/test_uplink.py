@@ -81,17 +81,6 @@ def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(buses: BusFixtur
                 room.bus.close()
 
 
-def test_without_its_site_a_robot_is_whole(buses: BusFixture) -> None:
-    buses.endpoint = somewhere()
-    with router(listening(buses.endpoint, somewhere())):
-        room, onboard = Room(buses), Onboard(buses)
-        until_received(onboard.put, lambda: room.received, "a bumper")
-        until_received(onboard.bus.estop, lambda: onboard.stops, "a stop")
-        until_received(room.request, lambda: room.replies, "a reply")
-        for bus in (room.bus, onboard.bus):
-            bus.close()
-
-
 def test_robots_do_not_hear_each_other(buses: BusFixture) -> None:
     """So the declarations of one cost the others nothing, and none can drive another."""
     site, first, second = somewhere(), somewhere(), somewhere()

@@ -47,11 +47,6 @@ def test_golden_bytes_both_ways(name: str) -> None:
     assert read_all(framing, raw, c.TO_BOARD) == [Received(frame, raw)]
 
 
-def test_the_golden_bytes_name_their_source() -> None:
-    assert "public ROS 1 driver" in GOLDEN["source"]
-    assert len(BY_NAME) == 11
-
-
 @pytest.mark.parametrize(
     ("frame", "payload"),
     [
