@@ -75,11 +75,15 @@ def decode(options: argparse.Namespace) -> int:
 def identify_crc(options: argparse.Namespace) -> int:
     """Print the matching CRCs with their numbers of frames."""
     datagrams = capture.read(options.source)
-    findings = crc.identify(crc.frames(datagram.data for datagram in datagrams))
-    if not findings.frames:
+    frames = list(crc.frames(datagram.data for datagram in datagrams))
+    if not frames:
         raise RobotError(f"{options.source}: contains no frame: the magic 47 53 is missing")
-    print("\n".join(crc.report(findings)))
-    return 0 if findings.nonzero and findings.answers else 1
+    fits = crc.identify(frames)
+    for fit in fits:
+        print(f"{fit.crc} over {fit.covers}: matches {fit.frames} of {len(frames)}")
+    text, found = crc.verdict(fits, len(frames))
+    print(text)
+    return 0 if found else 1
 
 
 @dataclass(frozen=True, slots=True)

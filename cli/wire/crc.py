@@ -4,10 +4,9 @@ Frames are found by magic and size only. An empty payload and a payload of zeros
 every CRC that starts at zero, whatever its polynomial, so such frames are no evidence.
 """
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import crcmod.predefined
 
@@ -15,27 +14,12 @@ from common.wire.frame import CRC_OFFSET, HEADER, MAGIC, PAYLOAD_OFFSET
 from common.wire.framing import Covers, crc_function
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
+class Fit(NamedTuple):
     """A CRC and a range, with the number of matching frames."""
 
     crc: str
     covers: Covers
     frames: int
-
-
-@dataclass(frozen=True, slots=True)
-class Findings:
-    """Result for the captured frames."""
-
-    frames: int
-    nonzero: int  # frames with a payload that is not all zeros
-    fits: list[Fit]  # best first; empty without a nonzero frame
-
-    @property
-    def answers(self) -> list[Fit]:
-        """The CRCs that match every frame."""
-        return [fit for fit in self.fits if fit.frames == self.frames]
 
 
 def frames(datagrams: Iterable[bytes]) -> Iterator[bytes]:
@@ -50,48 +34,33 @@ def frames(datagrams: Iterable[bytes]) -> Iterator[bytes]:
             start = datagram.find(MAGIC, start + (size if whole else 1))
 
 
-def identify(captured: Iterable[bytes]) -> Findings:
-    """Try every CRC over every range on the frames."""
-    found = list(captured)
-    nonzero = [frame for frame in found if any(frame[PAYLOAD_OFFSET:])]
-    fits = [
-        Fit(name, covers, _count(name, covers, found))
-        for name, covers in product(names(), get_args(Covers))
-        if _count(name, covers, nonzero)
-    ]
-    fits.sort(key=lambda fit: (-fit.frames, fit.crc))
-    return Findings(len(found), len(nonzero), fits)
-
-
 def names() -> list[str]:
     """Return the 16-bit CRCs that crcmod predefines."""
     definitions = crcmod.predefined._crc_definitions  # crcmod has no public list
     return [each["name"] for each in definitions if each["poly"].bit_length() == 17]
 
 
-def report(findings: Findings) -> list[str]:
-    """Return the findings as text."""
-    zero = findings.frames - findings.nonzero
-    lines = [
-        f"{findings.frames} frames; {zero} have an empty or all-zero payload, which is no "
-        "evidence: its CRC is 0 with every CRC that starts at zero"
+def identify(found: Sequence[bytes]) -> list[Fit]:
+    """Return the CRCs that match a frame with a payload that is not all zeros, best first."""
+    nonzero = [frame for frame in found if any(frame[PAYLOAD_OFFSET:])]
+    fits = [
+        Fit(name, covers, _count(name, covers, found))
+        for name, covers in product(names(), get_args(Covers))
+        if _count(name, covers, nonzero)
     ]
-    lines += [
-        f"{fit.crc} over {fit.covers}: matches {fit.frames} of {findings.frames}"
-        for fit in findings.fits
-    ]
-    return [*lines, _verdict(findings)]
+    return sorted(fits, key=lambda fit: (-fit.frames, fit.crc))
 
 
-def _verdict(findings: Findings) -> str:
-    if not findings.nonzero:
-        return "inconclusive: capture frames with a nonzero payload, such as motion"
-    if not findings.answers:
-        return "no CRC of crcmod matches every frame"
-    if len(findings.answers) > 1:
-        return "several match every frame: capture more"
-    answer = findings.answers[0]
-    return f'set: wire.crc = "{answer.crc}", wire.crc_covers = "{answer.covers}"'
+def verdict(fits: Sequence[Fit], count: int) -> tuple[str, bool]:
+    """Return what the fits of ``count`` frames show, and whether it is one or more CRCs."""
+    answers = [fit for fit in fits if fit.frames == count]
+    if not fits:
+        return "no CRC of crcmod matches a frame with a nonzero payload, such as motion", False
+    if not answers:
+        return "no CRC of crcmod matches every frame", False
+    if len(answers) > 1:
+        return "several match every frame: capture more", True
+    return f'set: wire.crc = "{answers[0].crc}", wire.crc_covers = "{answers[0].covers}"', True
 
 
 def _count(name: str, covers: Covers, found: Iterable[bytes]) -> int:

@@ -28,28 +28,11 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert max(map(len, shown.splitlines())) <= 80
 
 
-def test_no_arguments_show_help(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main([])
-    assert end.value.code == 0
-    assert capsys.readouterr().out.startswith("usage: t2 COMMAND")
-
-
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(["--version"])
     assert end.value.code == 0
     assert capsys.readouterr().out == f"t2 {metadata('t2')['Version']}\n"
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_help_of_a_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main([command, "--help"])
-    assert end.value.code == 0
-    shown = capsys.readouterr().out
-    assert shown.startswith(f"usage: t2 {command}")
-    assert COMMANDS[command] in " ".join(shown.split())
 
 
 @pytest.mark.parametrize(

@@ -3,18 +3,29 @@
 import argparse
 
 import pytest
+from msgspec.structs import replace
 
-from cli.inspect.addressing import chunks, expression, parse_key, parse_one_key, short, topic_of
-from common import keys
+from cli.inspect.addressing import (
+    chunks,
+    decode,
+    expression,
+    parse_key,
+    parse_one_key,
+    short,
+    topic_of,
+)
+from common import codec, keys
+from common.codec import Sample
+from common.errors import MessageError
+from common.messages import Health
+from tests.cli.inspect.tool import health
 
 
 @pytest.mark.parametrize(
     ("word", "key"),
     [
         ("tel/odom/odometry", "t2/v1/7/tel/odom/odometry"),
-        ("/tel/odom/odometry", "t2/v1/7/tel/odom/odometry"),
         ("odometry", "t2/v1/7/tel/odom/odometry"),
-        ("state", "t2/v1/7/tel/safety/state"),
         ("safety/state", "t2/v1/7/tel/safety/state"),
         ("/safety/health", "t2/v1/7/tel/safety/health"),
         ("driver/left", "t2/v1/7/tel/bridge/driver/left"),
@@ -24,7 +35,6 @@ from common import keys
         ("health", "t2/v1/7/tel/*/health"),
         ("estop", "t2/v1/7/estop"),
         ("**", "t2/v1/7/**"),
-        ("@cmd/motion", "t2/v1/7/@cmd/motion"),
         ("t2/v1/2/tel/**", "t2/v1/2/tel/**"),
     ],
 )
@@ -59,3 +69,11 @@ def test_topic_of_a_key() -> None:
     assert topic_of("t2/v1/7/tel/mine/x/y") is None
     assert topic_of("t2/v1/7/tel/mine/temperature") is None
     assert topic_of("elsewhere") is None
+
+
+def test_health_of_another_service_is_refused() -> None:
+    payload = codec.encode(health("safety"))
+    theirs = Sample("t2/v1/7/tel/dashboard/health", payload, "", False, None, 0, 0)
+    with pytest.raises(MessageError, match="names another service than the key"):
+        decode(theirs, Health)
+    assert decode(replace(theirs, key="t2/v1/7/tel/safety/health"), Health).service == "safety"

@@ -88,9 +88,7 @@ def test_a_reset_without_effect_is_not_confirmed(buses: BusFixture, tool: Tool) 
     assert NOT_CONFIRMED in result.err
 
 
-@pytest.mark.parametrize(
-    "payload", [b"ok", codec.encode(m.Done(text="ok")), codec.encode(m.ResetDone(text="ok"))]
-)
+@pytest.mark.parametrize("payload", [b"ok", codec.encode(m.ResetDone(text="ok"))])
 def test_a_rogue_answer_is_not_confirmed(payload: bytes, buses: BusFixture, tool: Tool) -> None:
     Safety(buses)
     key = keys.RESET.on(buses.robot)
@@ -169,9 +167,7 @@ def test_replies_and_refusals(buses: BusFixture, tool: Tool) -> None:
         (("mine/x",), 1, "no call mine/x; `t2 call` lists the calls"),
         (("reset",), 1, "reset is ambiguous: safety/reset, odom/reset"),
         (("bridge/led", '{"chanel": 1}'), 2, "not a LedRequest"),
-        (("safety/reset", '{"causes": [99999999999999999999999]}'), 2, "not a ResetRequest"),
         (("safety/reset", "{"), 2, "is not JSON"),
-        (("safety/reset", "[1]"), 2, "is not an object"),
         (("safety/*",), 2, "matches several keys"),
     ],
 )  # fmt: skip

@@ -61,7 +61,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Site:
         made.member("robot", robot, "--address", "127.0.0.1")
     made.member("site", "berlin", "--address", "127.0.0.1")
     made.member("driver", "anna", "--robot", "001")
-    made.member("driver", "planner", "--robot", "001", "--source", "nav")
     made.member("viewer", "hall")
     made.member("fleet", "room")
     return made
@@ -153,23 +152,6 @@ def test_t2_call_reports_why_no_service_answers(site: Site, join: Callable[..., 
         assert "this certificate may not call it" in reason("viewer", "hall")
         assert "safety does not answer" in reason("driver", "anna")
         assert "safety does not answer" in reason("viewer", "hall", "009")
-
-
-def test_a_certificate_is_bound_to_its_sources_and_who_uses_another_is_told(
-    site: Site, join: Callable[..., Bus]
-) -> None:
-    with site.router(site.settings("robot", "001")) as (secured, onboard):
-        robot = on_board(join, onboard)
-        planner = member(
-            join, connecting(site.settings("driver", "planner"), secured), source="nav"
-        )
-        assert drives(planner, robot)
-        stolen = member(join, connecting(site.settings("driver", "planner"), secured))
-        anna = member(join, connecting(site.settings("driver", "anna"), secured), source="nav")
-        assert not drives(stolen, robot), "it took teleop's priority"
-        assert not drives(anna, robot)
-        assert stolen.source.denied
-        assert anna.source.denied
 
 
 def test_members_reach_their_own_robots_through_the_sites_router(

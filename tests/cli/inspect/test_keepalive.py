@@ -7,10 +7,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from cli.inspect.estop import described, kept
 from common import keys
 from common.bus.bus import Arrival, Bus
-from common.errors import RobotError
 from common.messages import EstopKeepalive, KeepaliveState, SafetyState
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
@@ -92,12 +90,3 @@ def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
     result = tool("estop", "--keepalive", "phone")
     assert result.code == 1
     assert "safety does not expect 'phone': it expects pendant" in result.err
-
-
-def test_texts() -> None:
-    known = safety_state(estop_keepalives=(KNOWN,))
-    assert kept(known, "pendant") is KNOWN
-    with pytest.raises(RobotError, match="it expects no keepalive"):
-        kept(safety_state(), "pendant")
-    assert described(known, "pendant") == "alive  RUN  Driving."
-    assert described(safety_state(), "pendant").startswith("NOT ALIVE")

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cli.__main__ import main
-from cli.wire.command import Bad, Good, as_text, parts
+from cli.wire.command import Bad, as_text, parts
 from common.cli_args import EXIT_CONFIG
 from common.settings import Wire
 from common.wire import commands as c
@@ -23,10 +23,13 @@ from verification.harness.frame_strategies import COMMANDS, REPORTS
 
 def test_decode_prints_one_line_per_frame(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "decode", (RUN + QUERY).hex()]) == 0
-    assert capsys.readouterr().out.splitlines() == [
+    shown = [
         "+0    pc    MotionCommand kind RUN, linear 500 mm/s, angular 30.0 deg/s",
         "+13   pc    DistanceQuery",
     ]
+    assert capsys.readouterr().out.splitlines() == shown
+    assert main(["wire", "decode", (RUN + QUERY).hex() + "ff"]) == 1
+    assert "+21   BAD no_magic" in capsys.readouterr().out
 
 
 def test_decode_shows_the_place_in_a_capture(
@@ -40,11 +43,6 @@ def test_decode_shows_the_place_in_a_capture(
     assert "+12   board DistanceReport distance 1234 mm, heading -90.5 deg" in second
 
 
-def test_an_invalid_run_gives_exit_code_1(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["wire", "decode", RUN.hex() + "ff"]) == 1
-    assert "+13   BAD no_magic" in capsys.readouterr().out
-
-
 def test_wire_settings_apply(capsys: pytest.CaptureFixture[str]) -> None:
     raw = Framing("modbus", "header_and_payload").pack(COMMANDS[0]).hex()
     sets = ["--set", "wire.crc=modbus", "--set", "wire.crc_covers=header_and_payload"]
@@ -54,23 +52,18 @@ def test_wire_settings_apply(capsys: pytest.CaptureFixture[str]) -> None:
     assert "wire" in capsys.readouterr().err
 
 
-def test_an_unreadable_source_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["wire", "decode", "no/such.pcap"]) == 1
-    assert "t2 wire: 'no/such.pcap' is neither hex nor a file" in capsys.readouterr().err
-
-
 def test_identify_crc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "frames.txt"
     file.write_text("\n".join(Framing().pack(frame).hex() for frame in COMMANDS), encoding="utf-8")
     assert main(["wire", "identify-crc", str(file)]) == 0
     out = capsys.readouterr().out
-    assert "8 frames; 3 have an empty or all-zero payload" in out
+    assert "crc-16 over payload: matches 8 of 8" in out
     assert 'set: wire.crc = "crc-16", wire.crc_covers = "payload"' in out
 
 
 def test_identify_crc_without_evidence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["wire", "identify-crc", QUERY.hex()]) == 1
-    assert "inconclusive" in capsys.readouterr().out
+    assert "nonzero payload, such as motion" in capsys.readouterr().out
     assert main(["wire", "identify-crc", "0102"]) == 1
     assert "the magic 47 53 is missing" in capsys.readouterr().err
 
@@ -88,7 +81,6 @@ def lines(raw: bytes, wire: Wire | None = None) -> list[str]:
 TEXTS = [
     (c.MotionCommand(c.MotionKind.RUN, 500, -300),
      "pc    MotionCommand kind RUN, linear 500 mm/s, angular -30.0 deg/s"),
-    (c.DistanceQuery(), "pc    DistanceQuery"),
     (c.DriverQuery(Side.RIGHT), "pc    DriverQuery side RIGHT"),
     (c.LedSet(9, 1, 8, 2, 3, 4, 5, 6, 7),
      "pc    LedSet channel 9, mode 1, on_lightness 8, on_time 2, off_time 3, flash_lightness 4, "
@@ -152,10 +144,3 @@ def test_every_byte_is_in_a_part(pieces: list[bytes]) -> None:
     ]
     for part in found:
         assert as_text(part, Wire())
-
-
-@pytest.mark.parametrize("frame", [*COMMANDS, *REPORTS])
-def test_every_frame_is_known(frame: Frame) -> None:
-    (part,) = parts(framing, framing.pack(frame))
-    assert isinstance(part, Good)
-    assert frame in part.frames.values()
