@@ -33,7 +33,7 @@ from verification.search.oracle import STEP_NS
 from verification.search.stack import PENDANT
 
 PATIENCE = 3  # rules
-SEEDS, EXAMPLES_PER_SEED = 8, 9
+SEEDS, EXAMPLES_PER_SEED = 8, 5
 EXAMPLES = int(os.environ.get("T2_EXAMPLES", "0"))
 
 # --- values: few, dense around thresholds ---------------------------------------------------------

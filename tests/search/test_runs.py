@@ -15,10 +15,10 @@ from services.safety.core.planning import Limit, Zones
 from sim.geometry import Pose, Rectangle
 from sim.trace import Truth
 from sim.world import World
-from verification.search.draw import Draw, draw, ranges, room, shrink
+from verification.search.draw import Draw, draw, ranges, room
 from verification.search.judge import Judge, Stop, normalised, pose_error
 from verification.search.page import page
-from verification.search.run import FAULTS, Result, fails_as, run
+from verification.search.run import FAULTS, Result, run
 from verification.search.stack import START_NS, Stack
 
 BATCHES, BATCH = 25, 8
@@ -84,14 +84,6 @@ def test_the_vehicle_starts_with_room_around_it() -> None:
     for seed in range(60):
         found = room(draw(seed), vehicle)
         assert World.of(found).clearance(body, found.start.pose) > 0.2, seed
-
-
-def test_the_shrinker_keeps_what_matters() -> None:
-    def fails(one: Draw) -> bool:
-        return "b" in one.values and ("c" in one.values or "d" in one.values)
-
-    drawn = Draw(1, {"a": 1, "b": 2, "c": 3, "d": 4})
-    assert shrink(drawn, fails) == Draw(1, {"b": 2, "d": 4})
 
 
 # --- the judge ------------------------------------------------------------------------------------
@@ -170,16 +162,6 @@ def result(seed: int, **fields: Any) -> Result:
         cpu_s=1.0, metres=3.0, contacts=0, error=None,
     )  # fmt: skip
     return replace(usual, **fields)
-
-
-def test_a_failure_is_the_same_without_its_numbers() -> None:
-    same = fails_as(result(1, violations=["a RUN is held for more than 230 ms"]))
-    assert same(result(1, violations=["a RUN is held for more than 380 ms"]))
-    assert not same(result(1, violations=["a hit without a BRAKE at once"]))
-    stopped = fails_as(result(1, stops=[Stop(1.0, "silent", "")]))
-    assert stopped(result(1, stops=[Stop(2.0, "silent", "")]))
-    assert not stopped(result(1, stops=[Stop(1.0, "bumper", "")]))
-    assert fails_as(result(1, finished=False))(result(1, finished=False))
 
 
 def test_the_page_names_what_happened() -> None:

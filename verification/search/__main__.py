@@ -10,9 +10,8 @@ from pathlib import Path
 
 import msgspec
 
-from verification.search.draw import Draw, draw, shrink
 from verification.search.page import page
-from verification.search.run import Result, fails_as, run, run_seed
+from verification.search.run import Result, run_seed
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,12 +20,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--runs", type=int, default=1000, help="the seeds 0 to N - 1; 1000")
     parser.add_argument("--out", type=Path, help="the page to write, docs/vehicles.md")
     parser.add_argument("--seed", type=int, help="run one seed and print it")
-    parser.add_argument(
-        "--shrink", action="store_true", help="with --seed: find the parameters that matter"
-    )
     options = parser.parse_args(argv)
     if options.seed is not None:
-        return show(options.seed, shrinks=options.shrink)
+        return show(options.seed)
     results = sorted(campaign(options.runs), key=lambda result: result.seed)
     if options.out:
         options.out.write_text(page(results), encoding="utf-8")
@@ -46,20 +42,11 @@ def campaign(runs: int) -> list[Result]:
     return found
 
 
-def show(seed: int, *, shrinks: bool) -> int:
-    """Print one run, and the parameters that its failure needs."""
+def show(seed: int) -> int:
+    """Print one run."""
     result = run_seed(seed)
-    print(_json(result))
-    if shrinks and (result.violations or not result.completed):
-        same = fails_as(result)
-        smallest = shrink(draw(seed), lambda smaller: same(run(smaller)))
-        print("the failure needs:", _json(smallest.values))
-        print(_json(run(Draw(seed, smallest.values))))
+    print(msgspec.json.format(msgspec.json.encode(result)).decode())
     return int(bool(result.violations))
-
-
-def _json(found: object) -> str:
-    return msgspec.json.format(msgspec.json.encode(found)).decode()
 
 
 if __name__ == "__main__":

@@ -1,12 +1,11 @@
 """Random parameters of a run: a vehicle, a room, an operator and perhaps faults.
 
 A draw is a seed and the parameters that differ from the simulator's defaults. Without a parameter
-the default applies, so that any part of a draw is a draw again: the shrinker relies on it.
+the default applies.
 """
 
 import math
 import random
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -64,10 +63,6 @@ class Draw(Struct, frozen=True):
         """Return a parameter, or the default."""
         return self.values.get(name, default)
 
-    def without(self, name: str) -> "Draw":
-        """Return the draw with the default of one parameter."""
-        return Draw(self.seed, {key: self.values[key] for key in self.values if key != name})
-
     def model(self) -> Model:
         """Return the simulated vehicle."""
         own = {name: value for name, value in self.values.items() if name.startswith(SIM)}
@@ -98,22 +93,6 @@ def draw(seed: int) -> Draw:
 def _own(seed: int, one: Range, of: str = "chance") -> random.Random:
     """Return the random numbers of one parameter."""
     return random.Random(f"{seed} {one.name} {of}")
-
-
-def shrink(draw: Draw, fails: Callable[[Draw], bool]) -> Draw:
-    """Return a draw that still fails, and with no parameter less does.
-
-    Each parameter is set to its default, one after the other, until none can be spared. A failure
-    that needs chance (the noise of another parameter) may keep a parameter that only changes it.
-    """
-    spared = True
-    while spared:
-        spared = False
-        for name in list(draw.values):
-            smaller = draw.without(name)
-            if fails(smaller):
-                draw, spared = smaller, True
-    return draw
 
 
 def room(draw: Draw, vehicle: Vehicle) -> Plan:

@@ -82,24 +82,6 @@ def run(draw: Draw) -> Result:
     )
 
 
-def fails_as(result: Result) -> Callable[[Result], bool]:
-    """Return whether another result fails for the same reason."""
-
-    def same(other: Result) -> bool:
-        if result.violations:
-            return bool(_kinds(result) & _kinds(other))
-        if result.stops:
-            return bool({stop.cause for stop in result.stops} & {s.cause for s in other.stops})
-        return not other.finished
-
-    return same
-
-
-def _kinds(result: Result) -> set[str]:
-    # Numbers differ from run to run.
-    return {"".join(c for c in text if not c.isdigit()) for text in result.violations}
-
-
 class Trial:
     """The run under way."""
 
