@@ -83,10 +83,6 @@ class Streams:
         missing = [name for name, messages in needed.items() if not messages]
         if missing:
             return f"has no {' and no '.join(missing)}: record all keys with `t2 record`"
-        if len({each.host for messages in needed.values() for each in messages}) > 1:
-            return (
-                "has messages of several hosts, or of two boots of one: their clocks do not agree"
-            )
         if self.period_s > COARSEST_S:
             return (
                 f"has a velocity each {self.period_s:.2f} s, too coarse for a stop: laptops get "

@@ -5,8 +5,6 @@ answer, so a container's health check can run it often.
 """
 
 import argparse
-from bisect import bisect_left
-from itertools import accumulate
 from typing import Any, NamedTuple
 
 import msgspec
@@ -17,7 +15,7 @@ from cli.inspect.diagnosis import LATE_S, NEEDED
 from cli.inspect.session import BusSession, add_options, open_session
 from common import keys
 from common.errors import MessageError
-from common.messages import Durations, Health
+from common.messages import Health
 
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
 LISTEN_S = 2.5  # two periods of the health messages, and a margin
@@ -144,20 +142,13 @@ def as_cells(row: Row) -> list[str]:
 def reaction_lines(rows: list[Row]) -> list[str]:
     """Return a line for each reaction that was measured since its service's start."""
     return [
-        f"{row.name} of robot {row.robot}: {name} measured {sum(each.counts)} times, in ms: "
-        f"p50 {1e3 * quantile(each, 0.5):.2f}, p99 {1e3 * quantile(each, 0.99):.2f}, "
-        f"worst {1e3 * each.worst:.2f}"
+        f"{row.name} of robot {row.robot}: {name} measured {sum(each.counts)} times, "
+        f"worst {1e3 * each.worst:.2f} ms"
         for row in rows
         if row.health
         for name, each in row.health.reactions.items()
         if any(each.counts)
     ]
-
-
-def quantile(durations: Durations, part: float) -> float:
-    """Return an upper bound of a quantile: the bound of its bucket, or the worst if less."""
-    number = bisect_left(list(accumulate(durations.counts)), part * sum(durations.counts))
-    return min([*durations.bounds[number : number + 1], durations.worst])
 
 
 def duration(seconds: float) -> str:

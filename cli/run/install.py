@@ -6,8 +6,6 @@ starts nothing, and never changes an operator's files: the settings, drop-ins of
 
 import argparse
 import os
-import re
-import subprocess
 import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -30,8 +28,6 @@ ENABLED = {  # links of `systemctl enable`
 # Every version recognises the units of other versions by this line: never change it.
 MARK = "# From `t2 install`, which replaces and removes it; `systemctl edit` makes what stays.\n"
 SIM = "t2-sim.service"
-BACKOFF = "t2-.service.d/20-backoff.conf"
-BACKOFF_SINCE = 254  # the systemd that supports it
 EXTRAS = {
     "t2-recorder.service": "mcap",
     "t2-dashboard.service": "uvicorn",
@@ -184,26 +180,12 @@ def names_here(sim: bool) -> list[str]:
         print(f"without {name}: {EXTRAS[name]} is not installed")
     if not sim:
         left_out.add(SIM)
-    if systemd_version() < BACKOFF_SINCE:
-        left_out.add(BACKOFF)
     return [name for name in names() if name not in left_out]
 
 
 def template(name: str) -> str:
     """Return a file of deploy/systemd."""
     return (TEMPLATES / name).read_text(encoding="utf-8")
-
-
-def systemd_version() -> int:
-    """Return the version of systemd, 0 without systemd."""
-    try:
-        printed = subprocess.run(
-            ["systemctl", "--version"], capture_output=True, text=True, check=False
-        ).stdout
-    except OSError:
-        return 0
-    found = re.match(r"systemd (\d+)", printed)
-    return int(found[1]) if found else 0
 
 
 def settings(sim: bool) -> str:

@@ -130,9 +130,6 @@ def test_problems_of_a_recording() -> None:
     one = streams()
     one.velocities.clear()
     assert one.problem.startswith("has no tel/bridge/velocity:")
-    two = streams()
-    two.mileages[3] = replace(two.mileages[3], host=5)
-    assert two.problem.startswith("has messages of several hosts, or of two boots")
     coarse = streams()
     coarse.velocities = coarse.velocities[::5]
     assert coarse.problem.startswith("has a velocity each 0.10 s, too coarse for a stop")

@@ -8,11 +8,9 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from cli.demo import command, host_stalls
+from cli.demo import host_stalls
 from cli.demo.score import read
-from cli.settings import Everything
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.config import Sources, load
 from tests.cli.processes import PATIENCE_S, children, ran, running, sets, t2, wait_gone
 from verification.harness.waiting import wait_until
 
@@ -96,13 +94,3 @@ def test_bad_options_are_named(
     shown = capsys.readouterr().err
     assert shown.startswith(f"t2 demo: {error.format(tmp_path)}")
     assert len(shown.splitlines()) == 1
-
-
-def test_separate_ports_override_the_files() -> None:
-    vehicle = Path("config/vehicle.toml")
-    config = load(
-        Everything, Sources(files=(vehicle,), environ={}, sets=command.own_ports())
-    ).config
-    assert config.board.address == config.board.listen_address == "127.0.0.1"
-    assert len({config.board.port, *config.board.listen_ports}) == 3
-    assert config.bus.endpoints == config.bus.listen

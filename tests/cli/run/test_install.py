@@ -70,20 +70,6 @@ def test_initial_settings_are_valid_and_existing_keys_are_used(tmp_path: Path) -
     assert config.recorder.folder == "/var/lib/t2/recordings"
 
 
-def test_the_link_to_this_environment_is_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    version = tmp_path / "1.0"
-    version.mkdir()
-    monkeypatch.setattr("sys.prefix", str(version))
-    assert install.here() == version
-    (tmp_path / "current").symlink_to("2.0")
-    assert install.here() == version
-    (tmp_path / "current").unlink()
-    (tmp_path / "current").symlink_to("1.0")
-    assert install.here() == tmp_path / "current"
-
-
 def test_a_simulated_vehicle_stays_until_uninstall(tmp_path: Path) -> None:
     t2_install(tmp_path, "--sim")
     assert f"{UNITS}/t2-sim.service" in files(tmp_path)
@@ -191,26 +177,6 @@ def test_install_needs_root(
     monkeypatch.setattr("os.geteuid", lambda: 1000)
     assert main(["install", "--prefix", PREFIX]) == 1
     assert "needs root" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("message", "version"),
-    [("systemd 252 (252.39-1)\n+PAM", 252), ("systemd 257~rc1", 257), ("busybox", 0)],
-)
-def test_the_backoff_needs_a_recent_systemd(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, message: str, version: int
-) -> None:
-    tool = tmp_path / "bin" / "systemctl"
-    tool.parent.mkdir()
-    tool.write_text(f"#!/bin/sh\necho '{message}'\n")
-    tool.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tool.parent}:/bin")
-    assert install.systemd_version() == version
-    t2_install(tmp_path)
-    assert (f"{UNITS}/t2-.service.d/20-backoff.conf" in files(tmp_path)) == (version >= 254)
-    tool.unlink()
-    monkeypatch.setenv("PATH", str(tool.parent))
-    assert install.systemd_version() == 0
 
 
 # --- the units ----------------------------------------------------------------------------------
