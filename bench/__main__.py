@@ -1,7 +1,4 @@
-"""``python -m bench``: benchmarks of T2 and its alternatives, as a document.
-
-Raw samples are stored in ``out/bench``. A benchmark that is not measured again is read from there.
-"""
+"""``python -m bench``: benchmarks of T2 and its alternatives, as a document."""
 
 import argparse
 import platform
@@ -15,16 +12,15 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
-from bench import fleet, link, load, reaction, series
+from bench import fleet, link, load, reaction
 from bench.processes import MissingError
 from bench.reaction import PACKAGE, is_granted
-from bench.series import RAW, Column, Limits, Measured, Series, columns, compared, store
+from bench.series import Column, Limits, Measured, Series, columns, compared
 from verification.harness.host import StallRecorder, description
 from verification.harness.results import table
 
 PAGE = Path(__file__).with_name("page.md")
 HEAD = ["question", "figure", "compared with", "ratio", "target", "verdict"]
-UNMEASURED = 3  # exit code when samples are missing
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,21 +64,19 @@ BENCHMARKS: Mapping[str, Benchmark] = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, store and print; return ``UNMEASURED`` without samples."""
+    """Measure, and print the document; without ``--only`` it can be written to a file."""
     parser = argparse.ArgumentParser(prog="bench", description=__doc__)
-    parser.add_argument(
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
         "--only", action="append", choices=BENCHMARKS, metavar="NAME",
         help=f"measure only this: {', '.join(BENCHMARKS)}; repeatable",
     )  # fmt: skip
-    parser.add_argument("--again", action="store_true", help="use the stored samples")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the document here")
+    where.add_argument("--out", type=Path, metavar="FILE", help="write the document here")
     options = parser.parse_args(argv)
-    for name in [] if options.again else options.only or BENCHMARKS:
-        print(f"{name}: {store(name, measured(BENCHMARKS[name]))}", file=sys.stderr, flush=True)
-    found = {name: one for name in BENCHMARKS if (one := series.load(name))}
-    if missing := [name for name in BENCHMARKS if name not in found]:
-        print(f"no samples in {RAW} of {', '.join(missing)}: measure them first", file=sys.stderr)
-        return UNMEASURED
+    found = dict.fromkeys(BENCHMARKS, Measured(where="nothing: not measured", series=[]))
+    for name in options.only or BENCHMARKS:
+        print(name, file=sys.stderr, flush=True)
+        found[name] = measured(BENCHMARKS[name])
     text = page(found)
     print(text)
     if options.out:

@@ -1,16 +1,13 @@
-"""Samples of a row with their percentiles, targets, and the raw files in ``out/bench``."""
+"""Samples of a row with their percentiles, and targets."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
-import msgspec
 from msgspec import Struct
 
 from verification.harness.results import percentile, table
 
-RAW = Path("out/bench")
 Share = Literal["p50", "p99", "max"]
 
 
@@ -103,17 +100,3 @@ def compared(question: str, limits: Limits, by_name: ByName) -> list[list[str]]:
                 f"at most × {limit:g}", "reached" if mine <= limit * other else "not reached",
             ])  # fmt: skip
     return rows
-
-
-def store(benchmark: str, measured: Measured) -> Path:
-    """Write all samples of a benchmark; return the file."""
-    RAW.mkdir(parents=True, exist_ok=True)
-    file = RAW / f"{benchmark}.json"
-    file.write_bytes(msgspec.json.encode(measured))
-    return file
-
-
-def load(benchmark: str) -> Measured | None:
-    """Return the last stored result of a benchmark, or None."""
-    file = RAW / f"{benchmark}.json"
-    return msgspec.json.decode(file.read_bytes(), type=Measured) if file.exists() else None

@@ -2,7 +2,6 @@
 
 import shutil
 from collections.abc import Mapping
-from pathlib import Path
 
 import pytest
 
@@ -11,7 +10,7 @@ from bench import load, loop, reaction
 from bench.fleet import answers_ns
 from bench.processes import MissingError
 from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, ZENOH
-from bench.series import RAW, Measured, Series, compared, store
+from bench.series import Measured, Series, compared
 from common import motion
 from common.freshness import NS_PER_S
 from sim.trace import Command
@@ -30,21 +29,12 @@ SERIES = {
 }
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder with samples of all benchmarks."""
-    monkeypatch.chdir(tmp_path)
-    for name in bench.BENCHMARKS:
-        store(name, Measured(where=f"a machine for {name}", series=SERIES.get(name, [])))
-    return tmp_path
-
-
-def test_the_document_is_printed_from_stored_samples(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert bench.main(["--again", "--out", "performance.md"]) == 0
-    text = (folder / "performance.md").read_text(encoding="utf-8")
-    assert text in capsys.readouterr().out
+def test_the_document_has_each_table_and_the_limits() -> None:
+    results = {
+        name: Measured(where=f"a machine for {name}", series=SERIES.get(name, []))
+        for name in bench.BENCHMARKS
+    }
+    text = bench.page(results)
     assert f"| {REFLEX} | 140 | 140 | × 1.40 |  |  |  |" in text
     question = bench.BENCHMARKS["stop"].question
     row = f"| {JUDGED}, quiet, p50: 700 us | {ZENOH}: 1,000 us | × 0.70 | at most × 1 | reached |"
@@ -55,16 +45,8 @@ def test_the_document_is_printed_from_stored_samples(
     assert all(f"Measured on a machine for {name}." in text for name in bench.BENCHMARKS)
 
 
-def test_a_benchmark_without_samples_is_named(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (folder / RAW / "fleet.json").unlink()
-    assert bench.main(["--again"]) == bench.UNMEASURED
-    assert capsys.readouterr().err == f"no samples in {RAW} of fleet: measure them first\n"
-
-
 def test_what_a_host_lacks_is_on_the_page(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def lacking() -> list[Series]:
         raise MissingError("no C compiler")
