@@ -13,7 +13,7 @@ import pytest
 from cli.run import supervisor as module
 from cli.run.supervisor import WATCHDOG_S, Child, Supervisor
 from common.child_process import BACKOFF_S
-from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.cli_args import EXIT_CONFIG
 from tests.cli.processes import alive, running, wait_gone
 from verification.harness.waiting import wait_until
 
@@ -65,10 +65,8 @@ def test_restarts_follow_the_backoff(supervised: list[Supervisor]) -> None:
         now_s += wait_s
 
 
-@pytest.mark.parametrize("code", [EXIT_CONFIG, EXIT_LINK])
-def test_a_hopeless_process_stops_all_with_its_code(
-    supervised: list[Supervisor], code: int
-) -> None:
+def test_a_hopeless_process_stops_all_with_its_code(supervised: list[Supervisor]) -> None:
+    code = EXIT_CONFIG
     supervisor = Supervisor([("calm", SLEEP), ("hopeless", ["sh", "-c", f"exit {code}"])])
     supervised.append(supervisor)
     assert supervisor.run() == code
