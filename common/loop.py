@@ -90,11 +90,8 @@ class Loop:
             # Calls of other threads first: timers check the age of data.
             for _ in range(len(self._posted)):
                 self._posted.popleft()()
-            now_ns = clock.now_ns()
             for timer in self._timers:
-                if timer.due_ns <= now_ns:
-                    timer.call(now_ns)
-                    now_ns = clock.now_ns()
+                timer.call(clock.now_ns())
         self._stopped = False
 
     def close(self) -> None:

@@ -44,11 +44,6 @@ class Publisher(Generic[M]):
         self._waiting: deque[tuple[M, bytes | None]] = deque(maxlen=topic.service.history)
 
     @property
-    def next_seq(self) -> int:
-        """The ``seq`` that the next message will carry."""
-        return self._seq + 1
-
-    @property
     def passed_on(self) -> bool | None:
         """Whether a subscriber matches; None without a session."""
         if not self._declared:

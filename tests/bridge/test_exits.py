@@ -14,27 +14,13 @@ from tests.bridge.bridge_fixture import BridgeFixture
 from verification.harness.fake_board import board
 
 
-def end(bridge: BridgeFixture, *signals: signal.Signals) -> int:
-    """Send the signals and wait for the end of the bridge."""
-    for number in signals:
-        bridge.process.send_signal(number)
-    return bridge.process.wait(20)
-
-
-def test_a_bridge_whose_parent_and_log_are_gone_stops_the_vehicle(bridge: BridgeFixture) -> None:
-    bridge.drive()
-    assert bridge.process.stderr is not None
-    bridge.process.stderr.close()
-    assert end(bridge, signal.SIGTERM) == 0
-    bridge.board.wait_for(MotionKind.STOP)
-
-
 def test_a_second_signal_brakes_before_the_bridge_ends(bridge: BridgeFixture) -> None:
     bridge.drive()
     bridge.board.speed_mmps = 500  # it would wait for the vehicle to stand
     bridge.process.send_signal(signal.SIGINT)
     bridge.board.wait_for(MotionKind.STOP)
-    assert end(bridge, signal.SIGTERM) == 128 + signal.SIGTERM
+    bridge.process.send_signal(signal.SIGTERM)
+    assert bridge.process.wait(20) == 128 + signal.SIGTERM
     bridge.board.wait_for(MotionKind.BREAK)
 
 

@@ -186,17 +186,6 @@ def test_a_bug_of_ours_ends_it_though_its_session_is_open(shared_router: str) ->
 # --- without one, and with one that comes and goes ----------------------------------------------
 
 
-def test_a_second_signal_ends_it_at_once() -> None:
-    where = f"tcp/127.0.0.1:{free_port()}"
-    with program(SPECIMEN, "restless", *on(where, "001")) as it:
-        it.wait_for("waiting for a router")
-        it.process.send_signal(signal.SIGINT)
-        it.wait_for("stopping")
-        it.process.send_signal(signal.SIGTERM)
-        assert it.code() == 128 + signal.SIGTERM
-        assert "stopped" not in it.events()
-
-
 def test_on_a_terminal_it_writes_text_and_it_ends_though_it_finds_no_rest() -> None:
     where = f"tcp/127.0.0.1:{free_port()}"
     with program(SPECIMEN, "restless", *on(where, "001"), tty=True) as it:

@@ -72,7 +72,7 @@ class Odometry:
     def published(self) -> tuple[int, m.Odometry | None]:
         """The number of messages, and the last one."""
         publisher = next(p for p in self.node.bus.publishers if p.topic is keys.ODOMETRY)
-        return publisher.next_seq - 1, publisher.last
+        return publisher._seq, publisher.last
 
     def set_pose(self, **request: Any) -> str:
         """Set the pose; return what was replied, or the refusal."""

@@ -37,13 +37,13 @@ class FakeNode(Node[TeleopConfig]):
     def requests(self) -> tuple[int, Drive | None]:
         """The number of drive requests sent, and the last one."""
         publisher = next(p for p in self.bus.publishers if p.topic is keys.DRIVE)
-        return publisher.next_seq - 1, publisher.last
+        return publisher._seq, publisher.last
 
     @property
     def events(self) -> int:
         """The number of events published."""
         publisher = next(p for p in self.bus.publishers if p.topic is keys.EVENTS)
-        return publisher.next_seq - 1
+        return publisher._seq
 
 
 def view(**fields: Any) -> View:
