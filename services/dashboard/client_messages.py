@@ -8,7 +8,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from common.messages import Direction, LedRequest, SwitchesRequest
+from common.messages import Direction, SwitchesRequest
 from services.dashboard.config import GEARS
 
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
@@ -78,10 +78,4 @@ class Switch(ClientMessage, frozen=True):
     to: SwitchesRequest
 
 
-class Lamp(ClientMessage, frozen=True):
-    """Set one lamp channel."""
-
-    to: LedRequest
-
-
-AnyMessage = Name | Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch | Lamp
+AnyMessage = Name | Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch

@@ -32,7 +32,6 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
     # The URL of an MJPEG stream; ``{robot}`` in the path is the robot's id. Empty: none.
     camera: Url = ""
-    recordings: str = "recordings"  # the recorder's folder on this host; empty: none
     gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
     gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
 

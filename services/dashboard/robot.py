@@ -26,7 +26,6 @@ from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
-from services.dashboard.sectors import Protection
 from services.dashboard.snapshot import DriverState
 from services.dashboard.telemetry_cache import TelemetryCache, path_of
 
@@ -39,7 +38,6 @@ FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.ODOMETRY, keys.SAFETY, keys.MOTION,
 )  # fmt: skip
 WILDCARD_DEPTH = 16  # of a key with many publishers
-PROTECTION = {name: f"safety.{name}" for name in Protection.__struct_fields__}
 
 
 class Robot:
@@ -48,7 +46,6 @@ class Robot:
     def __init__(self, bus: Bus, settings: Dashboard, broadcast: Notify) -> None:
         self.bus = bus
         self.telemetry = TelemetryCache()
-        self.protection = Protection()
         self.driver_lock = DriverLock()
         self._settings = settings
         self._broadcast = broadcast  # to all viewers of this robot
@@ -63,7 +60,6 @@ class Robot:
             self._keepalives = KeepalivePublisher(bus, settings.estop_keepalive)
         self._requests_path = path_of(keys.DRIVE.on(bus.robot, source=settings.source))
         self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
-        self._is_queried = False
         self._log = Logger(robot=bus.robot)
         for topic in FIXED_TOPICS:
             bus.subscribe(topic, self._on_message)
@@ -79,8 +75,6 @@ class Robot:
     def tick(self, now_ns: int) -> None:
         """Send the requests of this tick and repeat what is not confirmed."""
         safety = self.telemetry.newest(keys.SAFETY, now_ns)
-        if safety and not self._is_queried:
-            self._query_protection()
         self._repeat_estop(safety)
         self._yield(safety)
         push = self.driver_lock.held(now_ns)
@@ -216,15 +210,3 @@ class Robot:
 
     def _on_event(self, arrival: Arrival[m.Event]) -> None:
         self.telemetry.add_event(arrival.key.rpartition("/")[2], arrival.message)
-
-    def _query_protection(self) -> None:
-        self._is_queried = True
-        self.bus.look_up("safety", "config", self._on_config, self._query_later)
-
-    def _query_later(self, _: str) -> None:
-        self._is_queried = False
-
-    def _on_config(self, answer: bytes) -> None:
-        given = msgspec.json.decode(answer)
-        values = {name: given[path]["value"] for name, path in PROTECTION.items() if path in given}
-        self.protection = msgspec.convert(values, Protection)

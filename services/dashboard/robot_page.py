@@ -79,7 +79,7 @@ class RobotPage:
                 self._take(viewer, force)
             case _ if self.robot.driver_lock.driver == viewer:
                 self._drive(viewer, message)
-            case client.Gear() | client.Reset() | client.Switch() | client.Lamp():
+            case client.Gear() | client.Reset() | client.Switch():
                 self._notify(viewer, "warning", "take_first")
 
     def tick(self, now_ns: int, robots: Mapping[str, bool]) -> None:
@@ -94,7 +94,6 @@ class RobotPage:
             robot.driver_state(),
             now_ns,
             connected=robot.bus.connected,
-            protection=robot.protection,
             keeper=robot.keepalive.holder,
         )
         self._send(self.viewers, fast, replaces=True)
@@ -132,8 +131,6 @@ class RobotPage:
                 robot.reset(echo, notify)
             case client.Switch(to):
                 robot.call(keys.SET_SWITCHES, to, notify)
-            case client.Lamp(to):
-                robot.call(keys.SET_LED, to, notify)
 
     def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
         self._send_text([viewer], notice(level, text, about), False)

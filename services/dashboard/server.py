@@ -19,7 +19,6 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from common.errors import LinkError
-from services.dashboard import recordings
 from services.dashboard.auth import AuthMiddleware
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import Dashboard
@@ -109,7 +108,6 @@ def _application(
             Route("/", index),
             Mount("/t2", StaticFiles(directory=STATIC)),
             Route("/estop/{robot}", stop, methods=["POST"]),
-            *(recordings.routes(Path(settings.recordings)) if settings.recordings else ()),
             WebSocketRoute("/live", live),
         ]
     )
@@ -125,7 +123,7 @@ def page(settings: Dashboard) -> str:
     template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
     return template.substitute(
         robot=ROBOT_ID, texts=_script(table()), phrases=_script(phrases()),
-        camera=html.escape(settings.camera), recordings="yes" if settings.recordings else "",
+        camera=html.escape(settings.camera),
     )  # fmt: skip
 
 

@@ -5,16 +5,30 @@ Two snapshots are sent to the browsers as JSON, each encoded once for all viewer
 there is no fresh message, or no finite number. Distances are metres, angles radians, times seconds.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
 from msgspec import Struct
 
 from common import keys
 from common.codec import finite
-from common.messages import Driver, Health, SafetyState, Switches
+from common.messages import (
+    SONAR_NAMES,
+    Cause,
+    Driver,
+    Health,
+    RangeStatus,
+    SafetyState,
+    Switches,
+    Ultrasonic,
+)
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.sectors import Protection, Tone, tones
 from services.dashboard.telemetry_cache import TelemetryCache
+
+Tone = Literal["dark", "clear", "slow", "stop", "fault"]  # of a sonar sector
+WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")
+OF_STATUS: dict[RangeStatus, Tone] = {"no_echo": "clear", "too_near": "stop", "fault": "fault"}
+OF_CAUSE: dict[str, Tone] = {"obstacle": "slow", "blocked": "stop", "sonar": "fault"}
 
 
 class DriverState(Struct, frozen=True):
@@ -64,7 +78,6 @@ def fast_snapshot(
     now_ns: int,
     *,
     connected: bool,
-    protection: Protection,
     keeper: str | None = None,
 ) -> FastSnapshot:
     """Return the fast snapshot at this time."""
@@ -88,7 +101,7 @@ def fast_snapshot(
         pose=_numbers(odometry.x, odometry.y, odometry.heading) if odometry else None,
         epoch=odometry.epoch if odometry else 0,
         ranges=tuple(map(_number, sonar.ranges)) if sonar else (None,) * 8,
-        tones=tones(sonar, state.causes if state else (), protection),
+        tones=tones(sonar, state.causes if state else ()),
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
         safety=state,
@@ -115,6 +128,31 @@ def slow_snapshot(
         right=telemetry.newest(keys.DRIVER, now_ns, side="right"),
         switches=telemetry.newest(keys.SWITCHES, now_ns),
     )
+
+
+def tones(ultrasonic: Ultrasonic | None, causes: Sequence[Cause]) -> tuple[Tone, ...]:
+    """Return the tone of each sector, by the sonar's status and the causes that name the sonar."""
+    if ultrasonic is None:
+        return tuple("dark" for _ in SONAR_NAMES)
+    own: list[Tone] = [
+        OF_STATUS.get(status) or ("dark" if _number(reading) is None else "clear")
+        for status, reading in zip(ultrasonic.status, ultrasonic.ranges, strict=True)
+    ]
+    for cause in causes:
+        for index in sonars_named(cause.text) if cause.name in OF_CAUSE else ():
+            own[index] = max(own[index], OF_CAUSE[cause.name], key=WORST.index)
+    return tuple(own)
+
+
+def sonars_named(text: str) -> list[int]:
+    """Return the sonars named in a text of safety; "front left" does not name "front"."""
+    found = []
+    for name in sorted(SONAR_NAMES, key=len, reverse=True):
+        words = name.replace("_", " ")
+        if words in text:
+            text = text.replace(words, "")
+            found.append(SONAR_NAMES.index(name))
+    return found
 
 
 def _numbers(*values: float) -> tuple[float, ...] | None:

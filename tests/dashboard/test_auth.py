@@ -12,6 +12,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
+from services.dashboard.auth import content_policy
 from services.dashboard.server import reachable
 from tests.dashboard.bus_fixture import Peer
 from verification.harness.dashboard import Server, dashboard
@@ -98,3 +99,9 @@ def test_a_new_token_is_logged(endpoint: str, tmp_path: Path) -> None:
         assert "0.0.0.0" not in where
         with browser().open(f"{server.url}?{urlsplit(where).query}") as answer:
             assert b'id="texts"' in answer.read()
+
+
+def test_only_the_origin_of_the_camera_may_be_shown() -> None:
+    policy = content_policy("http://10.0.0.5:8081/{robot}/stream")
+    assert "img-src 'self' http://10.0.0.5:8081; " in policy
+    assert "img-src 'self' ; " in content_policy("")

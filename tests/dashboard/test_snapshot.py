@@ -10,6 +10,7 @@ import pytest
 from common import keys
 from common.freshness import NS_PER_S
 from common.messages import (
+    SONAR_NAMES,
     Bumper,
     Cause,
     Drive,
@@ -19,6 +20,7 @@ from common.messages import (
     Link,
     Motion,
     Odometry,
+    RangeStatus,
     Release,
     SafetyState,
     Switches,
@@ -28,7 +30,6 @@ from common.messages import (
 from common.motion import Command
 from services.dashboard import snapshot
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.sectors import Protection
 from services.dashboard.telemetry_cache import TelemetryCache
 
 AT = 100 * NS_PER_S
@@ -77,13 +78,7 @@ NOBODY = snapshot.DriverState(None, HoldState.FREE, 1, None, overruled=False, ma
 
 
 def fast(telemetry: TelemetryCache, at: int = AT) -> snapshot.FastSnapshot:
-    return snapshot.fast_snapshot(
-        telemetry,
-        NOBODY,
-        at,
-        connected=True,
-        protection=Protection(),
-    )
+    return snapshot.fast_snapshot(telemetry, NOBODY, at, connected=True)
 
 
 def test_the_fast_snapshot() -> None:
@@ -91,7 +86,7 @@ def test_the_fast_snapshot() -> None:
     assert (seen.connected, seen.link, seen.bumper) == (True, "up", True)
     assert (seen.measured, seen.allowed) == ((0.5, 0.1), (0.0, 0.0))
     assert (seen.pose, seen.epoch) == ((1.0, 2.0, 0.3), 3)
-    assert seen.tones == ("slow",) * 8
+    assert seen.tones == ("clear",) * 8
     assert seen.safety is not None
     assert (seen.safety.verdict, seen.safety.latched) == ("brake", ("contact",))
     assert seen.safety.release == RELEASE
@@ -147,3 +142,22 @@ def test_the_fast_snapshot_is_small() -> None:
     assert read["safety"]["causes"][0]["name"] == "contact"
     assert read["safety"]["heartbeat"] == 1  # the answer echoes it
     assert len(coded) < 1500  # 20 of them a second to each viewer
+
+
+@pytest.mark.parametrize(
+    ("status", "cause", "text", "tone"),
+    [
+        ("ok", "obstacle", "Slowed by an obstacle at 4.00 m (front).", "slow"),
+        ("ok", "blocked", "No room toward the front: 4.00 m.", "stop"),
+        ("ok", "sonar", "Sonar not trusted: front left, front.", "fault"),
+        ("ok", "blocked", "No room toward the front left: 4.00 m.", "clear"),
+        ("ok", "contact", "The front was hit.", "clear"),
+        ("no_echo", "contact", "", "clear"),
+        ("too_near", "obstacle", "(front)", "stop"),
+        ("fault", "contact", "", "fault"),
+    ],
+)
+def test_the_tone_of_a_sector(status: RangeStatus, cause: str, text: str, tone: str) -> None:
+    sonar = Ultrasonic(ranges=(4.0,) * 8, status=(status,) * 8)
+    causes = [Cause(name=cause, action="slow", age=1.0, text=text)]
+    assert snapshot.tones(sonar, causes)[SONAR_NAMES.index("front")] == tone

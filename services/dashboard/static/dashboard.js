@@ -1,11 +1,11 @@
 // The page: WebSocket, messages from the server, commands, and language.
+import * as camera from "./camera.js";
 import * as charts from "./charts.js";
 import * as driving from "./driving.js";
 import * as estop from "./estop.js";
 import * as notices from "./notices.js";
 import * as phrases from "./phrases.js";
 import * as panels from "./panels.js";
-import * as slots from "./slots.js";
 import * as sonarView from "./sonar_view.js";
 import * as stateBar from "./state_bar.js";
 import * as theme from "./theme.js";
@@ -100,7 +100,7 @@ const HANDLERS = {
     events = [...events, ...message.lines].sort((a, b) => a.t - b.t).slice(-EVENTS_MAX);
     panels.showEvents(events, t, language);
   },
-  path: trail.begin,
+  path: trail.prepend,
   notice: (message) => toast(message.text, message.level, message.about),
   taken: () => confirm("take_over", `${stateBar.driverName(view())} ${t("take_over_from")}`,
     () => send({ k: "take", force: true })),
@@ -169,14 +169,6 @@ function reset() {
   else send({ k: "reset", echo: echoOf(drawn) });
 }
 
-function lamp() {
-  const value = (name) => Number($(`lamp-${name}`).value);
-  send({ k: "lamp", to: {
-    channel: value("channel"), mode: value("mode"), on_lightness: value("lightness"),
-    on_time: value("on_time"), off_time: value("off_time"), speed: value("speed_unit"),
-  } });
-}
-
 function toggle(name) {
   const on = slow?.switches?.[name] === true;
   const apply = () => send({ k: "switch", to: { [name]: !on, echo: echoOf(drawn) } });
@@ -189,7 +181,6 @@ function begin() {
   phrases.begin(JSON.parse($("phrases").textContent));
   const on = (id, call) => { $(id).onclick = call; };
   on("estop", stop);
-  on("lamp", lamp);
   on("take", () => send({ k: "take", force: false }));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
@@ -205,8 +196,8 @@ function begin() {
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
   estop.begin({ send, lost, toast, robot, mayDrive: () => fast?.driver.may !== false });
-  slots.begin({ t, robot });
-  trail.listen();
+  camera.begin({ t, robot });
+  trail.begin();
   showTexts();
   connect();
   draw();

@@ -8,15 +8,13 @@ let points = [];
 let vehicle = { length: 1.1, width: 0.7 };
 let scale = 40;
 let center = [0, 0];
-let follow = true;
 let epoch = null;
 let pose = null;
-const fingers = new Map();
 
 export const size = (given) => { vehicle = given; };
 
 // Points [x, y, heading] that odometry has stored, before those that this page has seen.
-export function begin(stored) {
+export function prepend(stored) {
   const same = epoch === null || epoch === stored.epoch;
   points = [...stored.points.map(([x, y]) => [x, y]), ...(same ? points : [])];
   epoch = stored.epoch;
@@ -34,7 +32,7 @@ export function add(snapshot) {
 
 export function draw(given) {
   pose = given;
-  if (follow && pose) center = [pose[0], pose[1]];
+  if (pose) center = [pose[0], pose[1]];
   const canvas = document.getElementById("trail");
   const [pen, width, height] = fitted(canvas);
   const css = getComputedStyle(document.documentElement);
@@ -98,48 +96,9 @@ function body(pen, [x, y], heading, color) {
   pen.restore();
 }
 
-// --- zoom, follow, clear ------------------------------------------------------------------------
-
 const zoom = (factor) => { scale = Math.max(FAR, Math.min(NEAR, scale * factor)); draw(pose); };
 
-function setFollow(on) {
-  follow = on;
-  document.getElementById("follow").classList.toggle("lit", on);
-}
-
-export function listen() {
-  const canvas = document.getElementById("trail");
-  const on = (id, call) => { document.getElementById(id).onclick = call; };
-  on("zoom-in", () => zoom(1.4));
-  on("zoom-out", () => zoom(1 / 1.4));
-  on("follow", () => { setFollow(!follow); draw(pose); });
-  on("clear", () => { points = []; draw(pose); });
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15);
-  }, { passive: false });
-  canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
-    fingers.set(event.pointerId, [event.clientX, event.clientY]);
-  });
-  canvas.addEventListener("pointermove", move);
-  for (const end of ["pointerup", "pointercancel"]) {
-    canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
-  }
-}
-
-function move(event) {
-  if (!fingers.has(event.pointerId)) return;
-  const spread = () => {
-    const [one, other] = [...fingers.values()];
-    return other ? Math.hypot(one[0] - other[0], one[1] - other[1]) : 0;
-  };
-  const [before, [x, y]] = [spread(), fingers.get(event.pointerId)];
-  fingers.set(event.pointerId, [event.clientX, event.clientY]);
-  if (before) zoom(spread() / before);
-  else {
-    setFollow(false);
-    center = [center[0] - (event.clientX - x) / scale, center[1] + (event.clientY - y) / scale];
-    draw(pose);
-  }
+export function begin() {
+  document.getElementById("zoom-in").onclick = () => zoom(1.4);
+  document.getElementById("zoom-out").onclick = () => zoom(1 / 1.4);
 }
