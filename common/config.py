@@ -164,9 +164,9 @@ def _toml(text: str) -> Any:
 
 
 def _leaves(path: str, value: Any, origin: str) -> Given:
-    """Return every setting in a value; an empty file has none."""
+    """Return every setting in a value; an empty table sets nothing."""
     try:
-        return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if at or leaf}
+        return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if leaf != {}}
     except RecursionError:
         raise ConfigError(f"{origin}: tables are nested too deep") from None
 
@@ -181,9 +181,7 @@ def _nest(settings: Given) -> dict[str, Any]:
             if not isinstance(inner, dict):
                 raise ConfigError(f"{setting.origin}: {path}: {name} is a value, not a table")
             branch = inner
-        # An empty table sets nothing, so it replaces nothing.
-        if setting.value != {} or not isinstance(branch.get(leaf), dict):
-            branch[leaf] = setting.value or copy(setting.value)  # an empty table gets rows
+        branch[leaf] = copy(setting.value)  # an empty default may get rows
     return tree
 
 
@@ -240,7 +238,7 @@ def _suggestion(word: str, known: Iterable[str]) -> str:
 def _origin(path: str, given: Given) -> str:
     """Return the origins of a setting, or of all settings of a table."""
     inside = [s for at, s in given.items() if f"{at}.".startswith(f"{path}." if path else "")]
-    named = [s for s in inside if s.value != {} and s.origin != DEFAULT] or inside
+    named = [s for s in inside if s.origin != DEFAULT] or inside
     return ", ".join(dict.fromkeys(setting.origin for setting in named))
 
 
