@@ -15,7 +15,7 @@ from msgspec import Struct
 from common import codec, keys
 from common import messages as m
 from services.metrics.samples import FAMILIES
-from services.safety.core.causes import RULES, SEVERITY, Clears
+from services.safety.core.causes import RULES, Clears
 from tools import rights_table, sdk, settings_file
 from tools.fields import fields_of
 from verification.harness.results import filled, table
@@ -126,7 +126,7 @@ def causes() -> str:
     rows = [
         (f"`{rule.name}`", rule.action.upper(), "yes" if rule.clears is Clears.RESET else "no",
          CLEARED[rule.clears], rule.text)
-        for rule in sorted(RULES, key=lambda rule: -SEVERITY[rule.action])
+        for rule in RULES
     ]  # fmt: skip
     return table(("cause", "action", "latched", "clears", "in words"), rows)
 

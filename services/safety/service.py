@@ -138,7 +138,7 @@ class SafetyService:
         # Most samples repeat that the bumper is free, and change no verdict. But a decision counts
         # the samples since the last one: too many would look like lost ones.
         due = bumper.seq - self._state.verdict.acked[1] >= LOST_SAMPLES
-        if due or bumper.pressed or before is None or differs(bumper, before.value):
+        if due or bumper.pressed or before is None or _content(bumper) != _content(before.value):
             self._decide()
 
     def _on_reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
@@ -199,13 +199,8 @@ class SafetyService:
         return measured is None or measured.value.is_standing
 
 
-def differs(bumper: Bumper, before: Bumper) -> bool:
-    """Return whether a bumper sample is news to the verdict."""
-    return (bumper.pressed, bumper.lost, bumper.boot) != (
-        before.pressed,
-        before.lost,
-        before.boot,
-    )
+def _content(bumper: Bumper) -> tuple[bool, int, int]:
+    return bumper.pressed, bumper.lost, bumper.boot
 
 
 def source_of(key: str) -> str:

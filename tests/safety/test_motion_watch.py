@@ -11,10 +11,10 @@ from common.motion import STILL, Twist
 from common.standstill import GRACE_NS
 from services.safety.config import Safety
 from services.safety.core.motion_watch import (
-    Axis,
     Bounds,
     MotionWatch,
     Phase,
+    Runaway,
     Standstill,
     Supervisor,
 )
@@ -25,7 +25,7 @@ BOUNDS = Bounds(deceleration=0.6, tolerance=0.3, against=0.1, patience_s=0.3)
 SETTINGS = Safety()  # slows down at 0.6 m/s^2 and 1.0 rad/s^2
 
 
-def follow(axis: Axis, commanded: float, measured: float, seconds: float) -> Axis:
+def follow(axis: Runaway, commanded: float, measured: float, seconds: float) -> Runaway:
     for _ in range(round(seconds / TICK_S)):
         axis = axis.follow(commanded, measured, TICK_S, BOUNDS)
     return axis
@@ -41,12 +41,12 @@ def follow(axis: Axis, commanded: float, measured: float, seconds: float) -> Axi
     ],
 )  # fmt: skip
 def test_runaway_bounds(commanded: float, measured: float, bad: bool) -> None:
-    assert (follow(Axis(), commanded, measured, 0.28).bad_s > 0.27) == bad
+    assert (follow(Runaway(), commanded, measured, 0.28).bad_s > 0.27) == bad
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_slowing_down_as_guaranteed_is_no_runaway(sign: int) -> None:
-    axis = follow(Axis(), sign, sign, 1.0)
+    axis = follow(Runaway(), sign, sign, 1.0)
     for step in range(100):
         late_s = max(0.0, step * TICK_S - 0.25)
         axis = axis.follow(0.0, sign * max(0.0, 1.0 - 0.6 * late_s), TICK_S, BOUNDS)
@@ -54,10 +54,10 @@ def test_slowing_down_as_guaranteed_is_no_runaway(sign: int) -> None:
 
 
 def test_bad_time_is_forgiven_half_as_fast_and_is_capped() -> None:
-    axis = follow(Axis(), 0.0, 1.0, 9.0)
+    axis = follow(Runaway(), 0.0, 1.0, 9.0)
     assert axis.bad_s == BOUNDS.patience_s
     assert follow(axis, 0.0, 0.0, 0.2).bad_s == pytest.approx(0.2)
-    axis = Axis()
+    axis = Runaway()
     for _ in range(20):  # flapping
         axis = follow(follow(axis, 0.0, 1.0, 0.04), 0.0, 0.0, 0.04)
     assert axis.bad_s > 0.27
@@ -99,7 +99,7 @@ class Board:
 
     def run(self, seconds: float, linear: float | None = 0.0, angular: float = 0.0) -> bool:
         """Report the same for a while; return whether the place was left meanwhile."""
-        steps = [self.step(linear, angular).left for _ in range(round(seconds / TICK_S))]
+        steps = [self.step(linear, angular).has_left for _ in range(round(seconds / TICK_S))]
         return any(steps)
 
     def late(self) -> bool:
@@ -226,7 +226,7 @@ def test_velocities_alone_detect_an_uncommanded_motion(linear: float, angular: f
 def test_a_vehicle_that_left_has_to_stop_anew_and_is_held_until_it_drives() -> None:
     board = standing()
     assert board.run(0.2, 0.5)
-    assert not board.state.left
+    assert not board.state.has_left
     assert board.state.due_ns is not None
     board.run(0.5 / 0.6 + 0.5, 0.5)
     assert board.late()

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
-from services.safety.core.planning import Limit, Zones
+from services.safety.core.planning import SonarLimit, Zones
 from sim.geometry import Pose, Rectangle
 from sim.trace import Truth
 from sim.world import World
@@ -56,7 +56,7 @@ def test_a_run_is_the_same_each_time() -> None:
 
 
 def test_a_safety_that_ignores_walls_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Zones, "limit", lambda *_: Limit(1.0))
+    monkeypatch.setattr(Zones, "limit", lambda *_: SonarLimit(1.0))
     assert any(run(draw(seed)).violations for seed in SOUND)
 
 

@@ -36,8 +36,6 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.messages import Action
 
-SEVERITY: dict[Action, int] = {"slow": 1, "stop": 2, "brake": 3}
-
 
 class Clears(Enum):
     """Rule by which a cause clears."""
@@ -104,12 +102,7 @@ RULES = (
 )  # fmt: skip
 
 BY_NAME = {rule.name: rule for rule in RULES}
-_ORDER = {rule.name: (-SEVERITY[rule.action], row) for row, rule in enumerate(RULES)}
-
-
-def severity(name: str) -> tuple[int, int]:
-    """Return a sort key: worst first, ties in table order."""
-    return _ORDER[name]
+_ROW = {rule.name: row for row, rule in enumerate(RULES)}  # the worst first
 
 
 def clears(name: str) -> Clears:
@@ -132,7 +125,6 @@ Token = tuple[int, int]  # boot and seq of a sample; (0, time) without a sample
 GOOD_SAMPLES = 3  # samples without the cause before a reset may clear it
 FAILURES = 5.0  # failures in short succession that exhaust the budget
 REFILL_PER_S = 0.1  # ten good seconds refill one failure
-_ROW = {rule.name: row for row, rule in enumerate(RULES)}
 
 
 class Observation(Struct, frozen=True):
@@ -197,7 +189,7 @@ def latched(held: Latches) -> tuple[str, ...]:
 
 def ordered(names: Iterable[str]) -> tuple[str, ...]:
     """Return the names, worst first."""
-    return tuple(sorted(names, key=severity))
+    return tuple(sorted(names, key=_ROW.__getitem__))
 
 
 def still_present(held: Latches) -> tuple[str, ...]:

@@ -179,7 +179,7 @@ def _motion(motion: MotionWatch, now_ns: int) -> Iterator[Observation]:
     if twist is not None:
         text = f"The vehicle does not stop: {twist.linear:.2f} m/s, {twist.angular:.2f} rad/s."
     yield Observation("runaway", motion.runs_away)
-    yield Observation("uncommanded_motion", standstill.left)
+    yield Observation("uncommanded_motion", standstill.has_left)
     yield Observation("not_stopping", standstill.is_late(now_ns), text=text)
 
 

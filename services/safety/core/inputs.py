@@ -1,5 +1,7 @@
 """Inputs of a decision: the newest sample of each stream, and at most one event."""
 
+from typing import Generic, TypeVar
+
 from msgspec import Struct
 
 from common import codec
@@ -13,35 +15,34 @@ from common.messages import (
     Link,
     Mileage,
     SafetyState,
+    SourceMessage,
     Switches,
     Ultrasonic,
     Velocity,
 )
 from common.motion import Twist
 
+M = TypeVar("M", bound=SourceMessage)
 
-class DriveRequest(Struct, frozen=True):
-    """A drive request of a source; ``drive`` is None for an invalid payload."""
+
+class Request(Struct, Generic[M], frozen=True):
+    """A message of a source; ``message`` is None for an invalid payload."""
 
     source: str
-    drive: Drive | None
+    message: M | None
     received_ns: int = 0
 
 
-class LimitRequest(Struct, frozen=True):
-    """A speed limit of a source; ``limit`` is None for an invalid payload."""
-
-    source: str
-    limit: Limit | None
-    received_ns: int = 0
+class DriveRequest(Request[Drive], frozen=True):
+    """A drive request."""
 
 
-class KeepaliveRequest(Struct, frozen=True):
-    """A sign of life of an emergency stop; ``message`` is None for an invalid payload."""
+class LimitRequest(Request[Limit], frozen=True):
+    """A speed limit."""
 
-    source: str
-    message: EstopKeepalive | None
-    received_ns: int = 0
+
+class KeepaliveRequest(Request[EstopKeepalive], frozen=True):
+    """A sign of life of an emergency stop."""
 
 
 class Estop(Struct, frozen=True):

@@ -58,14 +58,14 @@ class Bounds(Struct, frozen=True):
     patience_s: float  # bad time that trips
 
 
-class Axis(Struct, frozen=True):
+class Runaway(Struct, frozen=True):
     """Runaway on one axis: envelopes as magnitudes, and the accumulated bad time."""
 
     ahead: float = 0.0
     back: float = 0.0
     bad_s: float = 0.0
 
-    def follow(self, commanded: float, measured: float, dt_s: float, bounds: Bounds) -> "Axis":
+    def follow(self, commanded: float, measured: float, dt_s: float, bounds: Bounds) -> "Runaway":
         """Return the axis ``dt_s`` seconds later."""
         fall = bounds.deceleration * dt_s
         ahead = max(commanded, self.ahead - fall, 0.0)
@@ -78,7 +78,7 @@ class Axis(Struct, frozen=True):
         )
         bad_s = self.bad_s + (dt_s if bad else -dt_s * GOOD_PER_BAD)
         # Capped at the limit, so that the cause clears as soon as the vehicle obeys again.
-        return Axis(ahead, back, min(max(0.0, bad_s), bounds.patience_s))
+        return Runaway(ahead, back, min(max(0.0, bad_s), bounds.patience_s))
 
 
 class Phase(Enum):
@@ -97,7 +97,7 @@ class Standstill(Struct, frozen=True):
     began_ns: int = 0  # start of the newest commanded motion
     still_ns: int | None = None  # start of the measured standstill
     displacement: Displacement = Displacement()
-    left: bool = False  # whether the vehicle has just left the place of its standstill
+    has_left: bool = False  # whether the vehicle has just left the place of its standstill
     rolls: bool = False  # STOP did not hold it since the last motion: BRAKE does
 
     def is_late(self, now_ns: int) -> bool:
@@ -130,8 +130,8 @@ class Standstill(Struct, frozen=True):
 class MotionWatch(Struct, frozen=True):
     """The measured motion beside the commanded one."""
 
-    linear: Axis = Axis()
-    angular: Axis = Axis()
+    linear: Runaway = Runaway()
+    angular: Runaway = Runaway()
     standstill: Standstill = Standstill()
     runs_away: bool = False  # whether it did not move as commanded for too long
 
@@ -182,7 +182,7 @@ class Supervisor:
         now_ns: int,
     ) -> Standstill:
         displacement = before.displacement.with_velocity(velocity).with_mileage(mileage)
-        after = replace(before, displacement=displacement, left=False)
+        after = replace(before, displacement=displacement, has_left=False)
         if not commanded:
             return after.moving(now_ns)
         if before.phase is Phase.MOVING:
@@ -193,8 +193,8 @@ class Supervisor:
         if before.phase is Phase.STANDING:
             if not displacement.has_left:
                 return after
-            left = replace(after, left=True, rolls=True)
-            return left.begin(Phase.STOPPING, self._due_ns(velocity, now_ns))
+            gone = replace(after, has_left=True, rolls=True)
+            return gone.begin(Phase.STOPPING, self._due_ns(velocity, now_ns))
         if velocity is not None and before.displacement.velocity is None:  # it was unknown
             due_ns = self._due_ns(velocity, now_ns)
             after = replace(after, due_ns=min(due_ns, after.due_ns or due_ns))

@@ -9,7 +9,6 @@ and the release that frees it needs the reset. Causes that the reset does not na
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Direction
 from services.safety.config import Safety
 from services.safety.core.causes import (
     BARRING,
@@ -32,24 +31,16 @@ BUMPER_FREE = "The bumper is free. Next: reset."
 LET_GO = "A release begins with a new hold: let go first."
 
 
-def handle(
-    state: State, inputs: Inputs, settings: Safety, now_ns: int
-) -> tuple[State, Reply | None]:
-    """Carry out the reset in the inputs, if there is one."""
-    if isinstance(inputs.event, Reset):
-        return _reset(state, inputs, inputs.event, settings, now_ns)
-    return state, None
-
-
 def room(state: State, settings: Safety) -> float:
     """Return the remaining travel of a release in metres, less the stopping distance."""
     stopping = stopping_distance(settings.release_speed, settings.reaction, settings.deceleration)
     return state.release.remaining(settings.release_distance - stopping)
 
 
-def _reset(
-    state: State, inputs: Inputs, call: Reset, settings: Safety, now_ns: int
+def carry_out(
+    call: Reset, state: State, inputs: Inputs, settings: Safety, now_ns: int
 ) -> tuple[State, Reply]:
+    """Carry out a reset, or return the reason of its refusal."""
     reason = (
         state.heartbeat.refusal(call.echo, now_ns, CALL_AGE_NS)
         or _not_named(state, call)
@@ -137,23 +128,18 @@ def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Rel
     asked = state.arbiter.channels[source].release if source else "none"
     if source is None or asked == "none":
         return replace(release, direction=None, refusal="")
-    reason = (
-        _not_operated(source, settings)
-        or _no_release(state, inputs, settings)
-        or _direction_refusal(release, asked)
-        or _not_let_go(release, source, state.arbiter.channels[source])
-    )
+    if source not in settings.operators:
+        reason = f"{source} may not release: only a source that an operator holds may."
+    elif reason := _no_release(state, inputs, settings):
+        pass
+    elif asked in release.forbidden:
+        reason = f"Release {asked} is forbidden until a reset: the bumper was pressed that way."
+    else:
+        reason = _not_let_go(release, source, state.arbiter.channels[source])
     if reason:
         return replace(release, direction=None, refusal=reason, barred_ns=now_ns)
     moves = "" if release.direction else _not_standing(inputs, settings, now_ns)
     return replace(release, source=source, direction=None if moves else asked, refusal=moves)
-
-
-def _not_operated(source: str, settings: Safety) -> str:
-    """Return why this source may not release; empty when an operator holds it."""
-    if source in settings.operators:
-        return ""
-    return f"{source} may not release: only a source that an operator holds may."
 
 
 def _not_let_go(release: Release, source: str, channel: DriveChannel) -> str:
@@ -186,13 +172,6 @@ def spent(state: State, settings: Safety) -> str:
     if len(state.release.forbidden) == 2:
         return "The bumper was pressed in both directions."
     return "The distance for moving off is used up." if room(state, settings) <= 0 else ""
-
-
-def _direction_refusal(release: Release, direction: Direction) -> str:
-    """Return why a release in this direction is forbidden; empty when it is not."""
-    if direction in release.forbidden:
-        return f"Release {direction} is forbidden until a reset: the bumper was pressed that way."
-    return ""
 
 
 def _is_pressed(inputs: Inputs) -> bool:

@@ -27,7 +27,7 @@ MEASURED_EXCESS_MPS = 0.2  # tolerance over the allowed speed, for lag and noise
 MEASURED_CREEP_MPS = 0.05  # inside the margin
 
 
-class Limit(Struct, frozen=True):
+class SonarLimit(Struct, frozen=True):
     """Tightest limit on a twist, and the sonar that sets it (None without a limit)."""
 
     factor: float  # 0..1, to scale the twist by
@@ -52,16 +52,16 @@ class Zones(Struct, frozen=True):
         """Return the distance (m) at which this speed is allowed."""
         return self.margin + stopping_distance(speed, self.react, self.deceleration)
 
-    def limit(self, twist: Twist, distances: Sequence[float]) -> Limit:
+    def limit(self, twist: Twist, distances: Sequence[float]) -> SonarLimit:
         """Return the limit on a twist; a factor of 0 means blocked."""
-        tightest = Limit(1.0)
+        tightest = SonarLimit(1.0)
         for sonar, axis in enumerate(self.axes):
             speed = axis.approach(twist)
             if speed <= GRAZING_MPS:
                 continue
             factor = self.allowed(distances[sonar]) / speed
             if factor < tightest.factor:
-                tightest = Limit(factor, sonar)
+                tightest = SonarLimit(factor, sonar)
         return tightest
 
     def too_fast(self, measured: Twist, distances: Sequence[float]) -> int | None:
@@ -153,7 +153,7 @@ class Planner:
         current = sent.twist if sent.command is RUN else ramp_start(measured, target)
         ramped = ramp(current, target, self._up, self._down, step_s)
         # On the ramp the curve differs from the requested one.
-        here = Limit(1.0) if ramped == target else self.zones.limit(ramped, distances)
+        here = SonarLimit(1.0) if ramped == target else self.zones.limit(ramped, distances)
         for tightest in (limit, here):
             if tightest.factor == 0:
                 return Plan(blocked_by=tightest.sonar)

@@ -39,9 +39,9 @@ from services.safety.core.causes import (
     wants_neutral,
 )
 from services.safety.core.conditions import observe_inputs
-from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, LimitRequest
+from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, LimitRequest, Reset
 from services.safety.core.motion_watch import Supervisor
-from services.safety.core.operator_requests import answered, handle
+from services.safety.core.operator_requests import answered, carry_out
 from services.safety.core.planning import Plan, Planner, observations
 from services.safety.core.sonars import SonarFilter
 from services.safety.core.sources import Admission, Arbiter, Keepalives, SpeedLimits
@@ -82,7 +82,9 @@ class Policy:
         state, refused = self._accept(state, inputs, now_ns)
         state = self._sense(state, inputs, step_s, now_ns)
         state = self._observe(state, inputs, now_ns)
-        state, reply = handle(state, inputs, self.settings, now_ns)
+        reply = None
+        if isinstance(inputs.event, Reset):
+            state, reply = carry_out(inputs.event, state, inputs, self.settings, now_ns)
         state = self._arm(state, now_ns)
         state = replace(state, release=answered(state, inputs, self.settings, now_ns))
         state, verdict = self._conclude(state, inputs, step_s, now_ns)
@@ -98,19 +100,17 @@ class Policy:
 
     def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
         event, settings = inputs.event, self.settings
-        max_age_ns = round(settings.times.max_echo_age * NS_PER_S)
+        is_kept = isinstance(event, KeepaliveRequest)
+        age_s = settings.estop_keepalive_timeout if is_kept else settings.times.max_echo_age
+        admission = Admission(state.heartbeat, round(age_s * NS_PER_S), now_ns)
         match event:
             case DriveRequest():
-                admission = Admission(state.heartbeat, max_age_ns, now_ns)
                 arbiter, refused = state.arbiter.accept(event, admission)
                 return replace(state, arbiter=arbiter), refused
             case LimitRequest():
-                admission = Admission(state.heartbeat, max_age_ns, now_ns)
                 limits, refused = state.speed_limits.accept(event, admission)
                 return replace(state, speed_limits=limits), refused and f"limit_{refused}"
             case KeepaliveRequest():
-                max_age_ns = round(settings.estop_keepalive_timeout * NS_PER_S)
-                admission = Admission(state.heartbeat, max_age_ns, now_ns)
                 keepalives, refused = state.keepalives.accept(event, admission)
                 return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
             case _:

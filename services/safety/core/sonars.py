@@ -81,7 +81,7 @@ class Axis(Struct, frozen=True):
 
     def approach(self, twist: Twist) -> float:
         """Return the speed (m/s) of approach to what the sonar sees."""
-        along = twist.linear * self.linear + twist.angular * self.angular
+        along = self.along(twist)
         return max(along, abs(twist.angular) * self.swing) if self.swing else along
 
 

@@ -150,7 +150,7 @@ class Arbiter(Struct, frozen=True):
 
     def accept(self, request: DriveRequest, admission: Admission) -> tuple["Arbiter", str]:
         """Check a request; return the reason of its refusal, empty when accepted."""
-        name, drive = request.source, request.drive
+        name, drive = request.source, request.message
         values = (drive.linear, drive.angular) if drive else ()
         refused = admission.refusal(name, self.sources, drive, *values)
         if refused or drive is None:
@@ -254,7 +254,7 @@ class SpeedLimits(Struct, frozen=True):
 
     def accept(self, request: LimitRequest, admission: Admission) -> tuple["SpeedLimits", str]:
         """Check a limit; return the reason of its refusal, empty when accepted."""
-        name, limit = request.source, request.limit
+        name, limit = request.source, request.message
         caps = (limit.linear, limit.angular) if limit else ()
         refused = admission.refusal(
             name, self.sources, limit, *(cap for cap in caps if cap is not None)
