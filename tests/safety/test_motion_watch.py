@@ -197,19 +197,6 @@ def test_a_motion_of_half_a_second_renews_the_limit(ticks: int, renewed: bool) -
     assert (after_ns == due_ns + ticks * TICK_NS) != renewed
 
 
-def test_a_motion_between_begins_the_confirmation_anew() -> None:
-    board = stopping(0.4)
-    board.run(0.1, 0.4)
-    board.run(0.1, 0.0)
-    board.run(0.1, -0.1)  # the rebound of a contact
-    stood_ns = [board.state.still_ns]
-    board.run(0.18)
-    assert [*stood_ns, board.state.phase] == [None, Phase.STOPPING]
-    board.run(0.1)
-    assert board.state.phase is Phase.STANDING
-    assert board.state.displacement.integrated == STILL
-
-
 @pytest.mark.parametrize(
     ("linear", "angular"), [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.0, -0.1), (1.0, 0.0)]
 )
@@ -221,17 +208,3 @@ def test_velocities_alone_detect_an_uncommanded_motion(linear: float, angular: f
         assert took_s < 1.0
     away = max(abs(linear), abs(angular)) * took_s
     assert away < 0.05 + 0.02 * max(1.0, abs(linear) * 2)
-
-
-def test_a_vehicle_that_left_has_to_stop_anew_and_is_held_until_it_drives() -> None:
-    board = standing()
-    assert board.run(0.2, 0.5)
-    assert not board.state.has_left
-    assert board.state.due_ns is not None
-    board.run(0.5 / 0.6 + 0.5, 0.5)
-    assert board.late()
-    board.run(0.3)
-    assert board.state.phase is Phase.STANDING
-    assert not board.run(5.0)
-    assert board.state.rolls
-    assert not board.step(0.3, moves=True).rolls

@@ -417,18 +417,6 @@ def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
     assert fixture.drive(0.5).command == "run"
 
 
-def test_a_motion_that_the_bridge_braked_alone_has_its_own_text() -> None:
-    fixture = successor(latched_by=OLD)
-    fixture.tick(10)
-    bridge = fixture.inputs.link
-    assert bridge is not None
-    fixture.link = with_fields(fixture.link, latched_by=bridge.value.boot)
-    fixture.tick(10)
-    assert fixture.state.latches["predecessor"].text == (
-        "The vehicle moved without a command while safety was absent."
-    )
-
-
 @pytest.mark.parametrize("first", ["bumper", "link"])
 def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str) -> None:
     fixture = successor(latched_by=OLD)

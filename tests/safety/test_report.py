@@ -5,7 +5,7 @@ from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
 from common.codec import decode, encode
-from common.messages import MAX_REASON, MAX_TEXT, Direction, Limits, SafetyState
+from common.messages import MAX_REASON, MAX_TEXT, Limits, SafetyState
 from services.safety.config import LimitSource, Safety, Source
 from services.safety.core.inputs import Estop, Event, Reset
 from services.safety.core.operator_requests import BUMPER_FREE
@@ -14,7 +14,7 @@ from services.safety.report import (
     signature,
     transitions,
 )
-from tests.safety.policy_fixture import PolicyFixture, hit
+from tests.safety.policy_fixture import PolicyFixture
 
 
 def noted(fixture: PolicyFixture, event: Event | None = None) -> list[str]:
@@ -34,22 +34,6 @@ def ticked(fixture: PolicyFixture) -> list[str]:
     before = fixture.state
     fixture.tick()
     return [note.name for note in transitions(before, fixture.state, None)]
-
-
-def test_the_state_tells_verdict_causes_and_limits() -> None:
-    fixture = PolicyFixture().running()
-    fixture.sonar(front=1.0)
-    fixture.linear = 0.0
-    fixture.drive(1.0)
-    fixture.now_ns += 500_000_000
-    state = fixture.published()
-    assert (state.verdict, state.source, state.latched) == ("slow", "teleop", ())
-    assert [cause.name for cause in state.causes] == ["obstacle"]
-    assert state.causes[0].id == fixture.state.latches["obstacle"].id > 0
-    assert state.causes[0].age >= 0.5
-    assert state.limits.forward == pytest.approx(fixture.policy.planner.zones.allowed(1.0))
-    assert (state.limits.backward, state.limits.angular) == (1.0, 1.0)
-    assert state.heartbeat == fixture.state.heartbeat.number
 
 
 def test_nothing_is_allowed_while_a_cause_is_latched() -> None:
@@ -84,24 +68,6 @@ def test_one_sentence_says_why() -> None:
     fixture.pressed = False
     fixture.tick(5)
     assert sentence(fixture.state) == "The bumper was hit. Reset to go on."
-
-
-def test_a_pressed_bumper_names_the_step_that_is_accepted() -> None:
-    fixture = hit()
-    forbid: frozenset[Direction] = frozenset({"backward", "forward"})
-    fixture.estop()
-    fixture.tick(50)
-    reset_first = "It is still pressed: reset first, then move off."
-    assert fixture.published().text == f"The bumper was hit. {reset_first}"
-    assert fixture.hold("backward") == "Emergency stop. Reset first."
-    fixture.let_go()
-    assert fixture.reset() == ""
-    fixture.tick()
-    assert fixture.published().text.endswith("It is still pressed: move off first, then reset.")
-    fixture.state = replace(fixture.state, release=replace(fixture.state.release, forbidden=forbid))
-    by_hand = "Push the vehicle off by hand, then reset."
-    assert fixture.published().text == f"The bumper was hit. {by_hand}"
-    assert fixture.hold("backward").endswith(by_hand)
 
 
 def test_a_release_reports_its_beginning_its_first_refusal_and_its_success() -> None:
@@ -182,24 +148,6 @@ def test_changes_are_published_at_once_and_distances_are_not_a_change() -> None:
     assert signature(replace(fixture.state, latches=held)) != before
     release = replace(fixture.state.release, forbidden=frozenset({"forward"}))
     assert signature(replace(fixture.state, release=release)) != before
-
-
-def test_the_release_is_reported_while_a_contact_is_latched() -> None:
-    assert PolicyFixture().ready().published().release is None
-    fixture = hit()
-    first = fixture.published().release
-    assert first is not None
-    assert (first.believed_free, first.forbidden) == ("backward", ())
-    fixture.tick(50)
-    later = fixture.published().release
-    assert later is not None
-    assert first.age is not None
-    assert later.age == pytest.approx(first.age + 1.0)
-    forbid: frozenset[Direction] = frozenset({"backward", "forward"})
-    fixture.state = replace(fixture.state, release=replace(fixture.state.release, forbidden=forbid))
-    release = fixture.published().release
-    assert release is not None
-    assert (release.believed_free, release.forbidden) == (None, ("backward", "forward"))
 
 
 def test_zeros_after_an_emergency_stop_are_no_control() -> None:

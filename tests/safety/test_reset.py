@@ -134,17 +134,6 @@ def test_a_reset_clears_what_it_names_and_says_what_stays() -> None:
     assert fixture.drive().command == "run"
 
 
-def test_an_unnamed_cause_that_is_there_stops_no_reset_of_another() -> None:
-    fixture = stopped()
-    (estop,) = fixture.latched()
-    fixture.pressed = True
-    fixture.tick(3)
-    assert fixture.reset(estop) == ""
-    assert "The bumper was hit. Hold release" in answer(fixture).text
-    assert answer(fixture).cleared == (estop,)
-    assert latched(fixture.state.latches) == ("contact",)
-
-
 def test_an_unnamed_contact_excuses_nothing_that_is_named() -> None:
     fixture = stopped()
     fixture.left_bits = 1

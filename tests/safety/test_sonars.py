@@ -83,12 +83,11 @@ def test_what_cannot_be_trusted_is_no_distance(
     assert feed(recovering, 1.0) == Sonar(distance=1.0, fault="", same=1.0)
 
 
-@pytest.mark.parametrize("fault", ["silent", "faulty", "too near to measure"])
-@pytest.mark.parametrize("reading", [0.0, 0.01, 0.04, 0.28])
-def test_a_fault_ends_with_near_readings_too(fault: str, reading: float) -> None:
+@pytest.mark.parametrize("reading", [0.0, 0.04])
+def test_a_fault_ends_with_near_readings_too(reading: float) -> None:
     # Within the hysteresis of distance zero: the obstacle must not stay unseen.
-    sonar = Sonar(fault=fault)
-    for expected in (fault, fault, ""):
+    sonar = Sonar(fault="faulty")
+    for expected in ("faulty", "faulty", ""):
         sonar = read(sonar, reading, "ok", STILL)
         assert sonar.fault == expected
     assert sonar.distance == reading
@@ -266,18 +265,8 @@ def test_what_each_mount_predicts(twist: Twist, readings: dict[str, float], faul
     assert doubts(drive(31, twist, **readings)) == faults
 
 
-def test_the_sensors_greatest_reading_is_no_disagreement() -> None:
-    near = {"left": 0.7, "right": 0.9, "rear": 1.2, "rear_left": 1.0, "rear_right": 1.1}
-    fronts = {"front_left": 4.5, "front": 4.5, "front_right": 4.5}
-    array = drive(60, AHEAD, **near, **fronts)
-    assert array.saturation.reading == 4.5
-    assert "front" not in doubts(array)
-    assert drive(60, AHEAD, **fronts).saturation.reading is None  # others see farther
-
-
-@pytest.mark.parametrize("twist", [Twist(0.019), Twist(-0.019, 0.049), Twist(0.0, 0.049)])
-def test_a_parked_vehicle_makes_no_sonar_suspect(twist: Twist) -> None:
-    assert doubts(drive(20 * 120, twist, front=1.0, left=0.8)) == ""
+def test_a_parked_vehicle_makes_no_sonar_suspect() -> None:
+    assert doubts(drive(20 * 60, Twist(-0.019, 0.049), front=1.0, left=0.8)) == ""
 
 
 def test_an_unknown_speed_is_no_motion() -> None:
@@ -355,14 +344,3 @@ def test_it_is_known_until_the_sonar_is_back() -> None:
     assert known.updated({2}, set(), 60 * NS_PER_S).acknowledged_by("web") == {2}
     again = known.updated(set(), set(), 3 * NS_PER_S).updated({2}, {"web"}, 4 * NS_PER_S)
     assert again.acknowledged_by("web") == frozenset()
-
-
-def test_another_fault_has_to_be_known_as_well() -> None:
-    known = (
-        SonarOverrides()
-        .updated({2}, set(), 0)
-        .updated({2}, {"web"}, 2 * NS_PER_S)
-        .updated(ALL, {"web"}, 3 * NS_PER_S)
-    )
-    assert known.acknowledged_by("web") == {2}
-    assert known.updated(ALL, {"web"}, 4 * NS_PER_S).acknowledged_by("web") == ALL

@@ -247,30 +247,6 @@ def test_the_source_in_control_overrules_lower_ones_only() -> None:
     assert again["demo"].overruled_by == "web"  # it asks for motion
 
 
-@given(
-    st.lists(
-        st.tuples(st.sampled_from([*SOURCES, "nobody"]), st.integers(0, 400), st.floats(-1, 1)),
-        max_size=30,
-    )
-)
-def test_the_best_fresh_source_drives(asked: list[tuple[str, int, float]]) -> None:
-    arbiter, last, now_ns, beat = DRIVES, {}, 0, Heartbeat()
-    for seq, (source, pause_ms, linear) in enumerate(asked, start=1):
-        now_ns += pause_ms * MS
-        beat = beat.beat(now_ns)
-        drive = Drive(linear=linear, angular=0.0, echo=beat.number, seq=seq, boot=3)
-        sent = DriveRequest(source, drive, now_ns)
-        arbiter, refused = arbiter.accept(sent, Admission(beat, AGE_NS, now_ns))
-        assert refused == ("" if source in SOURCES else "unknown_source")
-        if not refused:
-            last[source] = (now_ns, linear)
-        fresh = [n for n, (at, _) in last.items() if now_ns - at <= SOURCES[n].lease * NS_PER_S]
-        best = max(fresh, key=lambda n: SOURCES[n].priority, default=None)
-        assert arbiter.in_control(now_ns) == best
-        if best:
-            assert arbiter.channels[best].requested == Twist(last[best][1], 0.0)
-
-
 def test_a_release_requests_no_other_motion() -> None:
     arbiter, _ = request(DRIVES, linear=0.5, release="forward")
     assert arbiter.channels["teleop"].requested == STILL
@@ -283,20 +259,6 @@ def test_a_release_requests_no_other_motion() -> None:
 def test_a_reason_shows_no_control_characters() -> None:
     assert printable("person\tat\x1b[2J 2 m\u202e\n") == "person at [2J 2 m"
     assert limit(LIMITS, 0.2, reason="a\x07b.")[0].channels["lidar"].reason == "a b."
-
-
-def test_a_second_limiting_publisher_is_reported_for_the_lease() -> None:
-    other, refused = limit(limit(LIMITS, 0.2)[0], 0.9, LEASE_NS, boot=2)
-    assert (refused, other.channels["lidar"].linear) == ("second_publisher", 0.2)
-    assert other.conflicts(LEASE_NS + CONFLICT_NS - 1) == ["limit lidar"]
-    assert other.conflicts(LEASE_NS + CONFLICT_NS) == []
-    taken, refused = limit(limit(LIMITS, 0.2)[0], 0.9, LEASE_NS + 1, boot=2)
-    assert (refused, taken.channels["lidar"].linear) == ("", 0.9)
-    assert taken.conflicts(LEASE_NS + 1) == []
-    slow = SpeedLimits({"lidar": LimitSource(lease=1.0, silence="ignore")})
-    slow, _ = limit(limit(slow)[0], boot=2)
-    assert next(slow.observations(NS_PER_S - 1)).text == "Stopped by lidar: two publishers."
-    assert slow.conflicts(NS_PER_S) == []
 
 
 @pytest.mark.parametrize(
@@ -320,18 +282,6 @@ def test_zero_is_a_protective_stop(
     assert not next(limits.observations(LEASE_NS + 1)).present
     both, _ = limit(limit(LIMITS, 0.0, reason="dog")[0], 0.0, source="fleet")
     assert next(both.observations(0)).text == "Stopped by lidar: dog, fleet."
-
-
-def test_silence_stops_from_the_start_and_after_each_lease() -> None:
-    _, silent = LIMITS.observations(0)
-    assert (silent.name, silent.present) == ("limit_silent", True)
-    assert silent.text == "No speed limit arrives of lidar."
-    limits, _ = limit(LIMITS)
-    for now_ns, present in ((LEASE_NS, False), (LEASE_NS + 1, True)):
-        assert [one.present for one in limits.observations(now_ns)] == [False, present]
-    _, silent = SpeedLimits(dict.fromkeys(("lidar", "fleet"), LIMITERS["lidar"])).observations(0)
-    assert silent.text == "No speed limit arrives of lidar, fleet."
-    assert list(SpeedLimits({}).observations(0)) == []
 
 
 def test_states_of_limits() -> None:

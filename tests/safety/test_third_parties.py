@@ -1,13 +1,8 @@
 """Speed limits and kept emergency stops of third parties through the whole decision."""
 
-import math
-
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from common.freshness import NS_PER_S
-from common.motion import ROUNDED_MPS, STILL
+from common.motion import STILL
 from services.safety.config import LimitSource, Safety
 from services.safety.core.operator_requests import LET_GO
 from tests.safety.policy_fixture import PolicyFixture
@@ -20,8 +15,6 @@ SOURCES = {
 IGNORED = Safety(limits={"lidar": LimitSource(lease=LEASE_S, silence="ignore")})
 NEEDED = Safety(limits=SOURCES)
 KEPT = Safety(estop_keepalive=("pendant",))
-CAPS = st.none() | st.floats(0, 3)
-SPEEDS = st.floats(-2, 2)
 
 
 def test_a_cap_that_falls_is_reached_at_the_normal_deceleration() -> None:
@@ -108,41 +101,6 @@ def test_a_limit_holds_for_a_release_too() -> None:
         assert fixture.hold() == LET_GO
     fixture.let_go()
     assert fixture.hold() == ""
-
-
-EVENTS = st.lists(
-    st.tuples(st.sampled_from(["limit", "drive", "wait"]), CAPS, SPEEDS, st.integers(1, 30)),
-    max_size=40,
-)
-
-
-@settings(max_examples=30)
-@given(EVENTS)
-def test_no_run_is_faster_than_a_valid_cap_after_its_deceleration(
-    events: list[tuple[str, float | None, float, int]],
-) -> None:
-    fixture = PolicyFixture(NEEDED)
-    fixture.tick(40)
-    cap, since_ns, heard_ns, speed = math.inf, 0, -NS_PER_S, 0.0
-    for kind, value, linear, ticks in events:
-        for _ in range(ticks):
-            fixture.tick()
-            if kind == "limit":
-                fixture.limit(value)
-                heard_ns = fixture.now_ns
-                new = math.inf if value is None else value
-                if new < cap:
-                    since_ns = fixture.now_ns
-                cap = new
-            verdict = fixture.request(linear) if kind == "drive" else fixture.verdict
-            alive = fixture.now_ns - heard_ns <= LEASE_NS
-            if verdict.command == "run":
-                assert alive
-                assert cap > ROUNDED_MPS
-                slowing_s = (fixture.now_ns - since_ns) / NS_PER_S
-                assert abs(verdict.twist.linear) <= max(cap, 1.0 - 0.6 * slowing_s) + 1e-9
-            speed = abs(verdict.twist.linear)
-    assert speed <= 1.0
 
 
 # --- emergency stops that must be kept alive ------------------------------------------------
