@@ -12,14 +12,12 @@ from ziaplot.style import DashTypes, MarkerTypes
 from cli.recordings.timeline import Series, Timeline, VelocitySeries, downsampled
 
 WIDTH = 1100  # pixels
-REQUESTED, ALLOWED, MEASURED, LIMIT = "#6b7683", "#b35900", "#0b62c4", "#c5ccd3"
+REQUESTED, ALLOWED, MEASURED = "#6b7683", "#b35900", "#0b62c4"
 STOPPED, TEXT = "#cf1f26", "#0a0e13"
 VERDICTS = {
     "run": "#1a7f37", "slow": "#f0b429", "stop": "#8a939c", "brake": "#cf1f26",
     "inhibited": "#7a3fd0",
 }  # fmt: skip
-FRONT = ("front_left", "front", "front_right")
-SONARS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd")
 DASHES: tuple[DashTypes, ...] = ("-", "--", ":", "-.")
 PATH_ASPECT = 2.0  # width by height
 BEYOND = 1000.0  # outside each axis; figures are clipped
@@ -94,17 +92,6 @@ def speeds(timeline: Timeline) -> str:
     return svg(zp.LayoutV(*rows, row_gap=4, row_heights="4fr 4fr 1fr"), 620, "speeds")
 
 
-def ranges(timeline: Timeline) -> str:
-    """Draw the eight sonar ranges over time, with the stops."""
-    front, rest = _over_time(timeline, "range, m"), _over_time(timeline, "range, m", "time, s")
-    for graph, names in ((front, FRONT), (rest, [n for n in timeline.ranges if n not in FRONT])):
-        for name, color in zip(names, SONARS, strict=False):
-            _line(graph, timeline.ranges[name], color, name.replace("_", " "))
-        for stop in timeline.stops:
-            _span(graph, stop.begins_s, stop.ends_s, f"{STOPPED} 8%")
-    return svg(zp.LayoutV(front, rest, row_gap=4), 500, "ranges")
-
-
 def place_at(timeline: Timeline, at_s: float) -> tuple[float, float] | None:
     """Return the last odometry position at that time; None before the first."""
     for segment in reversed(timeline.path):
@@ -135,8 +122,6 @@ def _over_time(timeline: Timeline, y_name: str | None, x_name: str | None = None
 
 def _velocity(timeline: Timeline, series: VelocitySeries, label: str) -> zp.Graph:
     graph = _over_time(timeline, label)
-    _line(graph, series.upper, LIMIT, "safety's limits", width=2)
-    _line(graph, series.lower, LIMIT, "", width=2)
     for number, (source, request) in enumerate(series.requested.items()):
         _line(graph, request, REQUESTED, f"requested by {source}", dash=DASHES[number % 4])
     _line(graph, series.allowed, ALLOWED, "allowed by safety")

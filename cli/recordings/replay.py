@@ -6,15 +6,15 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from functools import partial
+from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Self
 
 from cli.inspect.addressing import chunks, topic_of
 from cli.inspect.session import BusSession, add_options, open_session, positive, until_interrupt
 from cli.recordings.info import open_recording
-from cli.recordings.selection import Selection, refusal
+from cli.recordings.selection import is_played, refusal
 from common import keys
 from common.bus.probe import intersects, valid
 from common.cli_args import sources
@@ -31,20 +31,12 @@ CHECK_S = 1.0  # between two checks of the target
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("file", metavar="FILE", type=Path)
-    for name, text in (("--only", "these keys, such as tel/odom/odometry or 'tel/**'"),
-                       ("--skip", "not these keys")):  # fmt: skip
-        parser.add_argument(
-            name, metavar="KEY", action="append", default=[], type=key_expression,
-            help=f"{text}; may be repeated",
-        )  # fmt: skip
+    parser.add_argument(
+        "--only", metavar="KEY", action="append", default=[], type=key_expression,
+        help="these keys, such as tel/odom/odometry or 'tel/**'; may be repeated",
+    )  # fmt: skip
     parser.add_argument(
         "--rate", "-r", type=positive, default=1.0, help="playback speed, 2 is twice as fast"
-    )
-    parser.add_argument(
-        "--from", dest="begin", type=seconds, default=0.0, metavar="S", help="start at this second"
-    )
-    parser.add_argument(
-        "--to", dest="end", type=seconds, default=None, metavar="S", help="stop at this second"
     )
     parser.add_argument(
         "--frames", action="store_true",
@@ -55,44 +47,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Play the recording; return 1 if there was nothing to play."""
-    with open_recording(options.file) as reader, open_target(options) as (target, selection):
+    with open_recording(options.file) as reader, open_target(options) as target:
         pacer = Pacer(options.rate, target.check)
-        played, over = 0, False
+        played = 0
         with until_interrupt():
             for each in reader:
                 path = chunks(each.key)[1]
-                over = selection.is_over(each.log_ns)
-                if over:
-                    break
-                if selection.includes(path, each.log_ns):
+                if target.takes(path) and is_selected(path, tuple(options.only)):
                     pacer.wait(each.log_ns)
                     played += target.play(path, each.sample)
-    if reader.cut and not over:
+    if reader.cut:
         print("t2 replay: the recording is truncated; played what is readable", file=sys.stderr)
     print(f"played {played} messages", file=sys.stderr)
     return 0 if played else 1
 
 
+@cache
+def is_selected(path: str, only: tuple[str, ...]) -> bool:
+    """Return whether one of these key expressions matches; without any, all keys match."""
+    return not only or any(intersects(each, path) for each in only)
+
+
 @contextmanager
-def open_target(
-    options: argparse.Namespace,
-) -> Iterator[tuple["BoardTarget | BusTarget", Selection]]:
-    """Yield the target and the selection of messages."""
-    select = partial(
-        Selection,
-        matches=intersects,
-        only=options.only,
-        skip=options.skip,
-        from_s=options.begin,
-        to_s=options.end,
-    )
-    with ExitStack() as stack:
-        if options.frames:
-            board = load(BridgeConfig, sources(options)).config.board
-            yield stack.enter_context(BoardTarget(board)), select(frames=True)
-            return
-        bus = BusTarget(stack.enter_context(open_session(options)))
-        yield bus, select(alive=bus.alive())
+def open_target(options: argparse.Namespace) -> Iterator["BoardTarget | BusTarget"]:
+    """Yield what the recording is played to."""
+    if options.frames:
+        with BoardTarget(load(BridgeConfig, sources(options)).config.board) as target:
+            yield target
+    else:
+        with open_session(options) as session:
+            yield BusTarget(session)
 
 
 class BusTarget:
@@ -102,18 +86,20 @@ class BusTarget:
         """Raise ``RobotError`` if one of them is running."""
         self._probe = session.probe
         self._robot = session.robot
-        self.check()
+        self._alive = self.check()  # at the start
 
-    def alive(self) -> set[str]:
-        """Return the names of the running services."""
+    def check(self) -> set[str]:
+        """Return the running services; raise ``RobotError`` if bridge or safety is among them."""
         tokens = self._probe.alive(keys.live_key(self._robot, "*", "*"))
-        return {token.split("/")[-2] for token in tokens}
-
-    def check(self) -> None:
-        """Raise ``RobotError`` if a bridge or safety service has started."""
-        why = refusal(self._robot, self.alive())
+        alive = {token.split("/")[-2] for token in tokens}
+        why = refusal(self._robot, alive)
         if why:
             raise RobotError(why)
+        return alive
+
+    def takes(self, path: str) -> bool:
+        """Return whether a key may be played beside the services that run."""
+        return is_played(path, self._alive)
 
     def play(self, path: str, sample: Sample) -> bool:
         """Publish the original bytes; return whether anything was sent."""
@@ -153,6 +139,10 @@ class BoardTarget:
     def check(self) -> None:
         """Do nothing: no condition can change."""
 
+    def takes(self, path: str) -> bool:
+        """Return True: the frames of all keys are played."""
+        return True
+
     def play(self, path: str, sample: Sample) -> bool:
         """Send the raw frame attached to a message; return whether there is one."""
         if sample.raw is None:
@@ -167,7 +157,7 @@ class Pacer:
     It calls ``check`` while it waits, and at least once a second.
     """
 
-    def __init__(self, rate: float, check: Callable[[], None]) -> None:
+    def __init__(self, rate: float, check: Callable[[], object]) -> None:
         self._rate = rate
         self._check = check
         self._checked_s = time.monotonic()
@@ -197,11 +187,3 @@ def key_expression(word: str) -> str:
             f"{word!r} is not a key; `t2 info FILE` lists the keys of a recording"
         )
     return path
-
-
-def seconds(text: str) -> float:
-    """Parse a time since the start of the recording."""
-    number = float(text)
-    if not 0 <= number < 1e9:
-        raise ValueError(text)
-    return number

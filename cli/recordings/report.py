@@ -1,8 +1,7 @@
 """``t2 report FILE...``: an HTML report of each recording, in one self-contained file.
 
-It shows the path, the velocities (requested, allowed, measured), sonar ranges, stops with their
-reasons, events, rates and gaps of each stream. All content from the bus is escaped. It needs the
-extra ``report``.
+It shows the stops with their reasons, the velocities (requested, allowed, measured), the path, and
+rates and gaps of each stream. All content from the bus is escaped. It needs the extra ``report``.
 """
 
 import argparse
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from services.recorder.reader import Reader
 
 TEMPLATE = Path(__file__).with_name("report.html")
-EVENTS_MAX = 500
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,19 +71,16 @@ def page(timeline: Timeline, reader: "Reader") -> str:
     # The fastest streams first, event-driven keys last.
     streams = sorted(timeline.streams.values(), key=lambda each: (-each.expected_hz, each.key))
     names = [chunks(stream.key)[1] or stream.key for stream in streams]
-    has_ranges = any(series.times for series in timeline.ranges.values())
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters |= {"clock": clock, "figure": figure}
+    environment.filters["clock"] = clock
     return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
         timeline=timeline,
         title=reader.path.name,
         about=summary(timeline, reader),
         warnings=warnings(timeline, reader),
         streams=list(zip(names, streams, strict=True)),
-        events=timeline.events[:EVENTS_MAX],
         path=figures.path(timeline) if timeline.path else "",
         speeds=figures.speeds(timeline),
-        ranges=figures.ranges(timeline) if has_ranges else "",
     )
 
 
@@ -117,8 +112,6 @@ def warnings(timeline: Timeline, reader: "Reader") -> list[str]:
     undecoded = sum(stream.undecoded for stream in timeline.streams.values())
     if undecoded:
         found.append(f"{undecoded} messages could not be decoded.")
-    if len(timeline.events) > EVENTS_MAX:
-        found.append(f"The first {EVENTS_MAX} of {len(timeline.events)} events are listed.")
     return found
 
 
@@ -126,8 +119,3 @@ def clock(seconds: float) -> str:
     """Format a time or a duration."""
     minutes, tenths = divmod(round(10 * seconds), 600)
     return f"{minutes} min {tenths / 10:04.1f} s" if minutes else f"{tenths / 10:.1f} s"
-
-
-def figure(value: float | None, form: str) -> str:
-    """Format a number; empty for None."""
-    return "" if value is None else format(value, form)

@@ -15,7 +15,6 @@ from common import keys
 from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import (
-    SONAR_NAMES,
     Drive,
     Event,
     Health,
@@ -23,7 +22,6 @@ from common.messages import (
     Motion,
     Odometry,
     SafetyState,
-    Ultrasonic,
     Velocity,
 )
 
@@ -55,8 +53,6 @@ class VelocitySeries:
     requested: dict[str, Series] = field(default_factory=dict)  # by source
     allowed: Series = field(default_factory=Series)  # by safety
     measured: Series = field(default_factory=Series)
-    upper: Series = field(default_factory=Series)  # safety's limits
-    lower: Series = field(default_factory=Series)
 
 
 @dataclass(slots=True)
@@ -97,11 +93,6 @@ class Stream:
         self._last_seq[message.boot] = message.seq
 
     @property
-    def publishers(self) -> int:
-        """Return how many processes published on it, one after another or at the same time."""
-        return len(self._last_seq)
-
-    @property
     def expected_hz(self) -> float:
         """Return the nominal rate; 0 for an event-driven key, also of a source that may pause."""
         topic = topic_of(self.key)
@@ -114,15 +105,10 @@ class Stream:
         return (len(self.times) - 1) / span_s if span_s > 0 else None
 
     @property
-    def longest(self) -> tuple[float, float]:
-        """Return begin and end of the longest interval between two samples, in s."""
-        return max(pairwise(self.times), key=lambda each: each[1] - each[0], default=(0.0, 0.0))
-
-    @property
-    def gaps(self) -> list[tuple[float, float]]:
-        """Return begin and end of each gap, in s."""
+    def gaps(self) -> list[float]:
+        """Return the duration of each gap, in s."""
         limit_s = MISSED / self.expected_hz if self.expected_hz else math.inf
-        return [(a, b) for a, b in pairwise(self.times) if b - a > limit_s]
+        return [b - a for a, b in pairwise(self.times) if b - a > limit_s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,9 +129,6 @@ class Timeline:
     linear: VelocitySeries = field(default_factory=VelocitySeries)
     angular: VelocitySeries = field(default_factory=VelocitySeries)
     path: list[PathSegment] = field(default_factory=list)
-    ranges: dict[str, Series] = field(
-        default_factory=lambda: {name: Series() for name in SONAR_NAMES}
-    )
     verdicts: list[Phase] = field(default_factory=list)
     events: list[TimedEvent] = field(default_factory=list)
     streams: dict[str, Stream] = field(default_factory=dict)  # by key
@@ -191,9 +174,11 @@ class Timeline:
             case Odometry() if finite(message.x, message.y):
                 self._add_pose(message, at_s)
             case SafetyState():
-                self._add_state(message, at_s)
-            case _:
-                self._add_sensor_or_report(message, key, at_s)
+                add_state(self.verdicts, at_s, message, GAP_S)
+            case Event():
+                self.events.append(TimedEvent(at_s, key.rpartition("/")[2], message))
+            case Health():
+                self.versions[key.split("/")[-2]] = message.version
 
     def _add_pose(self, message: Odometry, at_s: float) -> None:
         epoch = (message.boot, message.epoch)
@@ -203,23 +188,6 @@ class Timeline:
         segment.times.append(at_s)
         segment.xs.append(message.x)
         segment.ys.append(message.y)
-
-    def _add_state(self, message: SafetyState, at_s: float) -> None:
-        self.linear.upper.add(at_s, message.limits.forward)
-        self.linear.lower.add(at_s, -message.limits.backward)
-        self.angular.upper.add(at_s, message.limits.angular)
-        self.angular.lower.add(at_s, -message.limits.angular)
-        add_state(self.verdicts, at_s, message, GAP_S)
-
-    def _add_sensor_or_report(self, message: Message, key: str, at_s: float) -> None:
-        match message:
-            case Ultrasonic():
-                for name, distance in zip(SONAR_NAMES, message.ranges, strict=True):
-                    self.ranges[name].add(at_s, distance)
-            case Event():
-                self.events.append(TimedEvent(at_s, key.rpartition("/")[2], message))
-            case Health():
-                self.versions[key.split("/")[-2]] = message.version
 
 
 def downsampled(

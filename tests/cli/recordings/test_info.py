@@ -95,13 +95,6 @@ def test_text_output(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert message in shown, message
 
 
-def test_an_empty_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), {})
-    made.close()
-    assert main(["info", str(made.path)]) == 0
-    assert "no messages" in capsys.readouterr().out
-
-
 def test_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", str(tmp_path / "gone.mcap")]) == 1
     assert "gone.mcap: cannot be read: No such file" in capsys.readouterr().err

@@ -91,10 +91,7 @@ def test_replay_publishes_the_original_bytes_without_actuation(
     ("words", "played"),
     [
         (["--only", "@cmd/**"], 0),
-        (["--only", "tel/mine"], 1),
-        (["--skip", "tel/bridge/*"], 1),
-        (["--from", "1", "--to", "3"], 3),
-        (["--from", "4", "--only", "tel/bridge/**", "--only", "tel/mine"], 2),
+        (["--only", "tel/bridge/**", "--only", "tel/mine"], 6),
     ],
 )
 def test_selection_options(path: Path, tool: Tool, words: list[str], played: int) -> None:
@@ -109,7 +106,7 @@ def test_refused_while_bridge_or_safety_run(
     pretend(buses, service, {})
     result = tool("replay", str(path), *FAST)
     assert result.code == 1
-    assert f"{service} of robot {buses.robot} is running" in result.err
+    assert f"robot {buses.robot} has a running {service}" in result.err
     assert tool("replay", str(path), *FAST, robot="nobody").code == 0
     assert came == []
 
@@ -128,7 +125,7 @@ def test_a_service_that_starts_ends_the_replay(
     monkeypatch.setattr(replay.BusTarget, "play", start_safety)
     result = tool("replay", str(path), "--rate", "0.5")
     assert result.code == 1
-    assert f"safety of robot {buses.robot} is running" in result.err
+    assert f"robot {buses.robot} has a running safety" in result.err
 
 
 def test_a_bridge_receives_the_raw_frames(path: Path, tool: Tool) -> None:
@@ -155,8 +152,6 @@ def test_a_truncated_recording_is_played_up_to_its_end(path: Path, tool: Tool) -
     assert "the recording is truncated" in result.err
 
 
-@pytest.mark.parametrize(
-    "words", [["--rate", "0"], ["--from", "-1"], ["--only", "//"], ["--skip", "tel//x"]]
-)
+@pytest.mark.parametrize("words", [["--rate", "0"], ["--only", "//"], ["--only", "tel//x"]])
 def test_invalid_arguments(path: Path, tool: Tool, words: list[str]) -> None:
     assert tool("replay", str(path), *words).code == 2

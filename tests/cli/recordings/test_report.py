@@ -1,13 +1,11 @@
 """The HTML page: complete, self-contained, and with escaped content."""
 
-import re
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
 from cli.__main__ import main
-from cli.recordings.report import clock
 from common import codec
 from common.codec import Sample
 from common.keys import ROOT
@@ -55,8 +53,8 @@ def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"{out}\n"
     text = out.read_text()
     for word in (
-        "requested by teleop", "allowed by safety", "measured", "The bumper was hit.", "front left",
-        "tel/bridge/velocity", "latched", "bridge 0.1.0", "4.0 m", "a reset",
+        "requested by teleop", "allowed by safety", "measured", "The bumper was hit.",
+        "tel/bridge/velocity", "bridge 0.1.0", "4.0 m", "a reset",
         "2023-11-14 22:13:20 UTC",
     ):  # fmt: skip
         assert word in text, word
@@ -67,25 +65,15 @@ def test_the_page_loads_nothing_and_has_no_script(file: Path) -> None:
     page = Page(file.with_suffix(".html").read_text())
     assert page.fetched == []
     assert "script" not in page.tags
-    assert page.tags.count("svg") == 3
+    assert page.tags.count("svg") == 2
 
 
 def test_content_from_the_bus_is_escaped(file: Path) -> None:
     main(["report", str(file)])
     text = file.with_suffix(".html").read_text()
-    assert "The &lt;b&gt;bumper&lt;/b&gt; was hit." in text
     assert "<i>" not in text
     assert "tel/&lt;i&gt;\\u202e" in text
     assert text.replace("\n", "").isprintable()
-
-
-def test_figures_have_unique_ids(file: Path) -> None:
-    main(["report", str(file)])
-    text = file.with_suffix(".html").read_text()
-    named = [re.findall(r'<clipPath id="([^"]+)"', each) for each in text.split("<svg")[1:]]
-    flat = [name for each in named for name in each]
-    assert flat
-    assert len(flat) == len(set(flat))
 
 
 def test_a_truncated_recording_has_a_warning(file: Path) -> None:
@@ -97,8 +85,6 @@ def test_a_truncated_recording_has_a_warning(file: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "arguments", "sentence"),
     [
-        ("none.mcap", [], "none.mcap: cannot be read: No such file"),
-        ("text.mcap", [], "text.mcap: is not an MCAP file"),
         ("empty.mcap", [], "empty.mcap: contains no messages of the bus"),
         ("lap.mcap", ["--out", "{folder}/lap.mcap"], "is the recording itself"),
         ("lap.mcap", ["--out", "{folder}/no/lap.html"], "cannot be written: No such file"),
@@ -120,17 +106,3 @@ def test_error_messages(
     assert main(["report", str(folder / name), *words]) == 1
     assert sentence in capsys.readouterr().err
     assert file.read_bytes() == before
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [
-        (0.0, "0.0 s"),
-        (59.94, "59.9 s"),
-        (59.96, "1 min 00.0 s"),
-        (119.97, "2 min 00.0 s"),
-        (125.25, "2 min 05.2 s"),
-    ],
-)
-def test_a_duration_has_less_than_60_seconds_beside_its_minutes(seconds: float, text: str) -> None:
-    assert clock(seconds) == text

@@ -5,10 +5,9 @@ import math
 import pytest
 
 from cli.recordings.timeline import Series, Stream, Timeline, downsampled
-from common.freshness import NS_PER_S
 from common.messages import Drive, Velocity
 from tests.cli.recordings import drive_fixture
-from tests.cli.recordings.drive_fixture import BEGIN_NS, HIT_S, RESET_S, drive
+from tests.cli.recordings.drive_fixture import HIT_S, RESET_S, drive
 
 
 @pytest.fixture
@@ -26,7 +25,6 @@ def test_requested_allowed_and_measured_velocity(timeline: Timeline) -> None:
     allowed = zip(timeline.linear.allowed.times, timeline.linear.allowed.values, strict=True)
     assert all((value == 0.0) == (HIT_S <= at_s < RESET_S) for at_s, value in allowed)
     assert set(timeline.angular.measured.values) == {0.1}
-    assert (set(timeline.linear.upper.values), set(timeline.linear.lower.values)) == ({0.8}, {-0.5})
 
 
 def test_stop_with_reason_and_event(timeline: Timeline) -> None:
@@ -36,10 +34,8 @@ def test_stop_with_reason_and_event(timeline: Timeline) -> None:
     assert [(each.at_s, each.service) for each in timeline.events] == [(HIT_S, "safety")]
 
 
-def test_path_ranges_and_versions(timeline: Timeline) -> None:
+def test_path_and_versions(timeline: Timeline) -> None:
     assert timeline.distance == pytest.approx(199 * 0.02)
-    assert math.isnan(timeline.ranges["front_left"].values[0])
-    assert timeline.ranges["left"].values[0] == 1.0
     assert timeline.versions == {"bridge": "0.1.0"}
     assert timeline.lasted_s == pytest.approx(9.95)
 
@@ -75,49 +71,26 @@ def test_downsampling_keeps_peaks_and_gaps() -> None:
     assert downsampled(times[:5], values[:5]) == (times[:5], values[:5])
 
 
-def test_time_starts_at_the_first_message() -> None:
-    timeline = Timeline()
-    timeline.add("t2/v1/001/tel/mine", "", None, BEGIN_NS)
-    timeline.add("t2/v1/001/tel/mine", "", None, BEGIN_NS + 3 * NS_PER_S)
-    assert (timeline.lasted_s, timeline.streams["t2/v1/001/tel/mine"].times) == (3.0, [0.0, 3.0])
-
-
 # --- streams ------------------------------------------------------------------------------------
 
 
-def test_rate_gaps_losses_and_publishers() -> None:
+def test_rate_gaps_and_losses() -> None:
     stream = Stream("t2/v1/001/tel/bridge/velocity")
-    for at_s, seq, boot in ((0.0, 1, 9), (0.02, 2, 9), (0.5, 5, 9), (0.52, 1, 10)):
+    for at_s, seq, boot in ((0.0, 1, 9), (0.08, 2, 9), (0.5, 5, 9), (0.52, 1, 10)):
         stream.add(at_s, Velocity(seq=seq, boot=boot, linear=0.0, angular=0.0))
     stream.add(0.54, None)
-    assert (stream.expected_hz, stream.lost, stream.publishers, stream.undecoded) == (50, 2, 2, 1)
+    assert (stream.expected_hz, stream.lost, stream.undecoded) == (50, 2, 1)
     assert stream.hz == pytest.approx(4 / 0.54)
-    assert stream.gaps == [(0.02, 0.5)]
-    assert stream.longest == (0.02, 0.5)
+    assert stream.gaps == [pytest.approx(0.08), pytest.approx(0.42)]
 
 
-def test_two_publishers_at_the_same_time_lose_nothing() -> None:
-    stream = Stream("t2/v1/001/tel/recorder/health")
-    for number in range(10):  # two recorders of one robot
-        for boot in (5, 6):
-            stream.add(number + boot / 10, Velocity(seq=number, boot=boot, linear=0, angular=0))
-    assert (stream.publishers, stream.lost) == (2, 0)
-
-
-def test_a_gap_is_longer_than_three_periods() -> None:
-    stream = Stream("t2/v1/001/tel/recorder/health")  # 1 Hz
-    for at_s in (0.0, 3.0, 6.5):
-        stream.add(at_s, None)
-    assert stream.gaps == [(3.0, 6.5)]
-
-
-@pytest.mark.parametrize("path", ["tel/lidar/points", "@cmd/drive/teleop", "evt/safety"])
+@pytest.mark.parametrize("path", ["tel/lidar/points", "@cmd/drive/teleop"])
 def test_a_key_without_a_rate_has_no_gaps(path: str) -> None:
     stream = Stream(f"t2/v1/001/{path}")
     stream.add(0.0, Drive(seq=1, boot=9, linear=0.0, angular=0.0, echo=1))
-    assert (stream.hz, stream.gaps, stream.longest) == (None, [], (0.0, 0.0))
+    assert (stream.hz, stream.gaps) == (None, [])
     stream.add(9.0, Drive(seq=2, boot=9, linear=0.0, angular=0.0, echo=1))
-    assert (stream.gaps, stream.expected_hz, stream.longest) == ([], 0.0, (0.0, 9.0))
+    assert (stream.gaps, stream.expected_hz) == ([], 0.0)
     assert stream.hz == pytest.approx(1 / 9)
 
 
