@@ -49,10 +49,6 @@ class OperatorProcess:
         assert self.process.stdin is not None
         self.process.stdin.write(f"{line}\n".encode())
 
-    def close_input(self) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.close()
-
     def signal(self, number: signal.Signals) -> None:
         self.process.send_signal(number)
 

@@ -8,14 +8,14 @@ from cli.commission.latches import LIMIT_S, LatchTest, Reset, judge_latch
 from common.freshness import NS_PER_S, Latest
 from common.messages import Motion, SafetyState
 from common.motion import Command
-from tests.cli.demo.lap_fixture import safety
+from tests.factories import safety_state
 
 T = 100 * NS_PER_S
 RESET = Reset(T + 2 * NS_PER_S, True, "Reset.", ())
 
 
 def state(after_s: float, *latched: str) -> Latest[SafetyState]:
-    return Latest(safety(latched=latched), T + round(after_s * NS_PER_S))
+    return Latest(safety_state(latched=latched), T + round(after_s * NS_PER_S))
 
 
 def motion(after_s: float, command: Command) -> Latest[Motion]:

@@ -19,7 +19,7 @@ from cli.commission.report import Verdict
 from common.freshness import NS_PER_S, Latest
 from common.messages import Mileage, Motion, Velocity
 from common.motion import Command, Twist
-from tests.cli.demo.lap_fixture import safety
+from tests.factories import safety_state
 
 FORWARD, LEFT = Twist(linear=0.1), Twist(angular=0.2)
 PERIOD_NS = NS_PER_S // 50
@@ -79,9 +79,8 @@ class Vehicle:
                 for t, distance, heading in zip(times, distances, headings, strict=True)
             ],
             states=[
-                Latest(safety("blocked"), 0),
-                Latest(safety(), 1),
-                Latest(safety("blocked"), 2),
+                Latest(safety_state(verdict="stop", text="blocked"), 0),
+                Latest(safety_state(verdict="run"), 1),
             ],
         )
 

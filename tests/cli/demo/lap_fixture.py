@@ -8,7 +8,6 @@ from msgspec import Struct
 from cli.demo.score import Trace
 from common import motion
 from common.freshness import NS_PER_S
-from common.messages import Cause, Limits, SafetyState
 from sim import trace as t
 from t2.messages import Odometry
 from tests import factories
@@ -28,22 +27,6 @@ def odometry(**fields: Any) -> Odometry:
     """Return a standing pose at the start, with the given differences."""
     standing = dict.fromkeys(("x", "y", "heading", "linear", "residual"), 0.0)
     return as_client(factories.odometry(**(standing | fields)), Odometry)
-
-
-def safety(*causes: str, latched: tuple[str, ...] = (), **fields: Any) -> SafetyState:
-    """Return safety's state with these causes; without causes the verdict is run."""
-    known: dict[str, Any] = {
-        "verdict": "stop" if causes or latched else "run",
-        "latched": latched,
-        "causes": tuple(
-            Cause(name=name, action="stop", age=0.1, text=f"there is {name}") for name in causes
-        ),
-        "source": "demo",
-        "limits": Limits(forward=1.0, backward=1.0, angular=1.0),
-        "heartbeat": 1,
-        "text": ", ".join(causes) or "drives as asked",
-    }
-    return SafetyState(**(known | fields))
 
 
 def truth(tick: int, **fields: Any) -> t.Truth:

@@ -58,11 +58,6 @@ def obey(safety: Safety, caller: Caller[m.ResetDone]) -> None:
     caller.reply(done)
 
 
-def lie(safety: Safety, caller: Caller[m.ResetDone]) -> None:
-    """Answer with values of safety's public state, and clear nothing."""
-    caller.reply(m.ResetDone(text="Reset.", boot=safety.bus.boot, cleared=(41,)))
-
-
 def done(_: Safety, caller: Caller[m.Done]) -> None:
     caller.reply(m.Done(text="done"))
 
@@ -79,13 +74,6 @@ def test_a_reset_names_the_latched_causes_and_is_confirmed_by_the_state(
     assert request.causes == (41,)
     assert request.echo is not None
     assert 100 < request.echo <= safety.heartbeat
-
-
-def test_a_reset_without_effect_is_not_confirmed(buses: BusFixture, tool: Tool) -> None:
-    Safety(buses, (keys.RESET, lie))
-    result = tool("call", "safety/reset")
-    assert result.code == 1
-    assert NOT_CONFIRMED in result.err
 
 
 @pytest.mark.parametrize("payload", [b"ok", codec.encode(m.ResetDone(text="ok"))])

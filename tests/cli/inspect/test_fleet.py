@@ -114,18 +114,6 @@ def test_stop_of_an_empty_site(t2: Tool) -> None:
     )
 
 
-def test_an_unconfirmed_stop_repeats_the_settings(
-    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(machine, "ESTOP_TICKS", 6)
-    robot = Robot(join("a"), obeys=False)
-    result = t2("estop", robot="a")
-    assert (result.code, result.out) == (1, "")
-    assert f"`t2 doctor --robot a --set bus.connect={t2.endpoint}`" in result.err
-    assert "USE THE VEHICLE'S OWN SWITCH" in result.err
-    assert len(robot.stops) > 2
-
-
 @pytest.mark.parametrize("word", ["ls", "estop"])
 def test_without_a_router(word: str, t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(estop, "TIMEOUT_S", 0.1)

@@ -70,12 +70,6 @@ def test_print_the_configuration_for_zenohd(
         (BusSettings(), "every program on this machine"),
         (BusSettings(insecure=True), "everyone on the network, without a certificate"),
         (
-            BusSettings(
-                listen=("tls/[::]:1",), ca="a", certificate="b", private_key="c", members="d"
-            ),
-            "this machine, and members with a certificate",
-        ),
-        (
             BusSettings(uplink=("tcp/127.0.0.1:1",)),
             "every program on this machine, and clients of the router tcp/127.0.0.1:1",
         ),

@@ -9,7 +9,7 @@ import pytest
 
 from cli.__main__ import main
 from cli.run import up
-from cli.run.up import commands, driving, selected
+from cli.run.up import commands, selected
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import ConfigError
 from tests.cli.processes import PATIENCE_S, children, ran, running, sets, t2, wait_gone
@@ -46,20 +46,6 @@ def test_a_second_stack_starts_nothing_and_killed_services_start_again(tmp_path:
         assert up.wait(PATIENCE_S) == 0
         wait_gone(list(second.values()))
     assert "Traceback" not in log.read_text()
-
-
-@pytest.mark.parametrize(
-    ("config", "sets", "command"),
-    [
-        (None, [], "t2 drive"),
-        ([Path("my keys/bus.toml")], [], "t2 drive --config 'my keys/bus.toml'"),
-        (None, ["bus.connect=tls/r:1", "log.level=debug"], "t2 drive --set bus.connect=tls/r:1"),
-    ],
-)
-def test_the_hint_reaches_the_same_bus(
-    config: list[Path] | None, sets: list[str], command: str
-) -> None:
-    assert driving(Namespace(config=config, sets=sets)) == command
 
 
 @pytest.mark.parametrize(
@@ -105,16 +91,8 @@ def test_processes_in_order_of_dependency(given: dict[str, object], names: list[
 def test_settings_sources_are_passed_to_all_processes() -> None:
     files = [Path("a.toml"), Path("b.toml")]
     made = dict(commands(options(config=files, sets=["robot.id=2", "log.level=debug"], world="x")))
-    passed = [
-        "--config",
-        "a.toml",
-        "--config",
-        "b.toml",
-        "--set",
-        "robot.id=2",
-        "--set",
-        "log.level=debug",
-    ]
+    passed = ["--config", "a.toml", "--config", "b.toml"]
+    passed += sets("robot.id=2", "log.level=debug")
     for name, command in made.items():
         assert command[-len(passed) :] == passed, name
     assert " ".join(made["sim"][1:6]) == "-P -m sim --world x"
