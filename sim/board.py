@@ -30,7 +30,6 @@ from sim.sonar import Ranges
 
 # rad/s of one unit on the wire.
 RADIANS = {"decidegree": math.radians(0.1), "milliradian": 0.001}
-DRIVER_SIDES = {"left": Side.LEFT, "right": Side.RIGHT}
 FORWARD_SONARS, BACKWARD_SONARS = (1, 2, 3), (5, 6, 7)
 S32_SPAN = 2**32
 ROLLING = 0.005  # m/s, slower counts as standing

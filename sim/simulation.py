@@ -11,6 +11,8 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 
+from msgspec import Struct
+
 from common.freshness import NS_PER_S
 from common.motion import STILL, Command
 from common.wire import reports as r
@@ -23,6 +25,7 @@ from sim.faults import Cable, Datagram
 from sim.firmware import Output
 from sim.geometry import Rectangle
 from sim.model import Model
+from sim.requests import Asked, GetTruth
 from sim.sonar import Sonars
 from sim.vehicle import Motors, move, rebounded
 from sim.world import Plan, World
@@ -39,6 +42,14 @@ COMMANDS = {
     MotionKind.RUN: Command.RUN,
     MotionKind.BREAK: Command.BRAKE,
 }
+
+
+class Reply(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The answer to a request; ``error`` is the reason of a refusal."""
+
+    ok: bool
+    error: str = ""
+    truth: t.Truth | None = None
 
 
 class Simulation:
@@ -113,9 +124,13 @@ class Simulation:
         records, self._records = self._records, []
         return records
 
-    def record(self, line: t.Line) -> None:
-        """Add a line to the trace."""
-        self._records.append(line)
+    def handle(self, request: Asked, now_ns: int) -> Reply:
+        """Apply one request; a refused one changes nothing."""
+        if isinstance(request, GetTruth):
+            return Reply(ok=True, truth=self.truth(now_ns))
+        error = request._apply(self, now_ns) or ""
+        self._records.append(t.Disturbed(mono_ns=now_ns, request=request, error=error))
+        return Reply(ok=not error, error=error)
 
     def freeze(self, seconds: float, now_ns: int) -> None:
         """Make the board neither receive nor send for this long."""
@@ -128,7 +143,7 @@ class Simulation:
         self.board.power_on()
         self._hold(self.board.command, now_ns)
         self.freeze(seconds, now_ns)
-        self.record(t.Power(mono_ns=now_ns, on=False))
+        self._records.append(t.Power(mono_ns=now_ns, on=False))
 
     def flood(self, rate: int, seconds: float, garbage: bool, now_ns: int) -> None:
         """Send this many extra datagrams a second, for this long."""
@@ -183,12 +198,12 @@ class Simulation:
         if self._is_merged():
             self._send(self.output.merged(), self.now_ns)
         if self._steps % TRUTH_STEPS == 0:
-            self.record(self.truth(self.now_ns))
+            self._records.append(self.truth(self.now_ns))
 
     def _update_power(self) -> None:
         if not self._powered and not self._silent(self.now_ns):
             self._powered = True
-            self.record(t.Power(mono_ns=self.now_ns, on=True))
+            self._records.append(t.Power(mono_ns=self.now_ns, on=True))
 
     def _is_merged(self) -> bool:
         wait_ns = self.output.firmware.merge * NS_PER_S
@@ -228,7 +243,7 @@ class Simulation:
             self.counters[type(part.frame).__name__] += 1
             if isinstance(part.frame, MotionCommand):
                 self._hold(part.frame, now_ns)
-                self.record(self._command)
+                self._records.append(self._command)
                 self._commanded_ns = now_ns
                 if self._command.kind in self.output.firmware.ignores:
                     continue
@@ -264,7 +279,7 @@ class Simulation:
                 continue
             if part.frame.on != self._reported_pressed:
                 self._reported_pressed = part.frame.on
-                self.record(t.BumperSent(mono_ns=now_ns, pressed=self._reported_pressed))
+                self._records.append(t.BumperSent(mono_ns=now_ns, pressed=self._reported_pressed))
 
     def _sense(self, now_ns: int) -> None:
         self._switch.touch(self._contact or self.pressed_by_hand, now_ns)

@@ -14,9 +14,8 @@ import msgspec
 from common.errors import LinkError, MessageError
 from common.settings import Board
 from sim.faults import Datagram
-from sim.injection import Reply, handle
 from sim.requests import Asked, GetTruth
-from sim.simulation import Simulation
+from sim.simulation import Reply, Simulation
 from sim.trace import Truth
 
 HOST = "127.0.0.1"  # of the control socket
@@ -80,7 +79,7 @@ class ControlSocket:
             request = _requests.decode(payload)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             return Reply(ok=False, error=str(error))
-        return handle(self._simulation, request, now_ns)
+        return self._simulation.handle(request, now_ns)
 
 
 class Control:

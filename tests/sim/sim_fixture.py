@@ -12,10 +12,9 @@ from common.wire.frame import Frame
 from common.wire.framing import Framing, Received
 from common.wire.reports import FROM_BOARD
 from sim.faults import Datagram
-from sim.injection import Reply, handle
 from sim.model import Model
 from sim.requests import Asked
-from sim.simulation import Simulation
+from sim.simulation import Reply, Simulation
 from sim.trace import Line, Truth
 from sim.world import Plan
 
@@ -80,7 +79,7 @@ class SimFixture:
 
     def do(self, request: Asked) -> Reply:
         """Apply a request."""
-        reply = handle(self.simulation, request, self.now_ns)
+        reply = self.simulation.handle(request, self.now_ns)
         self.records += self.simulation.take_records()
         return reply
 

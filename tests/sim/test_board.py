@@ -125,19 +125,6 @@ def test_the_slip_of_wheels_grows_with_the_root_of_the_way() -> None:
         assert 0.8 < statistics.stdev(errors) / deviation < 1.2
 
 
-def test_power_on_forgets_all() -> None:
-    some = board()
-    for frame in (FORWARD, c.BumperBrakeSet(True), c.UltrasonicBrakeSet(True)):
-        some.answer(frame)
-    some.count(1.0, 1.0)
-    some.driver_bits[Side.RIGHT] = 3
-    some.power_on()
-    assert some.drive() == STOP
-    assert (some.bumper_brake, some.ultrasonic_brake) == (False, False)
-    assert some.answer(c.DistanceQuery()) == r.DistanceReport(0, 0)
-    assert some.driver(Side.RIGHT) == r.DriverReport(Side.RIGHT, 0)
-
-
 def test_both_brakes_are_off_at_first() -> None:
     some = board()
     some.answer(FORWARD)
@@ -233,13 +220,6 @@ def test_velocities_with_noise_and_bias() -> None:
     assert statistics.stdev(linear) == pytest.approx(0.02, abs=0.002)
     assert statistics.mean(angular) == pytest.approx(0.08, abs=0.003)
     assert statistics.stdev(angular) == pytest.approx(0.03, abs=0.003)
-
-
-def test_one_that_does_not_bounce_is_what_touches_it() -> None:
-    switch = Switch(0.0, 1)
-    for now_ms, touched in ((0, False), (10, True), (10, True), (20, True), (30, False)):
-        switch.touch(touched, now_ms * MS)
-        assert switch.closed is touched
 
 
 def test_after_each_change_it_opens_and_closes_for_its_time() -> None:

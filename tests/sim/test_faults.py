@@ -1,13 +1,11 @@
 from collections.abc import Sequence
 from typing import Any, Literal
 
-import msgspec
 import pytest
 
 from common.freshness import NS_PER_S
 from sim.faults import Cable, Datagram
 from sim.model import Line
-from sim.requests import Wire
 
 MANY = [Datagram(bytes([k % 256, k // 256, 7]), 4002) for k in range(1000)]
 
@@ -105,9 +103,3 @@ def test_what_the_queue_of_a_thin_cable_does_not_hold_is_lost() -> None:
         cable.put(datagram, 0)
     cable.put(big[3], 1_000_000)  # a microsecond for a byte: one has left
     assert cable.take(NS_PER_S) == [big[0], big[1], big[3]]
-
-
-@pytest.mark.parametrize("wrong", [{"drop": 1.1}, {"delay": -1}, {"jitter": float("nan")}])
-def test_wrong_chances_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(msgspec.ValidationError):
-        msgspec.convert({"do": "wire", **wrong}, Wire)

@@ -31,11 +31,6 @@ def test_a_split_frame_comes_in_two_datagrams() -> None:
     assert sim.framing.pack(r.UltrasonicReport((5000,) * 8)) == first.payload + second.payload
 
 
-def test_some_frames_are_split() -> None:
-    whole = len(sim_with(split=0.1).after(20.0))
-    assert whole == pytest.approx(0.9 * 2000, abs=60)
-
-
 def test_merged_frames_share_a_datagram_of_their_port() -> None:
     sim = sim_with(merge=0.05)
     assert sim.say(c.BumperQuery(), c.DistanceQuery()) == []
@@ -44,10 +39,6 @@ def test_merged_frames_share_a_datagram_of_their_port() -> None:
     assert len(said) == 102
     assert said[0] == r.BumperReport(False)
     assert len(sim.frames(sim.datagrams[0])) == 4  # both answers, and velocities at 50 Hz
-
-
-def test_a_wait_shorter_than_a_step_is_one_step() -> None:
-    assert len(sim_with(merge=0.001).after(1.0)) == 100
 
 
 def test_a_watchdog_stops_a_vehicle_that_gets_no_commands() -> None:
@@ -85,13 +76,6 @@ def test_hits_may_be_reported_on_the_other_port() -> None:
         before = len(sim.datagrams)
         assert sim.say(c.BumperQuery()) == [r.BumperReport(pressed)]
         assert [datagram.port for datagram in sim.datagrams[before:]] == [port]
-
-
-def test_a_firmware_without_echoes_sets_its_brakes_and_says_nothing() -> None:
-    sim = SimFixture()
-    sim.do(q.Firmware(echoes=False))
-    assert sim.say(c.BumperBrakeSet(True), c.UltrasonicBrakeSet(True)) == []
-    assert (sim.truth.bumper_brake, sim.truth.ultrasonic_brake) == (True, True)
 
 
 def test_a_board_that_ignores_stop_drives_on_and_obeys_break() -> None:

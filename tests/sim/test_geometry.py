@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry import Pose, Rectangle, Segment, point_gap, ray
+from sim.geometry import Pose, Rectangle, Segment, ray
 
 BODY = Rectangle(1.0, 0.5)
 ORIGIN = Pose(0.0, 0.0, 0.0)
@@ -51,25 +51,6 @@ def test_gap_is_never_more_than_to_any_point_of_the_segment(segment: Segment, po
     middle = (segment.ax + segment.bx) / 2, (segment.ay + segment.by) / 2
     nearest_corner = min(math.dist(middle, pose.outward(x, y)) for x, y in BODY.corners())
     assert BODY.gap(pose, segment) <= nearest_corner + 1e-9
-
-
-def test_outline_goes_around_counter_clockwise_and_closes() -> None:
-    sides = BODY.outline(ORIGIN)
-    assert [(s.ax, s.ay) for s in sides] == [(1.0, 0.5), (-1.0, 0.5), (-1.0, -0.5), (1.0, -0.5)]
-    assert (sides[-1].bx, sides[-1].by) == (1.0, 0.5)
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "inside"), [(0.0, 0.9, True), (0.6, 0.0, False), (0.5, 1.0, True)]
-)
-def test_points_inside_a_turned_rectangle(x: float, y: float, inside: bool) -> None:
-    turned = Pose(0.0, 0.0, math.pi / 2 + 1e-9)
-    assert Rectangle(1.001, 0.501).holds(turned, x, y) is inside
-
-
-@pytest.mark.parametrize(("x", "y", "gap"), [(1.0, 2.0, 2.0), (-3.0, 4.0, 5.0), (14.0, 3.0, 5.0)])
-def test_distance_from_a_point_to_a_segment(x: float, y: float, gap: float) -> None:
-    assert point_gap(x, y, Segment(0.0, 0.0, 10.0, 0.0)) == pytest.approx(gap)
 
 
 @pytest.mark.parametrize(

@@ -89,28 +89,10 @@ def test_what_is_asked_for_is_traced_with_its_error() -> None:
     ("text", "error"),
     [
         (b'{"pressed": true}', "missing required field `do`"),
-        (b'{"do": "dance"}', "Invalid value 'dance'"),
-        (b'{"do": "bumper"}', "missing required field `pressed`"),
-        (b'{"do": "bumper", "pressed": 1}', "Expected `bool`"),
         (b'{"do": "bumper", "pressed": true, "hard": true}', "unknown field `hard`"),
-        (b'{"do": "sonar", "name": "top"}', "Invalid enum value 'top'"),
-        (b'{"do": "driver", "side": "left", "bits": -1}', ">= 0"),
         (b'{"do": "place", "x": 1e300, "y": 0}', "<= 1000.0"),
-        (b'{"do": "freeze", "seconds": -1}', ">= 0"),
-        (b"[]", "Expected `object`"),
     ],
 )
 def test_a_wrong_request_is_refused_with_its_field(text: bytes, error: str) -> None:
     with pytest.raises(msgspec.ValidationError, match=error):
         msgspec.json.decode(text, type=q.Asked)
-
-
-@pytest.mark.parametrize(
-    ("text", "request_"),
-    [
-        (b'{"do": "power_cycle"}', q.PowerCycle(seconds=1.0)),
-        (b'{"do": "wire", "drop": 0.5}', q.Wire(direction="both", drop=0.5)),
-    ],
-)
-def test_what_is_left_out_has_a_default(text: bytes, request_: Any) -> None:
-    assert msgspec.json.decode(text, type=q.Asked) == request_

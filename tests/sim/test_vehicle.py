@@ -67,12 +67,6 @@ def test_many_short_steps_are_one_long_one(twist: Twist, steps: int) -> None:
     assert (pose.x, pose.y) == pytest.approx((once.x, once.y), abs=1e-6)
 
 
-def test_a_free_way_is_gone_whole() -> None:
-    way = move(Pose(0.0, 0.0, 0.0), Twist(1.0, 0.5), 0.1, lambda _: False)
-    assert not way.held
-    assert (way.distance, way.turn) == pytest.approx((0.1, 0.05))
-
-
 def test_a_way_ends_just_before_what_blocks_it() -> None:
     way = move(Pose(0.0, 0.0, 0.0), Twist(1.0), 0.1, lambda pose: pose.x > 0.03)
     assert way.held

@@ -19,7 +19,6 @@ from services.odom.odometer import Odometer
 from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
 from sim import trace as t
-from sim.injection import handle
 from sim.model import Model
 from sim.requests import Asked
 from sim.simulation import Simulation
@@ -62,7 +61,7 @@ class Vehicle:
 
     def inject(self, request: Asked) -> None:
         """Inject a fault of the simulator."""
-        handle(self.simulation, request, self._net.now_ns)
+        self.simulation.handle(request, self._net.now_ns)
 
     def receive(self, datagram: bytes, port: int) -> None:
         """Send a datagram to the board, from a port of the bridge."""
