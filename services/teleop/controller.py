@@ -17,7 +17,7 @@ from common.messages import Drive, Event, ResetDone, SafetyState
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
-from services.teleop.core.controls import Action, Controls, Stick
+from services.teleop.core.controls import MAX_PRESS_AGE_S, Action, Controls, Stick
 from services.teleop.core.hold import Press
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.gamepad import Gamepad
@@ -58,7 +58,6 @@ class Controller:
         self._requested: Drive | None = None
         self._leaving = False
         self._reported: set[str] = set()  # rules that are broken, and in the event log
-        self._late_ns = -NS_PER_S  # when a late press was last reported
         self._unheard: int | None = None  # ticks; None before the first state of safety
         self._estop = EstopRepetition()
         self._contest = Contest(self._settings.source)
@@ -94,9 +93,8 @@ class Controller:
             self._start_reset(press.shown, self._state(now_ns))
         elif action is Action.SLOW:
             self._report_slow(self.terminal.refusal(press.at_ns))
-        elif action is Action.LATE and now_ns - self._late_ns > NS_PER_S:  # a held key repeats
-            self._late_ns = now_ns
-            text = f"key {press.key.upper()} ignored: it is {press.age_s(now_ns):.1f} s old"
+        elif action is Action.LATE:
+            text = f"key {press.key.upper()} ignored: it is older than {MAX_PRESS_AGE_S:g} s"
             self._event_log.add("teleop", "warning", text)
 
     def release_controls(self, now_ns: int) -> None:

@@ -160,10 +160,7 @@ def test_a_press_that_waited_for_long_does_nothing(operator: Operator, key: str)
     assert operator.speeds(3) == [None] * 3
     assert operator.node.fake.asked == []
     assert operator.controller.view.gear == 1
-    assert operator.lines == [f"key {key.upper()} ignored: it is 0.5 s old"]
-    operator.wait(1.5)
-    operator.press(key, waited_s=3.0)
-    assert operator.lines[1:] == [f"key {key.upper()} ignored: it is 3.0 s old"]
+    assert operator.lines == [f"key {key.upper()} ignored: it is older than 0.5 s"]
 
 
 def slow(operator: Operator) -> None:
