@@ -71,23 +71,6 @@ class RingBuffer:
             del self._numbers[key], self._sizes[key]
 
 
-class LatchDetector:
-    """Compares each safety state with the previous one."""
-
-    def __init__(self) -> None:
-        self._known: set[str] | None = None  # None until the first state
-
-    def update(self, state: SafetyState) -> list[str]:
-        """Return the causes that have latched since the previous state.
-
-        Causes of the first state do not count: they latched before the buffered minutes.
-        """
-        now = set(state.latched)
-        new = [] if self._known is None else sorted(now - self._known)
-        self._known = now
-        return new
-
-
 @dataclass(slots=True)
 class Dump:
     """A black-box file in progress."""
@@ -115,6 +98,15 @@ class BlackBox:
         self._open_recording = open_recording
         self._close_recording = close_recording
         self._dump: Dump | None = None
+        self._latched: set[str] | None = None  # None until the first state
+
+    def new_causes(self, state: SafetyState) -> list[str]:
+        """Return the causes that have latched since the previous state.
+
+        Causes of the first state do not count: they latched before the buffered minutes.
+        """
+        before, self._latched = self._latched, set(state.latched)
+        return [] if before is None else sorted(self._latched - before)
 
     def add(self, sample: Sample) -> None:
         """Buffer a sample, also for the dump in progress."""

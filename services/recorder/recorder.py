@@ -1,6 +1,5 @@
 """The recorder's shell: subscribes to every key, writes files, stops before the disk is full."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from common.codec import Sample
 from common.errors import MessageError
 from common.messages import SafetyState
 from common.service import Node
-from services.recorder.blackbox import BlackBox, LatchDetector
+from services.recorder.blackbox import BlackBox
 from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Encoder
 from services.recorder.retention import StoredFile
@@ -21,7 +20,6 @@ from services.recorder.writer import RecordingWriter, RollingWriter
 EVERYTHING = ("**", "@cmd/**")
 DEPTH = 10_000  # samples that may wait for a slow disk: about 20 s of a whole stack
 SLICE_S, FLUSH_S, CHECK_S = 0.05, 0.5, 1.0
-PROGRESS_S = 5.0  # on a terminal
 
 
 class Recorder:
@@ -31,7 +29,6 @@ class Recorder:
         settings = node.config.recorder
         self._node = node
         self._encoder = Encoder(node.config.vehicle)
-        self._latches = LatchDetector()
         self._safety_key = keys.SAFETY.on(node.bus.robot)
         robot = node.bus.robot if settings.make_room else None
         self._storage = Storage(Path(settings.folder), settings.free * MB, robot=robot)
@@ -47,8 +44,6 @@ class Recorder:
         )
         node.loop.every(FLUSH_S, self._flush)
         node.loop.every(CHECK_S, self._check_storage)
-        if self._rolling is not None and sys.stderr.isatty():
-            node.loop.every(PROGRESS_S, self._report_progress)
         node.on_exit = self._close
 
     def _on_sample(self, sample: Sample) -> None:
@@ -70,7 +65,7 @@ class Recorder:
             state = codec.decode(sample.payload, SafetyState)
         except MessageError:
             return  # it is recorded unchanged
-        causes = self._latches.update(state)
+        causes = self._black_box.new_causes(state)
         if causes and self._storage.has_room:
             self._black_box.trigger(causes, sample.received_ns)
         elif causes:
@@ -93,12 +88,6 @@ class Recorder:
             self._stop()
         elif not had_room and self._storage.has_room:
             self._node.event("disk_room", "info", "the disk has room again: recording continues")
-
-    def _report_progress(self, _: int) -> None:
-        """Report on a terminal that messages arrive and the file grows."""
-        if self._rolling is not None:
-            count, size = self._node.counters["recorded"], self._rolling.size / MB
-            self._node.log.info(f"{count} messages recorded, this file {size:.1f} MB")
 
     def _report_removed(self, removed: list[StoredFile]) -> None:
         self._node.counters["removed"] += len(removed)

@@ -111,11 +111,6 @@ class RollingWriter:
             self._opened_ns = sample.received_ns
         self._recording.write(sample)
 
-    @property
-    def size(self) -> int:
-        """Return the size of the open file in bytes; 0 without one."""
-        return 0 if self._recording is None else self._recording.size
-
     def flush(self, now_ns: int) -> None:
         """Flush the file; close it when it is large or old enough."""
         if self._recording is None:

@@ -93,12 +93,6 @@ def test_views_follow_the_message_and_are_marked() -> None:
     assert [each.channel.is_view for each in ENCODER.entries(it, 5)] == [False, True, True]
 
 
-def test_an_invalid_message_is_stored_without_views() -> None:
-    it = bare("tel/odom/odometry", b"\x81\xa1x\x05", codec.encoding(type(samples.odometry())))
-    (only,) = ENCODER.entries(it, 5)
-    assert msgspec.json.decode(only.data) == {"x": 5}
-
-
 @pytest.mark.parametrize("data", [b"[]", b"{", b'{"_payload": "?"}', b'{"_raw": 5}'])
 def test_foreign_entries_are_rejected(data: bytes) -> None:
     with pytest.raises(MessageError, match="not written by the recorder"):

@@ -17,11 +17,6 @@ def test_marked_files_stay() -> None:
     assert names(removable(files, "001")) == [CONTINUOUS[1], INCIDENTS[0]]
 
 
-def test_a_marked_newest_file_protects_no_other() -> None:
-    files = stored(*INCIDENTS, kept=(INCIDENTS[2],))
-    assert names(removable(files, "001")) == INCIDENTS[:2]
-
-
 def test_files_of_one_second_are_ordered_by_number() -> None:
     same = [f"{OLD}.mcap", *(f"{OLD}-{n}.mcap" for n in (1, 2, 10))]
     assert names(removable(stored(*reversed(same)), "001")) == same[:3]

@@ -1,7 +1,6 @@
 """The recorder on a real bus: recordings, disk errors and SIGKILL."""
 
 import errno
-import re
 import shutil
 import signal
 import subprocess
@@ -40,7 +39,7 @@ from verification.harness.waiting import PATIENCE_S, wait_until
 
 @pytest.fixture(autouse=True)
 def _short_tail(monkeypatch: pytest.MonkeyPatch) -> None:
-    box = partial(BlackBox, tail_ns=NS_PER_S)
+    box = partial(BlackBox, tail_ns=NS_PER_S // 5)
     monkeypatch.setattr(recorder_module, "BlackBox", box)
 
 
@@ -128,31 +127,42 @@ def test_every_key_is_recorded_with_raw_frames(buses: BusFixture, tmp_path: Path
     assert "t2/v1/another/tel/x" not in found
 
 
-def test_a_latch_writes_the_black_box(buses: BusFixture, tmp_path: Path) -> None:
+def test_a_latch_writes_the_black_box_and_old_recordings_make_room(
+    buses: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = [f"{buses.robot}-20260101-00000{n}.mcap" for n in range(2)]
+    for name in old:
+        (tmp_path / name).write_bytes(bytes(MB))
+
+    def usage(folder: Path) -> SimpleNamespace:
+        used = sum(each.stat().st_size for each in folder.iterdir())
+        return SimpleNamespace(free=13.5 * MB - used)
+
+    monkeypatch.setattr(shutil, "disk_usage", usage)
     events, numbers = recorder_events(buses), count()
     latched: list[str] = []
     pretend(buses, "bridge", {keys.VELOCITY: lambda: samples.velocity(next(numbers))})
     pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
-    with recorder(buses, tmp_path):
+    with recorder(buses, tmp_path, "recorder.free=12"):
         received: list[m.Velocity] = []
         buses.bus(lambda bus: bus.subscribe(keys.VELOCITY, lambda a: received.append(a.message)))
         wait_until(lambda: len(received) > 50, "some history")
-        assert read(tmp_path) == []
+        assert [path.name for path in tmp_path.iterdir()] == old[1:]
         latched.append("contact")
         wait_until(lambda: "black_box" in [each.name for each in events], "the black box")
-    (path,) = tmp_path.glob("*.mcap")
-    assert path.name.endswith("-latch-contact.mcap")
-    found = read(tmp_path)
+    (path,) = tmp_path.glob("*-latch-contact.mcap")
+    with Reader(path) as reader:
+        found = list(reader)
     states = [each.message.latched for each in found if isinstance(each.message, m.SafetyState)]
     velocities = [each.message.linear for each in found if isinstance(each.message, m.Velocity)]
     assert states[0] == ()
     assert states[-1] == ("contact",)
     assert len(velocities) > 50
     assert velocities == sorted(velocities)
-    with Reader(path) as reader:
-        list(reader)
     assert reader.about["robot"] == buses.robot
     assert reader.about["why"] == "latch-contact"
+    (removed,) = (each for each in events if each.name == "recordings_removed")
+    assert removed.about == {"first": old[0]}
 
 
 def test_without_room_nothing_is_written(buses: BusFixture, tmp_path: Path) -> None:
@@ -173,39 +183,6 @@ def test_without_room_nothing_is_written(buses: BusFixture, tmp_path: Path) -> N
     assert "recorder.free is 1000000" in full.text
 
 
-def test_an_incident_replaces_old_recordings_on_a_full_disk(
-    buses: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stem = f"{buses.robot}-2026"
-    old = [f"{stem}0101-00000{n}{why}.mcap" for why in ("", "-latch-contact") for n in range(3)]
-    for name in old:
-        (tmp_path / name).write_bytes(bytes(MB))
-    (tmp_path / f"{old[3]}.keep").touch()
-
-    def usage(folder: Path) -> SimpleNamespace:
-        used = sum(each.stat().st_size for each in folder.iterdir())
-        return SimpleNamespace(free=15.5 * MB - used)
-
-    monkeypatch.setattr(shutil, "disk_usage", usage)
-    events = recorder_events(buses)
-    latched: list[str] = []
-    pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
-    with recorder(buses, tmp_path, "recorder.free=12"):
-        received: list[m.SafetyState] = []
-        buses.bus(lambda bus: bus.subscribe(keys.SAFETY, lambda a: received.append(a.message)))
-        wait_until(lambda: len(received) > 10, "safety's state")
-        latched.append("estop")
-        wait_until(lambda: "black_box" in [each.name for each in events], "the incident")
-    (path,) = tmp_path.glob("*-latch-estop.mcap")
-    assert is_whole(path)
-    left = {each.name for each in tmp_path.glob("*.mcap")} - {path.name}
-    assert left == {old[2], old[3], old[5]}
-    (removed,) = (each for each in events if each.name == "recordings_removed")
-    assert removed.text == "3 of the oldest recordings removed to free 3 MB"
-    assert removed.about == {"first": old[0]}
-    assert not {"disk_full", "black_box_lost"} & {each.name for each in events}
-
-
 def test_sigkill_loses_at_most_a_second(buses: BusFixture, tmp_path: Path) -> None:
     numbers = count(1)
     put: list[m.Velocity] = []
@@ -223,7 +200,7 @@ def test_sigkill_loses_at_most_a_second(buses: BusFixture, tmp_path: Path) -> No
     ) as process:
         stalls = StallRecorder()
         try:
-            wait_until(lambda: len(read(tmp_path)) > 200, "some seconds of recording")
+            wait_until(lambda: len(read(tmp_path)) > 60, "some seconds of recording")
         finally:
             killed_ns = time.time_ns()
             process.kill()
@@ -232,7 +209,7 @@ def test_sigkill_loses_at_most_a_second(buses: BusFixture, tmp_path: Path) -> No
     with Reader(path) as reader:
         found = list(reader)
     assert reader.cut
-    assert len(found) > 200
+    assert len(found) > 60
     numbers_read = [each.message.linear for each in found if isinstance(each.message, m.Velocity)]
     assert numbers_read == list(range(int(numbers_read[0]), int(numbers_read[-1]) + 1))
     assert (killed_ns - found[-1].log_ns) / NS_PER_S < 1.0 + 2 * stall_s
@@ -278,17 +255,3 @@ def test_t2_record_completes_its_files_on_ctrl_c(buses: BusFixture, tmp_path: Pa
         assert [each for each in reader if each.kind == "Velocity"]
     assert not reader.cut
     assert reader.about["why"] == "everything"
-
-
-def test_a_terminal_shows_the_progress(
-    buses: BusFixture,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    monkeypatch.setattr(recorder_module, "PROGRESS_S", 0.05)
-    caplog.set_level("INFO")
-    pretend(buses, "bridge", {keys.BUMPER: lambda: m.Bumper(pressed=False)})
-    with recorder(buses, tmp_path, "recorder.everything=true"):
-        wait_until(lambda: re.search(r"[1-9]\d* messages recorded", caplog.text), "progress")
