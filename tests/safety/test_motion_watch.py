@@ -197,6 +197,19 @@ def test_a_motion_of_half_a_second_renews_the_limit(ticks: int, renewed: bool) -
     assert (after_ns == due_ns + ticks * TICK_NS) != renewed
 
 
+def test_a_motion_between_begins_the_confirmation_anew() -> None:
+    board = stopping(0.4)
+    board.run(0.1, 0.4)
+    board.run(0.1, 0.0)
+    board.run(0.1, -0.1)  # the rebound of a contact
+    stood_ns = [board.state.still_ns]
+    board.run(0.18)
+    assert [*stood_ns, board.state.phase] == [None, Phase.STOPPING]
+    board.run(0.1)
+    assert board.state.phase is Phase.STANDING
+    assert board.state.displacement.integrated == STILL
+
+
 @pytest.mark.parametrize(
     ("linear", "angular"), [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.0, -0.1), (1.0, 0.0)]
 )

@@ -309,6 +309,18 @@ def test_states_of_limits() -> None:
 CAPS, SPEEDS = st.none() | st.floats(0, 3), st.floats(-2, 2)
 
 
+@pytest.mark.parametrize(("lease_s", "until_ns"), [(0.2, CONFLICT_NS), (1.0, NS_PER_S)])
+def test_a_second_limiting_publisher_stops_for_the_lease_and_half_a_second_at_least(
+    lease_s: float, until_ns: int
+) -> None:
+    limits = SpeedLimits({"lidar": LimitSource(lease=lease_s, silence="ignore")})
+    limits, refused = limit(limit(limits)[0], boot=2)
+    assert refused == "second_publisher"
+    assert limits.conflicts(until_ns - 1) == ["limit lidar"]
+    assert next(limits.observations(until_ns - 1)).text == "Stopped by lidar: two publishers."
+    assert limits.conflicts(until_ns) == []
+
+
 @given(st.lists(st.tuples(CAPS, CAPS), min_size=2, max_size=2), SPEEDS, SPEEDS)
 def test_no_limit_raises_any_speed_or_bends_the_curve(
     caps: list[tuple[float | None, float | None]], linear: float, angular: float
