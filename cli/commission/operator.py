@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
-from cli.commission.report import Checked, Verdict
+from cli.commission.report import Verdict
 from cli.commission.session import CheckoutSession
 from common.errors import RobotError
 from common.text import printable
@@ -47,18 +47,20 @@ def confirm(fact: str, phrase: str) -> bool:
     return prompt(f'{fact}\nType "{phrase}" to confirm:').lower() == phrase
 
 
-def walk(steps: Sequence[Step], session: CheckoutSession, checked: list[Checked]) -> None:
+def walk(
+    steps: Sequence[Step], session: CheckoutSession, checked: list[tuple[str, Verdict]]
+) -> None:
     """Run the steps with the operator; results are appended to ``checked``, even on an abort."""
     for number, step in enumerate(steps, 1):
         show(f"\n[{number}/{len(steps)}] {step.title}\n{step.what}")
-        checked.append(Checked(step.title, _verdict(step, session)))
+        checked.append((step.title, _verdict(step, session)))
 
 
-def sign(name: str, checked: Sequence[Checked]) -> str:
+def sign(name: str, checked: Sequence[tuple[str, Verdict]]) -> str:
     """Show the results and ask for the signature; return the name, or an empty string."""
     show("")
-    for each in checked:
-        show(f"{each.verdict.outcome:8} {each.title}: {each.verdict.text}")
+    for title, verdict in checked:
+        show(f"{verdict.outcome:8} {title}: {verdict.text}")
     typed = prompt(f"To sign this off, type your name ({name}):")
     return name if name and typed.casefold() == name.casefold() else ""
 

@@ -33,14 +33,6 @@ def seconds(value: float | None, digits: int = 2) -> str:
     return "never" if value is None else f"{value:.{digits}f} s"
 
 
-@dataclass(frozen=True, slots=True)
-class Checked:
-    """The title of a step, and its verdict."""
-
-    title: str
-    verdict: Verdict
-
-
 @dataclass(slots=True)
 class Report:
     """Content of the report; the checkout fills it in, so that an abort loses nothing."""
@@ -50,7 +42,7 @@ class Report:
     facts: list[Row]  # board, versions, firmware
     settings: Sequence[tuple[str, str, str]]  # path, value, origin
     operator: str = ""
-    steps: list[Checked] = field(default_factory=list)
+    steps: list[tuple[str, Verdict]] = field(default_factory=list)  # by title
     left_out: Sequence[str] = ()  # steps excluded by --only
     aborted: str = ""  # reason of an early end
     signed: str = ""  # the name typed at the end
@@ -59,14 +51,14 @@ class Report:
     @property
     def passed(self) -> bool:
         """Whether each selected step passed, to the end, with a signature."""
-        good = all(step.verdict.outcome == "passed" for step in self.steps)
+        good = all(verdict.outcome == "passed" for _, verdict in self.steps)
         return bool(self.steps) and good and not self.aborted and bool(self.signed)
 
 
 def render(report: Report) -> str:
     """Return the report as Markdown."""
     about = [("date", report.date), ("operator", report.operator), *report.facts]
-    steps = [(step.title, step.verdict.outcome, step.verdict.text) for step in report.steps]
+    steps = [(title, verdict.outcome, verdict.text) for title, verdict in report.steps]
     signature = f"{_cell(report.signed)}, {report.ended}" if report.signed else "Not signed."
     parts = [
         [f"# Checkout of robot {_cell(report.robot)}", "", _headline(report)],
@@ -74,9 +66,9 @@ def render(report: Report) -> str:
         ["## Steps", ""],
         _table(("step", "result", "finding"), steps),
         *(
-            [f"### {_cell(each.title)}", "", *_table(("measured", "value"), each.verdict.data)]
-            for each in report.steps
-            if each.verdict.data
+            [f"### {_cell(title)}", "", *_table(("measured", "value"), verdict.data)]
+            for title, verdict in report.steps
+            if verdict.data
         ),
         ["## Effective settings", ""],
         _table(("setting", "value", "from"), report.settings),

@@ -94,7 +94,9 @@ def drive(
 
     end_s, log_file = time.monotonic() + TIMEOUT_S, options.out / LOG
     with log_file.open("wb") as written, contextlib.ExitStack() as ends:
-        supervisor = Supervisor(traced(options), written)
+        processes = dict(commands(options))
+        processes["sim"] = [*processes["sim"], "--trace", str(options.out / TRACE)]
+        supervisor = Supervisor([*processes.items()], written)
         ends.callback(supervisor.end)
 
         def check() -> None:
@@ -107,7 +109,12 @@ def drive(
         # Its session closes before the processes end: the last requests are zeros.
         robot = ends.enter_context(connected(config, check))
         robot.odometry.on(odometry.append)
-        lap = Lap(robot, pace, show=show, check=check)
+        lap = Lap(
+            robot,
+            pace,
+            show=lambda step, answer: print(f"    {answer}" if answer else f"  {step}", flush=True),
+            check=check,
+        )
         with contextlib.suppress(LapEndedError):
             lap.drive()
     return lap
@@ -125,11 +132,6 @@ def connected(config: Everything, check: Callable[[], None]) -> "t2.Robot":
             time.sleep(POLL_S)
 
 
-def show(step: str, answer: str) -> None:
-    """Print the start of a step, or safety's answer to it."""
-    print(f"    {answer}" if answer else f"  {step}", flush=True)
-
-
 def prepared(out: Path) -> tuple[Path, Path]:
     """Create the output folder; return its log, empty, and its trace, deleted."""
     log_file, trace_file = out / LOG, out / TRACE
@@ -140,14 +142,6 @@ def prepared(out: Path) -> tuple[Path, Path]:
     except OSError as error:
         raise ConfigError(f"--out {out}: cannot be written: {error.strerror}") from None
     return log_file, trace_file
-
-
-def traced(options: argparse.Namespace) -> list[tuple[str, list[str]]]:
-    """Return the processes of ``t2 up``, with a simulator that writes a trace."""
-    trace = ["--trace", str(options.out / TRACE)]
-    return [
-        (name, [*command, *(trace if name == "sim" else [])]) for name, command in commands(options)
-    ]
 
 
 def own_ports() -> list[str]:

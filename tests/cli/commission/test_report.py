@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from cli.commission.report import Checked, Report, Verdict, failed, judged, render
+from cli.commission.report import Report, Verdict, failed, judged, render
 
-GOOD = Checked("Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
-SKIPPED = Checked("Turn", Verdict("skipped", "no blocks | today\nsorry"))
+GOOD = ("Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
+SKIPPED = ("Turn", Verdict("skipped", "no blocks | today\nsorry"))
 REPORT = Report(
     robot="001",
     date="2026-03-01 10:00:00 +0800",
@@ -77,9 +77,9 @@ def test_conditions_that_do_not_pass(change: dict[str, object], text: str) -> No
 
 
 def test_a_partial_checkout_may_pass() -> None:
-    report = replace(REPORT, left_out=["crc", "sonar"])
+    report = replace(REPORT, left_out=["bumper", "sonar"])
     assert report.passed
-    assert "Partial checkout, left out: crc, sonar." in render(report)
+    assert "Partial checkout, left out: bumper, sonar." in render(report)
 
 
 def test_a_verdict_is_failed_by_any_problem() -> None:
