@@ -19,7 +19,7 @@ from common.messages import (
 )
 from common.motion import Twist
 from services.safety.config import Safety
-from services.safety.core.causes import FAILURES, RULES, Held, latched
+from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
 from services.safety.core.inputs import Inputs
 from tests.safety.policy_fixture import TICK_S, PolicyFixture, hit, link
 
@@ -117,7 +117,12 @@ def test_inputs_that_fail_again_and_again_latch() -> None:
     assert latched(fixture.state.latches) == ("flapping",)
     assert fixture.drive().command == "stop"
     fixture.tick(20)
+    fixture.estop()
+    fixture.tick(5)
+    assert fixture.reset(fixture.state.latches["estop"].id) == ""
+    assert fixture.state.fault_budget.remaining < FAILURES
     assert fixture.reset() == ""
+    assert fixture.state.fault_budget == FaultBudget()
     assert fixture.drive(seconds=1.0).command == "run"
 
 
