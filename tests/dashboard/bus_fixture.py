@@ -21,7 +21,6 @@ class Peer:
     def __init__(self, loop: Loop) -> None:
         self.requests: list[Drive] = []
         self.estops: list[int] = []
-        self.alive: list[str] = []
         self.safe = True
         self.latched: tuple[str, ...] = ()
         self.causes: tuple[Cause, ...] = ()
@@ -42,9 +41,6 @@ class Peer:
             keys.ESTOP_KEEPALIVE, lambda it: self.kept_alive.append(it.message), source="web"
         )
         bus.on_any(keys.estop_key("001"), self.estops.append)
-        bus.watch_live(
-            keys.live_key("001", "dashboard", "*"), lambda key, _: self.alive.append(key)
-        )
         bus.live(keys.live_key("two words", "bridge", "x"))
         bus.live(keys.live_key("002", "bridge", "x"))
 

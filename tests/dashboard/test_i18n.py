@@ -9,7 +9,7 @@ import pytest
 from common.messages import Direction, FaultName, LinkState, Verdict
 from services.dashboard import server
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.i18n import LANGUAGES, PHRASES, PLACEHOLDER, TEXTS, table
+from services.dashboard.i18n import PHRASES, PLACEHOLDER, TEXTS
 from services.safety.core.causes import RULES
 from tools.docs import DOCS
 
@@ -100,12 +100,6 @@ def test_both_languages_have_a_text(key: str) -> None:
     if key != "language":  # each names the other one
         assert not HAN.search(english)
         assert HAN.search(chinese)
-
-
-def test_the_table_has_the_texts_by_language() -> None:
-    both = table()
-    assert tuple(both) == LANGUAGES
-    assert (both["en"]["estop"], both["zh"]["estop"]) == TEXTS["estop"]
 
 
 @pytest.mark.parametrize("english", PHRASES)

@@ -7,10 +7,11 @@ import pytest
 from common import keys
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER, ESTOP_TICKS, OVERRULED_TICKS
-from common.messages import Cause, Direction, Drive, ResetDone, ResetRequest
+from common.messages import Direction, Drive, ResetDone, ResetRequest
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
 from services.dashboard.robot import Robot
+from tests.dashboard.servers import CONTACT, NEWER
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
 
@@ -60,13 +61,6 @@ class RobotFixture:
 @pytest.fixture
 def fixture() -> RobotFixture:
     return RobotFixture()
-
-
-def test_who_drives(fixture: RobotFixture) -> None:
-    fixture.ticks(40, "web")
-    driver = fixture.robot.driver_state()
-    assert (driver.id, driver.other, driver.may) == ("1", None, True)
-    assert driver.hold is HoldState.HELD
 
 
 def test_a_driver_who_is_overruled_must_let_go_first(fixture: RobotFixture) -> None:
@@ -154,10 +148,6 @@ def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.Monke
     fixture.robot.estop("a test")
     fixture.ticks(ESTOP_TICKS, None)
     assert fixture.notices[1:] == [("error", "estop_denied", "")]
-
-
-CONTACT = Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=11)
-NEWER = Cause(name="contact", action="brake", age=0.1, text="The bumper was hit.", id=12)
 
 
 @pytest.fixture

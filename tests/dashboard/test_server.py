@@ -127,16 +127,12 @@ def test_a_stop_of_an_unknown_robot_is_refused(server: Server, ada: Client) -> N
     assert "made-up" not in ada.wait_for("slow")["robots"]
 
 
-@pytest.mark.parametrize("text", ["", "{}", '{"k":"hold"}', "x" * 5000, '{"x":' + "[" * 2000])
+@pytest.mark.parametrize("text", ["{}", "x" * 5000, '{"x":' + "[" * 2000])
 def test_an_invalid_message_closes_the_connection(server: Server, text: str) -> None:
     with connected(server) as it:
         it.socket.send(text)
         with pytest.raises(ConnectionClosed):
             it.wait_for("never")
-
-
-def test_the_dashboard_is_alive_on_the_bus(peer: Peer) -> None:
-    wait_until(lambda: peer.alive, "presence")
 
 
 def test_a_signal_sends_zeros_and_ends_the_process(

@@ -86,29 +86,23 @@ def test_the_fast_snapshot() -> None:
     assert (seen.connected, seen.link, seen.bumper) == (True, "up", True)
     assert (seen.measured, seen.allowed) == ((0.5, 0.1), (0.0, 0.0))
     assert (seen.pose, seen.epoch) == ((1.0, 2.0, 0.3), 3)
-    assert seen.tones == ("clear",) * 8
+    assert seen.requested == (0.7, 0.2)  # of the driving source
     assert seen.safety is not None
     assert (seen.safety.verdict, seen.safety.latched) == ("brake", ("contact",))
     assert seen.safety.release == RELEASE
     assert seen.driver == NOBODY
 
 
-def test_the_request_is_that_of_the_driving_source() -> None:
-    assert fast(full()).requested == (0.7, 0.2)
-
-
-@pytest.mark.parametrize("telemetry", [TelemetryCache(), full()], ids=["never", "long ago"])
-def test_old_values_are_not_shown(telemetry: TelemetryCache) -> None:
-    seen = fast(telemetry, at=AT + 10 * NS_PER_S)
+def test_old_values_are_not_shown() -> None:
+    seen = fast(full(), at=AT + 10 * NS_PER_S)
     known = (seen.measured, seen.requested, seen.allowed, seen.pose, seen.bumper, seen.link)
     assert known == (None,) * 6
     assert seen.safety is None
     assert seen.tones == ("dark",) * 8
 
 
-@pytest.mark.parametrize("number", [math.nan, math.inf])
-def test_non_finite_values_are_not_shown(number: float) -> None:
-    telemetry = full()
+def test_non_finite_values_are_not_shown() -> None:
+    telemetry, number = full(), math.inf
     telemetry.update("tel/bridge/velocity", Velocity(linear=0.1, angular=number), AT)
     telemetry.update(
         "tel/bridge/ultrasonic", Ultrasonic(ranges=(number,) * 8, status=("ok",) * 8), AT
@@ -116,14 +110,6 @@ def test_non_finite_values_are_not_shown(number: float) -> None:
     seen = fast(telemetry)
     assert (seen.measured, seen.ranges) == (None, (None,) * 8)
     assert seen.tones == ("dark",) * 8
-
-
-def test_without_a_driving_source_there_is_no_request() -> None:
-    telemetry = full()
-    state = telemetry.newest(keys.SAFETY, AT)
-    assert state is not None
-    telemetry.update("tel/safety/state", msgspec.structs.replace(state, source=None), AT)
-    assert fast(telemetry).requested is None
 
 
 def test_the_slow_snapshot() -> None:

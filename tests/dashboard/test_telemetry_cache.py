@@ -10,7 +10,6 @@ from services.dashboard.telemetry_cache import (
     STATES_MAX,
     TelemetryCache,
     max_age_s,
-    path_of,
 )
 from tests.factories import safety_state
 
@@ -22,12 +21,6 @@ HEALTH = Health(
 
 def event(number: int) -> Event:
     return Event(name="n", level="info", text=str(number), t_ns=number)
-
-
-def test_an_empty_cache() -> None:
-    telemetry = TelemetryCache()
-    assert telemetry.newest(keys.BUMPER, 0) is None
-    assert telemetry.services() == []
 
 
 def test_the_newest_message_until_it_is_too_old() -> None:
@@ -93,7 +86,3 @@ def test_a_state_of_safety_is_found_by_its_heartbeat_while_it_is_new() -> None:
     assert telemetry.shown(2) == Latest(states[1], 20)
     assert telemetry.shown(STATES_MAX + 1) == Latest(states[-1], 10 * (STATES_MAX + 1))
     assert [telemetry.shown(number) for number in (0, 1, STATES_MAX + 2)] == [None] * 3
-
-
-def test_the_path_behind_the_robot() -> None:
-    assert path_of("t2/v1/001/tel/bridge/driver/left") == "tel/bridge/driver/left"
