@@ -18,10 +18,11 @@ def captured(crc: str, covers: Covers) -> list[bytes]:
     return [framing.pack(frame) for frame in (*TELLING, DistanceQuery(), BumperQuery())]
 
 
-def test_each_16_bit_crc_is_found_again() -> None:
-    assert {"crc-16", "modbus", "xmodem", "kermit", "x-25"} <= set(names())
+def test_a_crc_is_found_again() -> None:
+    usual = {"crc-16", "modbus", "xmodem", "kermit", "x-25"}
+    assert usual <= set(names())
     for covers in get_args(Covers):
-        for crc in names():
+        for crc in usual:
             fits = identify(captured(crc, covers))
             assert fits[0] == Fit(crc, covers, 5)
             text = f'set: wire.crc = "{crc}", wire.crc_covers = "{covers}"'
