@@ -4,6 +4,7 @@ A slow browser therefore never delays a zero request. The end of either ends the
 stops the server, then the loop sends its final zeros; an exception in the loop stops the server.
 """
 
+import secrets
 import signal
 import ssl
 import sys
@@ -16,8 +17,8 @@ from common.config import Loaded
 from common.errors import ConfigError
 from common.service import STOP_TIMEOUT_S, Node
 from common.systemd import Systemd
+from services.dashboard.auth import TOKEN_MIN, Credentials
 from services.dashboard.config import Dashboard, DashboardConfig
-from services.dashboard.credentials import TOKEN_MIN, Credentials, new_token
 from services.dashboard.fleet import Fleet
 from services.dashboard.server import listen, reachable, serving
 from services.dashboard.websocket_hub import WebSocketHub
@@ -98,7 +99,7 @@ class Host:
 def token(settings: Dashboard) -> str:
     """Return the required token: none for this host alone, else the file's or a new one."""
     if not settings.token_file:
-        return "" if settings.is_local else new_token()
+        return "" if settings.is_local else secrets.token_urlsafe(12)
     try:
         given = Path(settings.token_file).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeError) as error:

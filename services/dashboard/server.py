@@ -19,10 +19,9 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
 from common.errors import LinkError
-from services.dashboard.auth import AuthMiddleware
+from services.dashboard.auth import AuthMiddleware, Credentials
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import Dashboard
-from services.dashboard.credentials import Credentials
 from services.dashboard.i18n import phrases, table
 from services.dashboard.listener import BACKLOG, Listener
 from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub

@@ -8,7 +8,6 @@ import * as phrases from "./phrases.js";
 import * as panels from "./panels.js";
 import * as sonarView from "./sonar_view.js";
 import * as stateBar from "./state_bar.js";
-import * as theme from "./theme.js";
 import * as trail from "./trail.js";
 
 const { toast, confirm } = notices;
@@ -152,7 +151,6 @@ function showTexts() {
   document.documentElement.lang = language;
   for (const it of document.querySelectorAll("[data-t]")) it.textContent = t(it.dataset.t);
   for (const it of document.querySelectorAll("[data-t-placeholder]")) it.placeholder = t(it.dataset.tPlaceholder);
-  for (const it of document.querySelectorAll("[data-t-title]")) it.title = t(it.dataset.tTitle);
   if (slow) panels.showSlow(slow, t);
   panels.showEvents(events, t, language);
   drawn = undefined;
@@ -184,7 +182,6 @@ function begin() {
   on("take", () => send({ k: "take", force: false }));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
-  theme.begin(() => { drawn = undefined; });
   $("language").onclick = () => {
     language = language === "en" ? "zh" : "en";
     localStorage.setItem("t2.language", language);
