@@ -197,6 +197,15 @@ def test_a_motion_of_half_a_second_renews_the_limit(ticks: int, renewed: bool) -
     assert (after_ns == due_ns + ticks * TICK_NS) != renewed
 
 
+def test_a_vehicle_that_stood_has_a_new_limit() -> None:
+    board = stopping(0.3)
+    board.run(0.1, 0.3)
+    board.step(0.0, moves=True)
+    board.step(0.3, moves=True)
+    assert board.state.due_ns is None
+    assert board.step(0.3).due_ns == board.now_ns + NS_PER_S
+
+
 def test_a_motion_between_begins_the_confirmation_anew() -> None:
     board = stopping(0.4)
     board.run(0.1, 0.4)
