@@ -100,7 +100,7 @@ hostile = st.lists(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(hostile, st.floats(-3.0, 3.0))
 def test_it_never_penetrates_and_is_always_finite(
     said: list[list[Frame] | bytes], heading: float
