@@ -1,11 +1,15 @@
-"""``t2 replay``: play a recording onto the bus, or its raw frames to a bridge."""
+"""``t2 replay``: play a recording onto the bus, or its raw frames to a bridge.
+
+Onto a bus it never plays what moves or stops the vehicle: no drive request, no motion command and
+no emergency stop.
+"""
 
 import argparse
 import ipaddress
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -14,7 +18,6 @@ from typing import Self
 from cli.inspect.addressing import chunks, topic_of
 from cli.inspect.session import BusSession, add_options, open_session, positive, until_interrupt
 from cli.recordings.info import open_recording
-from cli.recordings.selection import is_played, refusal
 from common import keys
 from common.bus.probe import intersects, valid
 from common.cli_args import sources
@@ -26,6 +29,7 @@ from common.settings import Board
 from services.bridge.config import BridgeConfig
 
 CHECK_S = 1.0  # between two checks of the target
+DECIDING = ("bridge", "safety")  # services that act, and on whose messages others act
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -177,6 +181,29 @@ class Pacer:
             if now_s >= due_s:
                 return
             time.sleep(min(due_s - now_s, CHECK_S))
+
+
+def is_played(path: str, alive: Collection[str]) -> bool:
+    """Return whether to play a key below the robot, besides these running services."""
+    moves = path == keys.ESTOP_PATH or any(part.startswith("@") for part in path.split("/"))
+    return not moves and publisher(path) not in alive
+
+
+def publisher(path: str) -> str:
+    """Return the service that publishes a stream or an event; empty for other keys."""
+    kind, _, rest = path.partition("/")
+    return rest.partition("/")[0] if kind in ("tel", "evt") else ""
+
+
+def refusal(robot: str, alive: Collection[str]) -> str:
+    """Return why a replay is refused while these services run; empty if it is allowed."""
+    running = " and ".join(name for name in DECIDING if name in alive)
+    if not running:
+        return ""
+    return (
+        f"robot {robot} has a running {running}: others would take replayed messages for the real "
+        "ones. Stop it, or replay as another robot: --robot replay"
+    )
 
 
 def key_expression(word: str) -> str:

@@ -73,8 +73,21 @@ class Entry:
 
     @property
     def sample(self) -> Sample:
-        """Return the original bytes of the bus; raise ``MessageError`` for a foreign entry."""
-        return decode_sample(self)
+        """Return the sample as it was on the bus; raise ``MessageError`` for a foreign entry."""
+        key, encoding = self.channel.topic, self.channel.encoding
+        try:
+            fields: dict[str, Any] = msgspec.json.decode(self.data, type=dict[str, Any])
+            raw, payload = fields.pop(RAW, None), fields.pop(PAYLOAD, None)
+            deleted = bool(fields.pop(DELETED, False))
+            original = (
+                _codec(encoding).encode(fields)
+                if payload is None
+                else b64decode(payload, validate=True)
+            )
+            frame = None if raw is None else b64decode(raw, validate=True)
+        except UNREADABLE as error:
+            raise MessageError(f"{key}: not written by the recorder: {error}") from None
+        return Sample(key, original, encoding, deleted, frame, self.log_ns, self.log_ns)
 
 
 class Encoder:
@@ -122,27 +135,6 @@ def encode_json(sample: Sample, fields: dict[str, Any]) -> bytes:
     if not same:
         extra[PAYLOAD] = b64encode(sample.payload).decode()
     return msgspec.json.encode(fields | extra) if extra else text
-
-
-def decode_sample(entry: Entry) -> Sample:
-    """Return the sample as it was on the bus; raise ``MessageError`` for a foreign entry."""
-    try:
-        fields: dict[str, Any] = msgspec.json.decode(entry.data, type=dict[str, Any])
-        raw, payload = fields.pop(RAW, None), fields.pop(PAYLOAD, None)
-        deleted = bool(fields.pop(DELETED, False))
-        return Sample(
-            key=entry.channel.topic,
-            payload=_codec(entry.channel.encoding).encode(fields)
-            if payload is None
-            else b64decode(payload, validate=True),
-            encoding=entry.channel.encoding,
-            deleted=deleted,
-            raw=None if raw is None else b64decode(raw, validate=True),
-            received_ns=entry.log_ns,
-            wall_ns=entry.log_ns,
-        )
-    except UNREADABLE as error:
-        raise MessageError(f"{entry.channel.topic}: not written by the recorder: {error}") from None
 
 
 def _codec(encoding: str) -> Any:

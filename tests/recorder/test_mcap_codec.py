@@ -12,7 +12,7 @@ from common.codec import Sample
 from common.errors import MessageError
 from common.messages import Velocity
 from common.settings import Vehicle
-from services.recorder.mcap_codec import JSON, Channel, Encoder, Entry, decode_sample
+from services.recorder.mcap_codec import JSON, Channel, Encoder, Entry
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, bare, sample
 
@@ -67,7 +67,7 @@ def test_a_message_is_json_with_its_schema() -> None:
     ids=repr,
 )
 def test_round_trip_restores_the_bytes(it: Sample) -> None:
-    back = decode_sample(entry(it))
+    back = entry(it).sample
     assert (back.key, back.payload, back.encoding) == (it.key, it.payload, it.encoding)
     assert (back.raw, back.deleted) == (it.raw, it.deleted)
     assert back.wall_ns == it.wall_ns
@@ -76,7 +76,7 @@ def test_round_trip_restores_the_bytes(it: Sample) -> None:
 @given(payload=st.binary(max_size=60), raw=st.none() | st.binary(max_size=9), deleted=st.booleans())
 def test_round_trip_of_arbitrary_bytes(payload: bytes, raw: bytes | None, deleted: bool) -> None:
     for encoding in ("", JSON, codec.encoding(Velocity)):
-        back = decode_sample(entry(bare("tel/mine", payload, encoding, raw=raw, deleted=deleted)))
+        back = entry(bare("tel/mine", payload, encoding, raw=raw, deleted=deleted)).sample
         assert (back.payload, back.raw, back.deleted) == (payload, raw, deleted)
 
 
@@ -96,4 +96,4 @@ def test_views_follow_the_message_and_are_marked() -> None:
 @pytest.mark.parametrize("data", [b"[]", b"{", b'{"_payload": "?"}', b'{"_raw": 5}'])
 def test_foreign_entries_are_rejected(data: bytes) -> None:
     with pytest.raises(MessageError, match="not written by the recorder"):
-        decode_sample(Entry(Channel("a/key", None), data, 0, 0))
+        _ = Entry(Channel("a/key", None), data, 0, 0).sample

@@ -9,6 +9,8 @@ import pytest
 import zenoh
 
 from cli.recordings import replay
+from cli.recordings.replay import is_played, refusal
+from common import keys
 from common import messages as m
 from common.motion import Command
 from common.settings import Vehicle
@@ -155,3 +157,35 @@ def test_a_truncated_recording_is_played_up_to_its_end(path: Path, tool: Tool) -
 @pytest.mark.parametrize("words", [["--rate", "0"], ["--only", "//"], ["--only", "tel//x"]])
 def test_invalid_arguments(path: Path, tool: Tool, words: list[str]) -> None:
     assert tool("replay", str(path), *words).code == 2
+
+
+PATHS = [topic.path.format(service="odom", side="left", source="web") for topic in keys.TOPICS]
+
+
+@pytest.mark.parametrize("path", ["@cmd/motion", "@cmd/drive/web", "@new", "a/@b", "estop"])
+def test_actuation_keys_are_not_played_onto_the_bus(path: str) -> None:
+    assert not is_played(path, ())
+
+
+def test_other_keys_are_played() -> None:
+    assert [path for path in PATHS if not is_played(path, ())] == [p for p in PATHS if p[0] == "@"]
+    assert is_played("tel/mine", ())
+
+
+def test_streams_of_running_services_are_not_played() -> None:
+    paths = ["tel/odom/odometry", "evt/odom", "tel/bridge/velocity", "tel/odometer/x", "srv/odom"]
+    assert [is_played(path, ["odom"]) for path in paths] == [False, False, True, True, True]
+
+
+@pytest.mark.parametrize(
+    ("alive", "named"),
+    [
+        ({"odom", "safety"}, "robot 007 has a running safety: "),
+        ({"bridge", "safety"}, "robot 007 has a running bridge and safety: "),
+        ({"odom", "dashboard", "recorder"}, ""),
+    ],
+)
+def test_replay_is_refused_while_bridge_or_safety_run(alive: set[str], named: str) -> None:
+    why = refusal("007", alive)
+    assert why.startswith(named)
+    assert bool(why) is bool(named)
