@@ -1,4 +1,4 @@
-"""``t2 ls``: the active keys with type and rate; ``--services``: what each session declares.
+"""``t2 ls``: active keys with type, rate, publishers, readers; ``--services``: all sessions.
 
 A key is active if a message arrives on it while the command listens. The sessions come from
 liveliness tokens and from the router's admin space, which lists the sessions that have declared a
@@ -23,12 +23,12 @@ from cli.inspect.session import (
 )
 from cli.inspect.stream_stats import StreamStats
 from common import codec, keys
-from common.bus.probe import Probe
+from common.bus.probe import Probe, intersects
 from common.errors import RobotError
 from common.text import printable
 
 LISTEN_S = 2.0  # two periods of the slowest streams
-HEAD = ("key", "type", "Hz", "of")
+HEAD = ("key", "type", "Hz", "of", "publishers", "readers")
 ROLES = {"publisher": "publishes", "subscriber": "reads", "queryable": "answers"}
 ZENOH_OWN = "@adv"  # declarations of Zenoh itself below a key
 # The router of a robot that connects to a site's router is a peer there.
@@ -70,6 +70,8 @@ def list_keys(session: BusSession, options: argparse.Namespace) -> int:
             kinds[sample.key] = codec.kind_of(sample.encoding)
     if not streams:
         raise RobotError(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
+    found = discover(session.probe, session.robot)
+    warn_if_closed(found)
     rows = []
     for key, stats in sorted(streams.items()):
         topic = topic_of(key)
@@ -78,9 +80,16 @@ def list_keys(session: BusSession, options: argparse.Namespace) -> int:
             "type": kinds[key],
             "hz": stats.rate_hz(),
             "expected_hz": topic.rate_hz if topic else None,
+            "publishers": [each.name for each in found if declares(each.publishes, key)],
+            "readers": [each.name for each in found if declares(each.reads, key)],
         })  # fmt: skip
     output.rows(rows, HEAD, as_cells, as_json=options.json)
     return 0
+
+
+def declares(declared: set[str], key: str) -> bool:
+    """Return whether a key is among these keys, which may have wildcards."""
+    return any(intersects(one, key) for one in declared)
 
 
 def as_cells(row: output.Row) -> list[str]:
@@ -91,6 +100,8 @@ def as_cells(row: output.Row) -> list[str]:
         row["type"] or "?",
         "-" if hz is None else f"{hz:.1f}",
         "" if expected_hz is None else f"{expected_hz:g}" if expected_hz else "change",
+        ", ".join(row["publishers"]) or "?",
+        ", ".join(row["readers"]) or "?",
     ]
 
 
@@ -114,8 +125,7 @@ def list_services(session: BusSession, options: argparse.Namespace) -> int:
     found = discover(session.probe, session.robot)
     if not found:
         raise RobotError("no service found; try `t2 doctor`")
-    if not any(each.reads or each.publishes for each in found):
-        output.warn("t2 ls: the router shows no declarations (its admin space is closed)")
+    warn_if_closed(found)
     rows = [as_json(each, session.robot) for each in found]
     if options.json:
         for row in rows:
@@ -123,6 +133,12 @@ def list_services(session: BusSession, options: argparse.Namespace) -> int:
     else:
         print(printable("\n\n".join(map(as_text, rows)), "\n"))
     return 0
+
+
+def warn_if_closed(found: Sequence[Member]) -> None:
+    """Warn if the router lists no declaration."""
+    if not any(each.reads or each.publishes for each in found):
+        output.warn("t2 ls: the router shows no declarations (its admin space is closed)")
 
 
 def discover(probe: Probe, robot: str) -> list[Member]:

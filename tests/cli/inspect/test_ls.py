@@ -24,7 +24,10 @@ def bridge(buses: BusFixture) -> Bus:
     return pretend(buses, "bridge", {keys.BUMPER: lambda: Bumper(pressed=True)})
 
 
-def test_keys_with_type_and_rate(buses: BusFixture, bridge: Bus, tool: Tool) -> None:
+def test_keys_with_type_rate_publishers_and_readers(
+    buses: BusFixture, bridge: Bus, tool: Tool
+) -> None:
+    pretend(buses, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
     stranger, key = buses.session(), f"t2/v1/{buses.robot}/tel/x"
     buses.loop.post(lambda: buses.loop.every(0.1, lambda _: stranger.put(key, b"\x01")))
     found = {line["key"]: line for line in tool("ls", "--duration", "1").lines}
@@ -32,10 +35,12 @@ def test_keys_with_type_and_rate(buses: BusFixture, bridge: Bus, tool: Tool) -> 
     row = found["tel/bridge/bumper"]
     assert (row["type"], row["expected_hz"]) == ("Bumper", 50)
     assert row["hz"] > 1
+    assert (row["publishers"], row["readers"]) == (["bridge"], ["safety"])
     assert (found["tel/x"]["type"], found["tel/x"]["expected_hz"]) == ("", None)
     shown = tool("ls", "bumper", "--duration", "0.5", text=True).out.splitlines()
-    assert shown[0].split() == ["key", "type", "Hz", "of"]
+    assert shown[0].split() == ["key", "type", "Hz", "of", "publishers", "readers"]
     assert shown[1].split()[::3] == ["tel/bridge/bumper", "50"]
+    assert shown[1].split()[4:] == ["bridge", "safety"]
 
 
 def test_services(buses: BusFixture, bridge: Bus, tool: Tool) -> None:
