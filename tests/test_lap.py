@@ -11,8 +11,6 @@ from t2.messages import Odometry
 from tests.cli.demo.lap_fixture import as_client
 from tests.simulated_robot import SimulatedStack, simulated_robot
 
-pytestmark = pytest.mark.no_cover  # whole laps; the cores have tests of their own
-
 
 @cache
 def driven() -> tuple[SimulatedStack, Lap, list[tuple[str, str]]]:

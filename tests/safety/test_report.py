@@ -14,7 +14,7 @@ from services.safety.report import (
     signature,
     transitions,
 )
-from tests.safety.policy_fixture import PolicyFixture
+from tests.safety.core.policy_fixture import PolicyFixture
 
 
 def noted(fixture: PolicyFixture, event: Event | None = None) -> list[str]:

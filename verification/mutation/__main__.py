@@ -1,6 +1,7 @@
 """``python -m verification.mutation [FILE]...``: mutation testing of the cores.
 
-The default is all cores; ``--changed`` selects those that differ from the fork point of the branch.
+The default is all cores; ``--changed`` selects those that differ from the fork point of the branch,
+and ``--tests`` prints the tests of all cores instead.
 Exit code 1 when a mutant survives that is not marked as equivalent, or a marked one was killed.
 """
 
@@ -21,6 +22,9 @@ def main(words: list[str]) -> None:
     """Choose files, test them, compare with the marks."""
     os.chdir(ROOT)
     found = cores()
+    if words == ["--tests"]:
+        print(*sorted({test for tests in found.values() for test in tests}))
+        return
     if unknown := set(words) - {"--changed", *found}:
         sys.exit(f"mutants: no core: {', '.join(sorted(unknown))}")
     chosen = changed(found) if words == ["--changed"] else {f: found[f] for f in words or found}

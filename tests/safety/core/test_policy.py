@@ -21,7 +21,7 @@ from common.motion import Twist
 from services.safety.config import Safety
 from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
 from services.safety.core.inputs import Inputs
-from tests.safety.policy_fixture import TICK_S, PolicyFixture, hit, link
+from tests.safety.core.policy_fixture import TICK_S, PolicyFixture, hit, link
 
 
 @pytest.mark.parametrize(

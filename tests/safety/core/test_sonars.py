@@ -24,7 +24,7 @@ from services.safety.core.sonars import (
     updated,
 )
 from services.safety.report import _doubts
-from tests.safety.policy_fixture import FREE, NO_ECHO
+from tests.safety.core.policy_fixture import FREE, NO_ECHO
 
 GOOD = Sonar(distance=1.0, fault="")
 

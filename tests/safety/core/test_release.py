@@ -9,7 +9,7 @@ from common.freshness import NS_PER_S
 from common.messages import Direction, ReleaseRequest
 from services.safety.core.causes import BY_NAME, latched
 from services.safety.core.operator_requests import BUMPER_FREE, LET_GO, room
-from tests.safety.policy_fixture import (
+from tests.safety.core.policy_fixture import (
     DIRECTIONS,
     USED_UP_TEXT,
     PolicyFixture,

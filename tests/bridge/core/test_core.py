@@ -15,7 +15,7 @@ from common.wire.frame import HEADER, Frame, Side
 from common.wire.framing import Framing, crc_function
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Send
-from tests.bridge.core_fixture import (
+from tests.bridge.core.core_fixture import (
     BOOT,
     CLEAR,
     FRAMING,

@@ -11,7 +11,7 @@ from common.messages import Velocity
 from services.odom.config import Odom
 from services.odom.core.estimator import SEGMENTS_MAX, START, Estimator, SlipDetector
 from services.odom.core.pose import ArcSegment, Pose
-from tests.odom.odom_fixture import (
+from tests.odom.core.odom_fixture import (
     EXACT,
     TICK_NS,
     Board,

@@ -18,7 +18,7 @@ from services.odom.core.pose import (
     halved,
     total,
 )
-from tests.odom.odom_fixture import apart
+from tests.odom.core.odom_fixture import apart
 
 distances = st.floats(-3.0, 3.0)
 turns = st.floats(-6.0, 6.0)

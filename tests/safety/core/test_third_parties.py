@@ -5,7 +5,7 @@ import pytest
 from common.motion import STILL
 from services.safety.config import LimitSource, Safety
 from services.safety.core.operator_requests import LET_GO
-from tests.safety.policy_fixture import PolicyFixture
+from tests.safety.core.policy_fixture import PolicyFixture
 
 LEASE_S, LEASE_NS = 0.5, 500_000_000
 SOURCES = {

@@ -6,7 +6,7 @@ import pytest
 
 from common.messages import SONAR_NAMES
 from common.motion import Twist
-from tests.safety.policy_fixture import TICK_S, PolicyFixture
+from tests.safety.core.policy_fixture import TICK_S, PolicyFixture
 
 # --- zones ----------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from common.freshness import NS_PER_S
 from common.messages import Drive, Switches
 from services.safety.config import Safety
 from services.safety.core.inputs import DriveRequest
-from tests.safety.policy_fixture import PolicyFixture
+from tests.safety.core.policy_fixture import PolicyFixture
 
 
 def test_requests_are_ramped() -> None:

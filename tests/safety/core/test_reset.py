@@ -12,7 +12,7 @@ from common.freshness import NS_PER_S
 from services.safety.core.causes import GOOD_SAMPLES, latched
 from services.safety.core.inputs import Reset
 from services.safety.core.state import Reply
-from tests.safety.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit, link
+from tests.safety.core.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit, link
 
 UNKNOWN = "Standstill is not confirmed: no velocity is received."
 

@@ -10,7 +10,7 @@ from common.messages import Mileage
 from services.odom.config import Odom
 from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, NoiseModel
 from services.odom.core.pose import ArcSegment, ProcessNoise
-from tests.odom.odom_fixture import OdomFixture, started
+from tests.odom.core.odom_fixture import OdomFixture, started
 
 ODOM = Odom(
     hold=0.1,

@@ -23,7 +23,7 @@ from services.bridge.core.readiness import (
     RelayStatus,
 )
 from services.relay.core import REPORT, Relay
-from tests.bridge.core_fixture import MS, STANDS, Bench, events, frames, motions, published
+from tests.bridge.core.core_fixture import MS, STANDS, Bench, events, frames, motions, published
 
 SILENCE = 200 * MS
 CONFIGURED = "board.relay_port=4010"

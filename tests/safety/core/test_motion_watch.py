@@ -18,7 +18,7 @@ from services.safety.core.motion_watch import (
     Standstill,
     Supervisor,
 )
-from tests.safety.policy_fixture import TICK_S
+from tests.safety.core.policy_fixture import TICK_S
 
 TICK_NS = round(TICK_S * NS_PER_S)
 BOUNDS = Bounds(deceleration=0.6, tolerance=0.3, against=0.1, patience_s=0.3)

@@ -3,7 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
-from tests.safety.policy_fixture import TICK_S, PolicyFixture
+from tests.safety.core.policy_fixture import TICK_S, PolicyFixture
 
 
 def until(fixture: PolicyFixture, command: str) -> None:

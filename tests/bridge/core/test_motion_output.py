@@ -14,7 +14,7 @@ from services.bridge.core.lease import Lease
 from services.bridge.core.motion_output import MotionOutput
 from services.bridge.core.output import Event, Send
 from services.bridge.core.translate import Translator
-from tests.bridge.core_fixture import BOOT, MS, NOW, SAFETY
+from tests.bridge.core.core_fixture import BOOT, MS, NOW, SAFETY
 
 SETTINGS = Bridge(deceleration=0.6, angular_deceleration=2.0)
 END = NOW + 200 * MS + 1  # of a lease from NOW on
