@@ -7,18 +7,13 @@ import ssl
 import time
 import urllib.request
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
-from ipaddress import ip_address
 from pathlib import Path
 
 import pytest
-from cryptography import x509
-from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.x509.oid import NameOID
 from websockets.exceptions import ConnectionClosed
 
 from tests.dashboard.bus_fixture import Peer
+from verification.harness.certificates import Site
 from verification.harness.dashboard import Client, Server, connected, dashboard, half_open
 from verification.harness.waiting import wait_until
 
@@ -70,9 +65,12 @@ def test_an_emergency_stop_beside_requests_that_never_end(server: Server, peer: 
 def test_an_emergency_stop_beside_tls_handshakes_that_never_end(
     endpoint: str, peer: Peer, tmp_path: Path
 ) -> None:
-    certificate, key = self_signed(tmp_path)
-    sets = (f"dashboard.certificate={certificate}", f"dashboard.private_key={key}")
-    context = ssl.create_default_context(cafile=certificate)
+    member = Site(tmp_path / "keys").member("robot", "001", "--address", "127.0.0.1")
+    sets = (
+        f"dashboard.certificate={member.certificate}",
+        f"dashboard.private_key={member.private_key}",
+    )
+    context = ssl.create_default_context(cafile=member.ca)
     with dashboard(endpoint, tmp_path, *sets, tls=context) as server:
         resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, (FILES, FILES))
         with silent(server, HALF_OPEN):
@@ -87,33 +85,3 @@ def test_a_viewer_that_floods_is_disconnected(server: Server) -> None:
 
     with connected(server) as it, pytest.raises((ConnectionClosed, OSError)):
         flood(it)
-
-
-def self_signed(folder: Path) -> tuple[Path, Path]:
-    """Write a certificate for 127.0.0.1 and its key."""
-    key = ec.generate_private_key(ec.SECP256R1())
-    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "127.0.0.1")])
-    now = datetime.now(UTC)
-    made = (
-        x509.CertificateBuilder()
-        .subject_name(name)
-        .issuer_name(name)
-        .public_key(key.public_key())
-        .serial_number(x509.random_serial_number())
-        .not_valid_before(now - timedelta(hours=1))
-        .not_valid_after(now + timedelta(hours=1))
-        .add_extension(
-            x509.SubjectAlternativeName([x509.IPAddress(ip_address("127.0.0.1"))]), critical=False
-        )
-        .sign(key, hashes.SHA256())
-    )
-    files = folder / "server.pem", folder / "server.key"
-    files[0].write_bytes(made.public_bytes(serialization.Encoding.PEM))
-    files[1].write_bytes(
-        key.private_bytes(
-            serialization.Encoding.PEM,
-            serialization.PrivateFormat.PKCS8,
-            serialization.NoEncryption(),
-        )
-    )
-    return files

@@ -72,35 +72,10 @@ def test_a_disconnect_ends_the_hold(server: Server, peer: Peer) -> None:
         assert it.next_snapshot()["driver"]["id"] is None
 
 
-def test_a_silent_safety_ends_the_hold(ada: Client, peer: Peer) -> None:
-    ada.take_control()
-    peer.requests.clear()
-    drive(ada, peer)
-    peer.safe = False
-    while (snapshot := ada.next_snapshot())["driver"]["hold"] != "lapsed":
-        ada.send("hold", echo=echo_of(snapshot), **HOLD)
-    wait_until(lambda: peer.zeros() >= 3, "zeros")
-
-
 def test_any_viewer_may_stop_and_the_stop_is_repeated(ada: Client, peer: Peer) -> None:
     peer.estops.clear()
     ada.send("estop")
     wait_until(lambda: len(peer.estops) > 5, "stops, again and again")
-
-
-def test_a_stop_by_post_needs_no_websocket(server: Server, peer: Peer) -> None:
-    peer.estops.clear()
-    post_stop(server, "001")
-    wait_until(lambda: peer.estops, "a stop")
-
-
-def post_stop(server: Server, robot: str) -> None:
-    """Stop a robot by POST."""
-    request = urllib.request.Request(
-        f"{server.url}estop/{robot}", method="POST", headers={"Origin": server.url.rstrip("/")}
-    )
-    with urllib.request.urlopen(request) as answer:
-        assert answer.status == 200
 
 
 def test_each_robot_has_a_page(server: Server, ada: Client) -> None:

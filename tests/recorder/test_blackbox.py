@@ -31,13 +31,6 @@ def test_old_samples_are_dropped() -> None:
     assert buffer.size == 3 * (1 + OVERHEAD)
 
 
-def test_the_oldest_samples_are_dropped_above_the_size_limit() -> None:
-    buffer = RingBuffer(100 * NS_PER_S, 3 * (OVERHEAD + 10))
-    for number in range(9):
-        buffer.add(bare("tel/x", b"12345", raw=b"%05d" % number))
-    assert [each.raw for _, each in buffer.since(0)] == [b"00006", b"00007", b"00008"]
-
-
 @pytest.mark.parametrize("count", [1, 100])
 def test_a_flood_on_one_key_removes_no_sample_of_the_others(files: Files, count: int) -> None:
     """It also stays within the size limit while a dump waits to be written."""

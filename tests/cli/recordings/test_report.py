@@ -87,7 +87,6 @@ def test_a_truncated_recording_has_a_warning(file: Path) -> None:
     [
         ("empty.mcap", [], "empty.mcap: contains no messages of the bus"),
         ("lap.mcap", ["--out", "{folder}/lap.mcap"], "is the recording itself"),
-        ("lap.mcap", ["--out", "{folder}/no/lap.html"], "cannot be written: No such file"),
         ("lap.mcap", ["{folder}/a.mcap", "--out", "a.html"], "and there are 2 recordings"),
     ],
 )
