@@ -13,7 +13,7 @@ class Recorder(settings.Section, frozen=True, kw_only=True):
     folder: Annotated[str, Meta(min_length=1)] = "recordings"  # created if missing
     everything: bool = False  # record continuously, not only after a latch
     free: Annotated[float, Meta(ge=1.0, le=1_000_000.0)] = 1000.0  # MB to keep free on the disk
-    make_room: bool = True  # remove the oldest recordings; see retention.py
+    make_room: bool = True  # remove the oldest recordings; see storage.py
 
 
 class RecorderConfig(settings.Shared, frozen=True, kw_only=True):

@@ -12,8 +12,7 @@ from common.service import Node
 from services.recorder.blackbox import BlackBox
 from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Encoder
-from services.recorder.retention import StoredFile
-from services.recorder.storage import MB, Storage
+from services.recorder.storage import MB, Storage, StoredFile
 from services.recorder.writer import RecordingWriter, RollingWriter
 
 # `**` does not match chunks that begin with "@": two expressions cover all keys.

@@ -10,8 +10,7 @@ from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.reader import Reader
-from services.recorder.retention import StoredFile
-from services.recorder.storage import MB, Storage
+from services.recorder.storage import MB, Storage, StoredFile
 from services.recorder.writer import RecordingWriter
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, MONO_NS, sample
