@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from cli.settings import Everything
 from common import realtime
+from common.config import flatten
 from tests.cli.processes import PATIENCE_S, running, sets
 from tests.cli.stack import STACK, ports, starts
 from verification.harness.waiting import wait_until
@@ -65,6 +67,14 @@ def test_compose_gives_each_container_its_rights_only(overlays: tuple[str, ...])
     # deploy/nftables/t2.nft drops the traffic of containers on the board's network.
     for file in ("compose.yaml", *overlays):
         assert "10.7.5." not in (ROOT / file).read_text(encoding="utf-8"), file
+
+
+def test_the_recipes_set_existing_settings() -> None:
+    known = {name for name, _ in flatten(Everything())}
+    files = [ROOT / "compose.yaml", *(it for it in (ROOT / "deploy").rglob("*.*") if it.is_file())]
+    for file in files:
+        for name in re.findall(r"\bT2__(\w+)[:=]", file.read_text(encoding="utf-8")):
+            assert name.lower().replace("__", ".") in known, f"{file}: {name}"
 
 
 def test_the_wheel_contains_what_ships(tmp_path: Path) -> None:
