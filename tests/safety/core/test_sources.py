@@ -132,6 +132,12 @@ def test_reasons_of_refusal(
     assert accept(*given, Admission(BEAT, AGE_NS, now_ns)) == reason
 
 
+def test_a_repeated_number_is_refused() -> None:
+    assert request(request(DRIVES)[0], 1)[1] == "seq_not_rising"
+    assert limit(limit(LIMITS)[0], None, 1)[1] == "seq_not_rising"
+    assert keep(keep(KEPT)[0], 1)[1] == "seq_not_rising"
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_values_that_are_not_finite_are_refused(value: float) -> None:
     assert request(DRIVES, linear=value) == (DRIVES, "not_finite")
@@ -282,6 +288,14 @@ def test_zero_is_a_protective_stop(
     assert not next(limits.observations(LEASE_NS + 1)).present
     both, _ = limit(limit(LIMITS, 0.0, reason="dog")[0], 0.0, source="fleet")
     assert next(both.observations(0)).text == "Stopped by lidar: dog, fleet."
+
+
+def test_all_silent_sources_are_named() -> None:
+    needed = LimitSource(lease=LEASE_S, silence="stop")
+    _, silent = SpeedLimits({"lidar": needed, "person": needed}).observations(0)
+    assert (silent.name, silent.text) == (
+        "limit_silent", "No speed limit arrives of lidar, person.",
+    )  # fmt: skip
 
 
 def test_states_of_limits() -> None:
