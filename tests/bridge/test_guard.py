@@ -83,6 +83,7 @@ def test_a_bridge_that_was_only_held_up_lives_on() -> None:
 def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(bridge: BridgeFixture) -> None:
     bridge.drive()
     first = bridge_pid(bridge.process)
+    assert os.getsid(first) == first  # a kill of the guard's session spares the bridge
     bridge.process.kill()
     bridge.board.wait_for(MotionKind.STOP)
     wait_until(lambda: not (PROC / str(first)).exists(), "the end of the bridge")

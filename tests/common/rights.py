@@ -12,8 +12,6 @@ PATIENCE_S = 60
 
 PRELUDE = "from common import realtime as r; import os, threading, resource; "
 
-LIMITS = "print(resource.getrlimit(resource.RLIMIT_RTTIME)[0])"
-
 
 def output_of(script: str) -> list[str]:
     """Run a script in an ordinary process; return its words."""

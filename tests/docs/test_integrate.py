@@ -13,7 +13,6 @@ from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.timed
 
-RUST = ROOT / "examples" / "rust"
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "out" / "rust"))
 RUST_MARKS = pytest.mark.skipif(
     not (TARGET / "debug" / "drive").exists(), reason="not compiled: make rust-example"

@@ -8,7 +8,6 @@ from sim.geometry import Pose, Rectangle, Segment, ray
 
 BODY = Rectangle(1.0, 0.5)
 ORIGIN = Pose(0.0, 0.0, 0.0)
-NORTH = Pose(0.0, 0.0, math.pi / 2)
 
 coordinates = st.floats(-10.0, 10.0)
 segments = st.builds(Segment, coordinates, coordinates, coordinates, coordinates)

@@ -9,8 +9,6 @@ from sim.requests import Driver, Flood, Freeze, PowerCycle, Wire
 from sim.simulation import CATCH_UP_NS
 from tests.sim.sim_fixture import PORTS, START_NS, WALL_AHEAD, SimFixture, model
 
-LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)
-
 
 def test_velocity_streams_to_both_ports_from_power_on() -> None:
     sim = SimFixture()

@@ -323,8 +323,6 @@ def test_it_is_remembered_until_a_sonar_sees_farther() -> None:
 
 # --- overrides of faulty sonars ---------------------------------------------------------------
 
-ALL: set[int] = {2, 3}
-
 
 def test_a_neutral_request_counts_once_the_fault_was_shown_for_a_second() -> None:
     overrides = SonarOverrides().updated({2}, {"teleop"}, 5)

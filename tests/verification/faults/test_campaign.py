@@ -1,4 +1,4 @@
-"""Four rows of the fault campaign on real processes; `make faults` runs all of them."""
+"""Rows of the fault campaign on real processes; `make faults` runs all of them."""
 
 import os
 import re
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from _pytest.mark import ParameterSet
 
 from verification.faults.catalogue import FAULTS
 from verification.faults.fault import Fault, run_row
@@ -21,6 +22,7 @@ pytestmark = pytest.mark.timed
 
 BY_NAME = {fault.name: fault for fault in FAULTS}
 ROWS = "contact in one sample", "estop", "bridge SIGKILL", "safety SIGKILL"
+MORE_ROWS = ("safety hangs, then contact",)
 WITH_NAMESPACES = (
     "driver's network cut for 3 s, then the burst", "robot's clock stepped by +1 h",
     "disk full, then contact", "relay: contact", "site: estop of all",
@@ -43,9 +45,14 @@ def stack(
         yield it
 
 
+def row(name: str, *marks: pytest.MarkDecorator) -> ParameterSet:
+    """Return the parameters of the test below."""
+    return pytest.param(BY_NAME[name].needs, BY_NAME[name], id=name, marks=marks)
+
+
 @pytest.mark.parametrize(
     ("stack", "fault"),
-    [pytest.param(BY_NAME[name].needs, BY_NAME[name], id=name) for name in ROWS],
+    [row(name) for name in ROWS] + [row(name, pytest.mark.campaign) for name in MORE_ROWS],
     indirect=["stack"],
 )
 def test_the_board_receives_a_stop_in_time(
