@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -89,14 +89,16 @@ class Stream(Generic[M]):
 
         A slow function skips messages. Its exceptions are logged, and the next message is handled.
         """
-        self.open()
+        reading = ExitStack()
+        queue = reading.enter_context(self.reading())  # now: no message before the thread is missed
 
         def run() -> None:
-            for message in self:
-                try:
-                    handle(message)
-                except Exception:
-                    logger.exception("handler of %s", self.key)
+            with reading:
+                for message in self._messages(queue):
+                    try:
+                        handle(message)
+                    except Exception:
+                        logger.exception("handler of %s", self.key)
 
         thread = threading.Thread(target=run, name=f"t2 {self._what}", daemon=True)
         thread.start()
@@ -104,10 +106,13 @@ class Stream(Generic[M]):
 
     def __iter__(self) -> Iterator[M]:
         with self.reading() as queue:
-            while not self.closed:
-                message = self.after(queue, 1.0)
-                if message is not None:
-                    yield message
+            yield from self._messages(queue)
+
+    def _messages(self, queue: "deque[M]") -> Iterator[M]:
+        while not self.closed:
+            message = self.after(queue, 1.0)
+            if message is not None:
+                yield message
 
     @contextmanager
     def reading(self) -> Iterator["deque[M]"]:

@@ -101,6 +101,22 @@ def test_a_handler_that_fails_is_called_again_until_the_robot_closes(
     assert not thread.is_alive()
 
 
+def test_a_handler_gets_a_message_that_comes_before_its_thread(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[Velocity] = []
+    start = threading.Thread.start
+
+    def start_late(thread: threading.Thread) -> None:
+        if thread.name.startswith("t2 "):  # Zenoh has threads, too
+            robot.put_until_received(1.0)
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start_late)
+    robot.stream.on(seen.append)
+    wait_until(lambda: seen, "the message")
+
+
 @pytest.mark.parametrize("name", ["", "*", "001/**"])
 def test_an_id_of_several_robots_is_refused(name: str) -> None:
     with pytest.raises(t2.LinkError, match="not the id of one robot"):
