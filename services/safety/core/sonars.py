@@ -202,10 +202,13 @@ class Saturation(Struct, frozen=True):
     def updated(self, readings: Sequence[float]) -> "Saturation":
         """Return the state after one sample of all sonars; infinity: no echo, 0: no reading."""
         top = max(readings)
+        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
         known = None if self.reading is not None and top > self.reading + SAME_M else self.reading
+        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
         sharing = sum(top - one < SAME_M for one in readings)
         if math.isinf(top) or sharing < 2:
             return Saturation(known)
+        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
         if abs(top - self.candidate) >= SAME_M:
             return Saturation(known, top, 1)
         samples = self.samples + 1
@@ -214,6 +217,7 @@ class Saturation(Struct, frozen=True):
 
     def explains(self, reading: float) -> bool:
         """Return whether a reading is the greatest one."""
+        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
         return self.reading is not None and abs(reading - self.reading) < SAME_M
 
 
@@ -234,6 +238,7 @@ class SonarOverrides(Struct, frozen=True):
 
     def acknowledged_by(self, source: str | None) -> frozenset[int]:
         """Return the sonars toward which this source may creep without a reading."""
+        # 1 equivalent mutant: no source has such a name.
         return self.acknowledged.get(source or "", frozenset())
 
 
@@ -309,4 +314,5 @@ def _is_alongside(sonar: int, readings: Sequence[float]) -> bool:
     if flank is None:
         return False
     low, high = (share * readings[sonar] for share in ALONGSIDE)
+    # 2 equivalent mutants: a range of measured numbers, with or without its ends.
     return low <= readings[SONAR_NAMES.index(flank)] <= high

@@ -235,6 +235,9 @@ def test_an_emergency_stop_that_only_the_bridge_received_latches_and_is_acknowle
     assert fixture.motions[-1].estop == 77
     fixture.link = replace(fixture.link, estop=78)
     assert fixture.tick().command == "brake"
+    fixture.pressed = True
+    fixture.tick()
+    assert [motion.estop for motion in fixture.motions] == [78, 78]
 
 
 def test_a_connection_that_was_lost_between_two_decisions_latches() -> None:

@@ -288,12 +288,13 @@ def after(saturation: Saturation, *samples: tuple[float, ...], times: int = 1) -
     return saturation
 
 
-KNOWN = after(Saturation(), SHARED, times=SHARED_SAMPLES)
+def known() -> Saturation:
+    return after(Saturation(), SHARED, times=SHARED_SAMPLES)
 
 
 def test_it_takes_a_second_of_sharing() -> None:
     assert after(Saturation(), SHARED, times=SHARED_SAMPLES - 1).reading is None
-    assert KNOWN.reading == 3.001
+    assert known().reading == 3.001
     assert SHARED_SAMPLES == 20
 
 
@@ -307,18 +308,18 @@ def test_anything_else_begins_anew(other: tuple[float, ...]) -> None:
 
 
 def test_it_explains_itself_and_nothing_else() -> None:
-    assert KNOWN.explains(3.0)
-    assert KNOWN.explains(3.002)
-    assert not KNOWN.explains(2.9995)
-    assert not KNOWN.explains(3.0026)
+    assert known().explains(3.0)
+    assert known().explains(3.002)
+    assert not known().explains(2.9995)
+    assert not known().explains(3.0026)
     assert not Saturation().explains(3.0)
 
 
 def test_it_is_remembered_until_a_sonar_sees_farther() -> None:
-    assert after(KNOWN, (1.0, 0.5, 0.7, 0.0), (2.0, 2.0, 0.0, 0.0)).reading == 3.001
-    assert after(KNOWN, (3.002, 0.5, 0.7, 0.0)).reading == 3.001
-    assert after(KNOWN, (3.1, 0.5, 0.7, 0.0)).reading is None
-    assert after(KNOWN, (1.0, 0.5, math.inf, 0.0)).reading is None
+    assert after(known(), (1.0, 0.5, 0.7, 0.0), (2.0, 2.0, 0.0, 0.0)).reading == 3.001
+    assert after(known(), (3.002, 0.5, 0.7, 0.0)).reading == 3.001
+    assert after(known(), (3.1, 0.5, 0.7, 0.0)).reading is None
+    assert after(known(), (1.0, 0.5, math.inf, 0.0)).reading is None
 
 
 # --- overrides of faulty sonars ---------------------------------------------------------------

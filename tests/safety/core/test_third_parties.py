@@ -144,6 +144,14 @@ def test_its_silence_brakes_and_latches_until_it_is_back_and_reset() -> None:
     assert fixture.verdict.command == "run"
 
 
+def test_a_keepalive_may_echo_an_older_heartbeat_than_a_request_to_move() -> None:
+    fixture = running()
+    echo = fixture.echo
+    kept(fixture, 0.5, 0.7)
+    assert fixture.request(echo=echo).refused == "late"
+    assert fixture.keepalive(echo=echo).refused == ""
+
+
 def test_messages_that_a_proxy_holds_do_not_keep_it_alive() -> None:
     fixture = running()
     echo = fixture.echo
