@@ -47,7 +47,13 @@ def prepare(path: Path) -> None:
             f"bus.drive: {folder} must be a directory of this user that no other user can enter "
             f"(chmod 700); it has mode {stat.S_IMODE(found.st_mode):o} and owner {found.st_uid}"
         )
-    if path.exists() and not path.is_socket():  # Zenoh would remove it
+    try:
+        is_socket = stat.S_ISSOCK(path.lstat().st_mode)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise ConfigError(f"bus.drive: {path}: {error.strerror}") from None
+    if not is_socket:  # Zenoh would remove it; a stale socket may stay
         raise ConfigError(f"bus.drive: {path} exists and is not a socket; remove or rename it")
 
 

@@ -95,13 +95,14 @@ def declares(declared: set[str], key: str) -> bool:
 def as_cells(row: output.Row) -> list[str]:
     """Return one stream as table cells; a topic without a rate is published on change."""
     hz, expected_hz = row["hz"], row["expected_hz"]
+    none = "?" if row["key"].startswith("@") else "-"  # the router does not list these keys
     return [
         row["key"],
         row["type"] or "?",
         "-" if hz is None else f"{hz:.1f}",
         "" if expected_hz is None else f"{expected_hz:g}" if expected_hz else "change",
         ", ".join(row["publishers"]) or "?",
-        ", ".join(row["readers"]) or "?",
+        ", ".join(row["readers"]) or none,
     ]
 
 

@@ -3,13 +3,13 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from t2 import messages as m
 from t2.connection import connect
 from t2.drive import Drive
+from t2.limit import SpeedLimit
 from t2.robot import Robot
 from t2.stream import Stream
 
@@ -137,7 +137,7 @@ class AsyncDrive:
 class AsyncRobot:
     """A ``Robot`` for asyncio, from ``aconnect``; ``robot`` is the twin.
 
-    Each stream is an ``AsyncStream``; the other methods of ``Robot`` run in a thread: ``await`` it.
+    Each stream is an ``AsyncStream``.
 
     >>> async def main():
     ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
@@ -148,24 +148,17 @@ class AsyncRobot:
     >>> asyncio.run(main())
     """
 
-    odometry: AsyncStream[m.Odometry]
-    safety: AsyncStream[m.SafetyState]
-    velocity: AsyncStream[m.Velocity]
-    mileage: AsyncStream[m.Mileage]
-    ultrasonic: AsyncStream[m.Ultrasonic]
-    bumper: AsyncStream[m.Bumper]
-    switches: AsyncStream[m.Switches]
-    link: AsyncStream[m.Link]
-    events: AsyncStream[m.Event]
-
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-
-    def __getattr__(self, name: str) -> Any:
-        value = getattr(self.robot, name)
-        if isinstance(value, Stream):
-            return AsyncStream(value)
-        return partial(asyncio.to_thread, value) if callable(value) else value
+        self.odometry = AsyncStream(robot.odometry)
+        self.safety = AsyncStream(robot.safety)
+        self.velocity = AsyncStream(robot.velocity)
+        self.mileage = AsyncStream(robot.mileage)
+        self.ultrasonic = AsyncStream(robot.ultrasonic)
+        self.bumper = AsyncStream(robot.bumper)
+        self.switches = AsyncStream(robot.switches)
+        self.link = AsyncStream(robot.link)
+        self.events = AsyncStream(robot.events)
 
     def drive(self, source: str) -> AsyncDrive:
         """Return a drive as this source, for ``async with``."""
@@ -175,3 +168,33 @@ class AsyncRobot:
         """Stop and latch as ``Robot.estop`` does; a cancelled task does not end the attempts."""
         self.robot.put_estop()  # at once: a thread may not be free
         await asyncio.to_thread(self.robot.estop)
+
+    async def limit(
+        self,
+        source: str,
+        linear: float | None = None,
+        angular: float | None = None,
+        reason: str = "",
+        *,
+        seconds: float,
+    ) -> SpeedLimit:
+        """Cap the speed in m/s and rad/s as ``Robot.limit`` does."""
+        return await asyncio.to_thread(
+            self.robot.limit, source, linear, angular, reason, seconds=seconds
+        )
+
+    async def reset(self) -> m.ResetDone:
+        """Reset as ``Robot.reset`` does."""
+        return await asyncio.to_thread(self.robot.reset)
+
+    async def release(self, direction: m.Direction, source: str, timeout: float = 5.0) -> None:
+        """Move off a pressed bumper as ``Robot.release`` does."""
+        await asyncio.to_thread(self.robot.release, direction, source, timeout)
+
+    async def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
+        """Set the pose of odometry in ``odom`` (m, m, rad) as ``Robot.set_pose`` does."""
+        await asyncio.to_thread(self.robot.set_pose, x, y, heading)
+
+    async def led(self, channel: int, mode: int, **settings: int) -> None:
+        """Set one lamp channel as ``Robot.led`` does."""
+        await asyncio.to_thread(self.robot.led, channel, mode, **settings)

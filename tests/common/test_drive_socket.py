@@ -1,6 +1,7 @@
 """Path of the drive link's socket, and that no other user can connect."""
 
 import os
+import socket
 from pathlib import Path
 
 import pytest
@@ -109,3 +110,14 @@ def test_a_foreign_file_is_named_and_stays(folder: Path) -> None:
     with pytest.raises(ConfigError, match=rf"bus\.drive: {path} exists and is not a socket"):
         prepare(path)
     assert path.read_text() == "important"
+    path.unlink()
+    path.symlink_to(folder / "elsewhere")
+    with pytest.raises(ConfigError, match="is not a socket"):
+        prepare(path)
+
+
+def test_a_socket_that_a_killed_bridge_left_is_no_error(folder: Path) -> None:
+    path = folder / "drive.sock"
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(str(path))
+    prepare(path)

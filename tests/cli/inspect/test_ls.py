@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from cli.inspect import hz
-from cli.inspect.ls import members
+from cli.inspect.ls import as_cells, members
 from common import keys
 from common.bus.bus import Bus
 from common.bus.session import router
@@ -41,6 +41,16 @@ def test_keys_with_type_rate_publishers_and_readers(
     assert shown[0].split() == ["key", "type", "Hz", "of", "publishers", "readers"]
     assert shown[1].split()[::3] == ["tel/bridge/bumper", "50"]
     assert shown[1].split()[4:] == ["bridge", "safety"]
+    row = {
+        "key": "tel/x",
+        "type": "",
+        "hz": 1.0,
+        "expected_hz": None,
+        "publishers": [],
+        "readers": [],
+    }
+    assert as_cells(row)[4:] == ["?", "-"]
+    assert as_cells({**row, "key": "@cmd/x"})[4:] == ["?", "?"]
 
 
 def test_services(buses: BusFixture, bridge: Bus, tool: Tool) -> None:
