@@ -31,6 +31,8 @@ from common.motion import Command
 from services.dashboard import snapshot
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.telemetry_cache import TelemetryCache
+from services.safety import report
+from tests.safety.core.policy_fixture import PolicyFixture
 
 AT = 100 * NS_PER_S
 RELEASE = Release(
@@ -147,3 +149,10 @@ def test_the_tone_of_a_sector(status: RangeStatus, cause: str, text: str, tone: 
     sonar = Ultrasonic(ranges=(4.0,) * 8, status=(status,) * 8)
     causes = [Cause(name=cause, action="slow", age=1.0, text=text)]
     assert snapshot.tones(sonar, causes)[SONAR_NAMES.index("front")] == tone
+
+
+@pytest.mark.parametrize("name", SONAR_NAMES)
+def test_the_page_finds_the_sonar_in_the_texts_of_safety(name: str) -> None:
+    state, index = PolicyFixture().ready().state, SONAR_NAMES.index(name)
+    for text in (report._blocked_text(state, index), report._slowed_text(state, index)):
+        assert snapshot.sonars_named(text) == [index]
