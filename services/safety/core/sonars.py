@@ -146,6 +146,7 @@ def _accept(sonar: Sonar, distance: float) -> Sonar:
     # A faulty sonar has no distance to compare with: any good readings end the fault. A near one
     # that did not would leave the obstacle unseen, and an operator may creep toward that.
     if not sonar.fault:
+        # 1 equivalent mutant: an equal distance is within the hysteresis, too.
         if distance <= sonar.distance:
             return replace(sonar, distance=distance, farther=())
         if distance < sonar.distance + HYSTERESIS_M:
@@ -158,6 +159,7 @@ def _accept(sonar: Sonar, distance: float) -> Sonar:
 
 def _watch(sonar: Sonar, distance: float, moved: Moved) -> Sonar:
     """Compare the reading with the previous one and with the motion."""
+    # 1 equivalent mutant: readings are whole millimetres, never at the limit.
     if math.isinf(distance) or abs(distance - sonar.same) >= SAME_M:
         changed = sonar.changed + 1
         if sonar.suspect and changed < CHANGED_SAMPLES:
@@ -165,6 +167,7 @@ def _watch(sonar: Sonar, distance: float, moved: Moved) -> Sonar:
         return _begin(sonar, distance)
     if moved.beyond:
         return _begin(sonar, sonar.same)
+    # 1 equivalent mutant: only the magnitude counts.
     turned = sonar.turned + moved.turn
     nearer, travel = (0.0, 0.0) if moved.alongside else _span(sonar, moved.along)
     against = travel >= STUCK_TRAVEL_M or abs(turned) >= STUCK_TURN
@@ -281,6 +284,7 @@ class SonarFilter(Struct, frozen=True):
     ) -> SonarArray:
         """Return the array with the newest sample; each sample is processed once."""
         if latest is None or not fresh(latest, now_ns, self.age_s):
+            # 1 equivalent mutant: a sample that is too old never becomes fresh again.
             return SonarArray(SILENT, array.token, array.at_ns, array.saturation)
         sample = latest.value
         token = (sample.boot, sample.seq)
@@ -288,6 +292,7 @@ class SonarFilter(Struct, frozen=True):
             return array
         moved = STILL if measured is None or measured.is_standing else measured
         step_s = min((latest.received_ns - array.at_ns) / NS_PER_S, LONGEST_STEP_S)
+        # 3 equivalent mutants: both have a row for each sonar.
         distances, faults = zip(*map(trusted, sample.ranges, sample.status), strict=True)
         saturation = array.saturation.updated(distances)
         sonars = tuple(

@@ -52,6 +52,7 @@ def along(metres: float) -> Moved:
     [
         ((1.2, 1.2), 1.0),
         ((1.2, 1.1, 1.3), 1.1),
+        ((1.2, 1.2, 0.9, 1.2), 0.9),
         ((1.2, 1.04, 1.2, 1.2), 1.0),
         ((1.2, 1.04, 1.2, 1.3, 1.2), 1.2),
         ((1.049, 1.049, 1.049), 1.0),
@@ -76,6 +77,7 @@ def test_farther_counts_after_three_by_5_cm(readings: tuple[float, ...], distanc
 def test_what_cannot_be_trusted_is_no_distance(
     reading: float | None, status: RangeStatus, fault: str
 ) -> None:
+    assert trusted(reading, status) == (0.0, fault)  # 0 is no reading for the saturation either
     bad = read(GOOD, reading, status, STILL)
     assert (bad.distance, bad.fault) == (0.0, fault)
     recovering = feed(bad, 1.0, 1.0)
@@ -320,6 +322,13 @@ def test_it_is_remembered_until_a_sonar_sees_farther() -> None:
     assert after(known(), (3.002, 0.5, 0.7, 0.0)).reading == 3.001
     assert after(known(), (3.1, 0.5, 0.7, 0.0)).reading is None
     assert after(known(), (1.0, 0.5, math.inf, 0.0)).reading is None
+
+
+def test_each_sample_counts_once_and_a_silence_keeps_the_saturation() -> None:
+    array = SonarArray(saturation=known())
+    once = FILTER.update(array, sample(1, 2.0), None, STEP_NS)
+    assert FILTER.update(once, sample(1, 2.0), None, STEP_NS) is once
+    assert FILTER.update(array, None, None, STEP_NS).saturation == known()
 
 
 # --- overrides of faulty sonars ---------------------------------------------------------------
