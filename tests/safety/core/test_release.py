@@ -412,10 +412,10 @@ def test_a_second_contact_looks_at_the_travel_between() -> None:
     assert release.travelled == pytest.approx(-1.03, abs=0.01)
 
 
-def test_without_counters_the_commanded_speed_counts() -> None:
+def test_without_counters_a_contact_is_held_too() -> None:
     fixture = PolicyFixture()
     fixture.muted = {"mileage"}
     fixture.running()
     fixture.pressed = True
-    assert fixture.tick().command == "brake"
+    assert fixture.tick(3).command == "brake"
     assert fixture.published().release is not None

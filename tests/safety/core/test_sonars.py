@@ -130,11 +130,17 @@ def test_a_constant_reading_is_shortened_by_the_way_toward_it() -> None:
     assert feed(near, 0.2).cautious(ROOM_M) == 0.2
 
 
-@pytest.mark.parametrize(("turn", "suspect"), [(0.24, False), (0.26, True), (-0.26, True)])
+@pytest.mark.parametrize(("turn", "suspect"), [(0.24, False), (0.25, True), (-0.26, True)])
 def test_a_reading_that_stays_over_half_a_radian_is_suspect(turn: float, suspect: bool) -> None:
     sonar = feed(GOOD, 0.8, 0.8, 0.8)
     sonar = feed(sonar, 0.8, 0.8, moved=Moved(turn=turn, alongside=True))
     assert sonar.suspect is suspect
+    turned = feed(GOOD, *[0.8] * 4, moved=Moved(turn=0.1))
+    assert not feed(turned, 0.9, 0.9, moved=Moved(turn=0.25)).suspect  # another reading: anew
+
+
+def test_half_a_metre_is_enough() -> None:
+    assert feed(feed(GOOD, 2.0, 2.0), 2.0, 2.0, moved=along(0.25)).suspect
 
 
 def test_what_explains_a_constant_reading() -> None:
