@@ -177,6 +177,7 @@ class Policy:
         plan = Plan()
         if requested and (BARRING & state.latches.keys()) <= ignored:
             known = inputs.known_velocity(now_ns, self.settings.times.velocity_age)
+            # 1 equivalent mutant: an unknown velocity bars motion.
             measured = known.value if known else STILL
             plan = self.planner.plan(state, measured, requested, step_s)
         seen = observations(state, requested, plan)
@@ -190,6 +191,7 @@ class Policy:
         return replace(state, latches=held), Verdict(
             name=_name(worst, held),
             command=command,
+            # 1 equivalent mutant: a plan that does not run has no twist.
             twist=plan.twist if command is RUN else STILL,
             source=source,
             control=source if source and BARRING.isdisjoint(held) else None,

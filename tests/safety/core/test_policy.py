@@ -447,3 +447,37 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
     assert release is not None
     assert release.left == 0.0
     assert fixture.reset() == f"Still present: The bumper was hit. {UNKNOWN}"
+
+
+def test_a_motion_carries_its_verdict() -> None:
+    fixture = PolicyFixture().running(0.3, 0.1)
+    fixture.tick()
+    (motion,) = fixture.motions
+    assert (motion.command, motion.linear, motion.angular) == ("run", 0.3, 0.1)
+    assert (motion.judged_boot, motion.judged) == (fixture.boot, fixture.seq)
+    assert (motion.source, motion.latched) == ("teleop", False)
+    assert fixture.verdict.control == "teleop"
+
+
+def test_a_stop_carries_no_velocity_and_a_barred_source_is_not_in_control() -> None:
+    fixture = PolicyFixture().running(0.3)
+    fixture.sonar(front=0.1)
+    fixture.drive(0.3)
+    (motion,) = fixture.motions
+    assert (motion.command, motion.linear, motion.source) == ("stop", 0.0, "teleop")
+    assert fixture.verdict.control == "teleop"
+    fixture.link = replace(fixture.link, state="lost")
+    barred = fixture.drive(0.3)
+    assert (barred.name, barred.source, barred.control) == ("inhibited", "teleop", None)
+
+
+def test_each_occurrence_of_a_cause_of_the_plan_has_its_own_identity() -> None:
+    fixture, found = PolicyFixture().ready(), []
+    for _ in range(2):
+        fixture.drive(0.3)
+        fixture.sonar(front=0.1)
+        fixture.drive(0.3)
+        found.append(fixture.state.latches["blocked"].id)
+        fixture.sonar(front=5.0)
+        fixture.drive()
+    assert found[0] != found[1]
