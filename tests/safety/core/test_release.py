@@ -419,3 +419,13 @@ def test_without_counters_a_contact_is_held_too() -> None:
     fixture.pressed = True
     assert fixture.tick(3).command == "brake"
     assert fixture.published().release is not None
+
+
+def test_a_neutral_request_at_the_time_of_the_press_is_not_newer() -> None:
+    fixture = PolicyFixture().running()
+    fixture.pressed, fixture.linear = True, 0.0
+    fixture.feed()
+    fixture.request(0.0)
+    fixture.tick()
+    fixture.request(release="forward")
+    assert fixture.state.release.refusal == LET_GO

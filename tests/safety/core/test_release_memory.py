@@ -138,6 +138,7 @@ def travel(*distances: float) -> Leg:
         ((), 0.0, None),
         ((3.0,), 0.0, None),
         ((0.0, 0.004), 0.0, None),  # noise
+        ((0.0, 0.005), 0.005, None),
         ((0.0, 0.004, 0.008), 0.008, None),  # small steps add up
         ((0.0, 0.049), 0.049, None),  # too short
         ((0.0, 0.05), 0.05, "forward"),
@@ -169,3 +170,9 @@ def test_a_restart_and_a_turn_on_the_spot_begin_a_leg(reading: Mileage, anew: bo
     assert leg.ended_ns == 1
     assert leg.follow(Latest(reading, 9)) == (Leg(reading, reading) if anew else leg)
     assert leg.follow(Latest(at(0.505), 9)).ended_ns == 9
+    turned = Leg(at(0.0, heading=3.0), at(0.5, heading=3.0), 1)
+    assert turned.follow(Latest(at(0.5, heading=-3.0), 9)) == turned  # past pi
+
+
+def test_without_a_direction_a_release_does_not_move() -> None:
+    assert Release().away(0.1) == STILL

@@ -100,6 +100,22 @@ def test_a_reset_that_names_nothing_is_refused() -> None:
         "The reset names no cause. Latched: Emergency stop. Send the `id` of each as `causes`.",
     )
     assert latched(fixture.state.latches) == ("estop",)
+    blink(fixture)
+    refused = fixture.decide(Reset(fixture.echo)).reply
+    fault = fixture.state.latches["driver_left"].text
+    assert refused is not None
+    assert f"Latched: Emergency stop. {fault} Send" in refused.text
+
+
+def test_a_contact_that_is_free_and_others_stay_latched_by_their_texts() -> None:
+    fixture = hit()
+    fixture.pressed = False
+    fixture.tick(4)
+    fixture.estop()
+    driver = blink(fixture)
+    texts = f"The bumper was hit. {fixture.state.latches['estop'].text}"
+    assert fixture.reset(driver) == ""
+    assert answer(fixture).text == f"Reset, but still latched: {texts}"
 
 
 @pytest.mark.parametrize(("ticks", "age"), [(50, ""), (51, "1.0"), (150, "3.0")])
