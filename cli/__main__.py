@@ -59,7 +59,7 @@ GROUPS = {
     },
     "Commission": {
         "checkout": ("cli.commission.command", "check the real vehicle before its first drive"),
-        "wire": ("cli.wire.command", "decode captured frames"),
+        "wire": ("cli.wire", "decode captured frames"),
     },
     "Administer": {
         "config": ("cli.settings", "show the effective configuration and the source of each value"),

@@ -66,7 +66,7 @@ def _link_problems(
     if any(link.state != "up" for link in links):
         yield (
             f"The link is {links[-1].state} or was not up all the time: `t2 wire decode` shows "
-            "the board's frames, `t2 wire identify-crc` finds their CRC."
+            "the board's frames."
         )
         return
     yield from _relay_problems(links)
@@ -88,7 +88,7 @@ def _crc_problem(bad: int, frames: int, nonzero: int) -> str:
     if bad and bad >= MOST_BAD * (bad + frames):
         return (
             f"{bad} bad CRCs against {frames} good frames: this firmware has another CRC. Capture "
-            "the board's frames, run `t2 wire identify-crc capture.pcap`, and set wire.crc."
+            "its frames, try wire.crc with `t2 wire decode` (docs/checkout.md), and set it."
         )
     if bad:
         return f"{bad} bad CRCs against {frames} good frames: check the cable and its connectors."

@@ -114,7 +114,7 @@ def test_too_few_frames(frames: int, nonzero: int) -> None:
 
 @pytest.mark.parametrize(
     ("bad", "frames", "phrase"),
-    [(1, 1000, "check the cable"), (499, 501, "check the cable"), (500, 500, "identify-crc")],
+    [(1, 1000, "check the cable"), (499, 501, "check the cable"), (500, 500, "another CRC")],
 )
 def test_a_bad_cable_and_another_firmware_differ(bad: int, frames: int, phrase: str) -> None:
     verdict = judge(frames=frames, rejected={"bad_crc": bad})

@@ -1,1 +1,0 @@
-"""``t2 wire``: captured frames, decoded."""

@@ -1,0 +1,248 @@
+"""``t2 wire decode``: captures and hex, frames as text, the reasons of invalid runs, errors."""
+
+import contextlib
+import io
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+from dpkt import arp, ethernet, pcap, pcapng, sll, sll2, tcp, udp  # type: ignore[import-untyped]
+from dpkt import ip as ipv4
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cli import wire as command
+from cli.__main__ import main
+from cli.wire import Datagram, as_text, from_bytes, parts, size_of
+from common.cli_args import EXIT_CONFIG
+from common.errors import RobotError
+from common.settings import Wire
+from common.wire import commands as c
+from common.wire import reports as r
+from common.wire.frame import Frame, Side
+from common.wire.framing import Framing, Rejected
+from verification.harness.frame_strategies import COMMANDS, REPORTS
+
+framing = Framing()
+RUN = framing.pack(c.MotionCommand(c.MotionKind.RUN, 500, 300))
+QUERY = framing.pack(c.DistanceQuery())
+VELOCITY = framing.pack(r.VelocityReport(-250, -15))
+DISTANCE = framing.pack(r.DistanceReport(1234, -905))
+ENDS = "10.7.5.224:4002 > 10.7.5.220:4001"
+
+# --- datagrams ------------------------------------------------------------------------------
+
+
+def packet(data: bytes) -> ipv4.IP:
+    """Return a packet from the board to the PC."""
+    segment = udp.UDP(sport=4002, dport=4001, data=data)
+    segment.ulen = len(segment)
+    whole = ipv4.IP(
+        p=ipv4.IP_PROTO_UDP, data=segment, src=bytes([10, 7, 5, 224]), dst=bytes([10, 7, 5, 220])
+    )
+    whole.len = len(whole)
+    return whole
+
+
+def on_ethernet(network: ipv4.IP) -> bytes:
+    # Padded, as on the cable.
+    return bytes(ethernet.Ethernet(type=ethernet.ETH_TYPE_IP, data=network)).ljust(60, b"\0")
+
+
+def as_pcap(*packets: bytes, link: int = pcap.DLT_EN10MB, writer: type = pcap.Writer) -> bytes:
+    file = io.BytesIO()
+    out = writer(file, linktype=link)
+    for number, each in enumerate(packets):
+        out.writepkt(each, ts=float(number))
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("text", ["47530800", "0x47, 0x53, 0x08, 0x00", "47:53-08\n00"])
+def test_hex_formats(text: str) -> None:
+    assert command.datagrams(text) == [Datagram("", b"GS\x08\x00")]
+
+
+@pytest.mark.parametrize("text", ["no/such/file", "zz", ""])
+def test_neither_hex_nor_file(text: str) -> None:
+    with pytest.raises(RobotError, match="is neither hex nor a file"):
+        command.datagrams(text)
+
+
+def test_text_with_one_datagram_per_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "frames.txt"
+    file.write_text("# captured by hand\n4753 # magic\n\n00 01\n", encoding="utf-8")
+    assert command.datagrams(str(file)) == [
+        Datagram(f"{file} line 2", b"GS"),
+        Datagram(f"{file} line 4", b"\x00\x01"),
+    ]
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"4753")))
+    assert command.datagrams("-") == [Datagram("standard input line 1", b"GS")]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"47 53\n47 5\n", "^trip line 2: '47 5' is not hex$"),
+        (b"# nothing\n", "^trip: contains no hex lines$"),
+        (b"\xff\xfe\x00", "^trip line 1: .* is not hex$"),
+        (as_pcap(), "^trip: contains no UDP packets$"),
+        (as_pcap(b"x", link=105), "^trip: unsupported link type 105"),
+        (as_pcap(on_ethernet(packet(RUN)), b"\x01"), "^trip: invalid after packet 2"),
+    ],
+)
+def test_unsuitable_content(content: bytes, reason: str) -> None:
+    with pytest.raises(RobotError, match=reason):
+        from_bytes("trip", content)
+
+
+def wrapped(kind: Callable[..., bytes]) -> bytes:
+    return bytes(kind(ethtype=ethernet.ETH_TYPE_IP, data=packet(RUN)))
+
+
+OTHER = packet(b"")
+OTHER.p, OTHER.data = 6, tcp.TCP()
+
+
+@pytest.mark.parametrize(
+    ("content", "found"),
+    [
+        (as_pcap(on_ethernet(packet(RUN)), writer=pcapng.Writer), [1]),
+        (as_pcap(wrapped(sll.SLL), link=pcap.DLT_LINUX_SLL), [1]),
+        (as_pcap(wrapped(sll2.SLL2), link=pcap.DLT_LINUX_SLL2), [1]),
+        (
+            as_pcap(
+                bytes(ethernet.Ethernet(type=ethernet.ETH_TYPE_ARP, data=arp.ARP())),
+                bytes(ethernet.Ethernet(type=0x9000, data=b"loop")),
+                on_ethernet(OTHER),
+                on_ethernet(packet(RUN)),
+            ),
+            [4],
+        ),
+    ],
+)
+def test_the_payload_of_each_udp_packet(content: bytes, found: list[int]) -> None:
+    assert from_bytes("trip", content) == [Datagram(f"packet {n} {ENDS}", RUN) for n in found]
+
+
+def test_a_missing_library_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dpkt", None)
+    with pytest.raises(RobotError, match="\\[inspect\\]"):
+        from_bytes("trip", as_pcap(on_ethernet(packet(RUN))))
+
+
+flips = st.lists(st.tuples(st.integers(4, 10_000), st.integers(1, 255)), max_size=3)
+
+
+@given(st.sampled_from([pcap.Writer, pcapng.Writer]), st.integers(4, 10_000), flips)
+def test_a_damaged_capture_is_read_or_refused(
+    writer: type, length: int, changes: list[tuple[int, int]]
+) -> None:
+    """Nothing but ``RobotError`` comes out, and never an empty answer."""
+    packets = on_ethernet(packet(RUN)), on_ethernet(packet(VELOCITY))
+    damaged = bytearray(as_pcap(*packets, writer=writer)[:length])
+    for at, change in changes:
+        damaged[4 + at % max(1, len(damaged) - 4) if len(damaged) > 4 else 0] ^= change
+    with contextlib.suppress(RobotError):
+        assert from_bytes("trip", bytes(damaged))
+
+
+# --- the command line -----------------------------------------------------------------------
+
+
+def test_decode_prints_one_line_per_frame(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["wire", "decode", (RUN + QUERY).hex()]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "+0    pc    MotionCommand kind RUN, linear 500 mm/s, angular 30.0 deg/s",
+        "+13   pc    DistanceQuery",
+    ]
+    assert main(["wire", "decode", (RUN + QUERY).hex() + "ff"]) == 1
+    assert "+21   BAD no_magic" in capsys.readouterr().out
+    file = tmp_path / "trip.pcap"
+    file.write_bytes(as_pcap(on_ethernet(packet(VELOCITY + DISTANCE))))
+    assert main(["wire", "decode", str(file)]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith(f"packet 1 {ENDS} +0    board Velocity")
+    assert "+12   board DistanceReport distance 1234 mm, heading -90.5 deg" in second
+
+
+def test_wire_settings_apply(capsys: pytest.CaptureFixture[str]) -> None:
+    raw = Framing("modbus", "header_and_payload").pack(COMMANDS[0]).hex()
+    sets = ["--set", "wire.crc=modbus", "--set", "wire.crc_covers=header_and_payload"]
+    assert main(["wire", "decode", raw]) == 1
+    assert main(["wire", "decode", raw, *sets]) == 0
+    assert main(["wire", "decode", raw, "--set", "wire.crc=no-such"]) == EXIT_CONFIG
+    assert "wire" in capsys.readouterr().err
+
+
+# --- frames as text -------------------------------------------------------------------------
+
+
+def lines(raw: bytes, wire: Wire | None = None) -> list[str]:
+    return [as_text(part, wire or Wire()) for part in parts(framing, raw)]
+
+
+TEXTS = [
+    (c.MotionCommand(c.MotionKind.RUN, 500, -300),
+     "pc    MotionCommand kind RUN, linear 500 mm/s, angular -30.0 deg/s"),
+    (c.DriverQuery(Side.RIGHT), "pc    DriverQuery side RIGHT"),
+    (c.LedSet(9, 1, 8, 2, 3, 4, 5, 6, 7),
+     "pc    LedSet channel 9, mode 1, on_lightness 8, on_time 2, off_time 3, flash_lightness 4, "
+     "speed 5, lightness_min 6, lightness_max 7"),
+    (r.VelocityReport(-250, -15), "board VelocityReport linear -250 mm/s, angular -1.5 deg/s"),
+    (r.DistanceReport(1234, -905), "board DistanceReport distance 1234 mm, heading -90.5 deg"),
+    (r.UltrasonicReport((1, 2, 3, 4, 5, 6, 0xFFFF, 8)),
+     "board UltrasonicReport left=1 front_left=2 front=3 front_right=4 right=5 rear_right=6 "
+     "rear=fault rear_left=8 mm"),
+    (r.BumperReport(True), "board BumperReport on yes"),
+    (r.BumperBrakeReport(False),
+     "pc or board BumperBrakeSet or BumperBrakeReport on no"),
+    (r.DriverReport(Side.LEFT, 0), "board DriverReport side LEFT, faults 0x00000000"),
+    (r.DriverReport(Side.LEFT, 0x80000011),
+     "board DriverReport side LEFT, faults 0x80000011 over_current overload bit_31"),
+    (r.LedReport(False), "board LedReport done no"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("frame", "text"), TEXTS)
+def test_a_frame_as_text(frame: Frame, text: str) -> None:
+    assert lines(framing.pack(frame)) == [text]
+
+
+def test_the_other_angular_unit() -> None:
+    frames: tuple[Frame, ...] = (
+        r.VelocityReport(0, 1500),
+        c.MotionCommand(c.MotionKind.RUN, 0, 1500),
+    )
+    for number, setting in enumerate(("feedback_angular_unit", "command_angular_unit")):
+        wire = msgspec.convert({setting: "milliradian"}, Wire)
+        texts = [lines(framing.pack(frame), wire=wire)[0] for frame in frames]
+        assert texts[number].endswith("angular 1.500 rad/s")
+        assert texts[1 - number].endswith("angular 150.0 deg/s")
+
+
+def test_frames_and_garbage() -> None:
+    raw = framing.pack(c.DistanceQuery()) + b"\x01\x02" + framing.pack(r.BumperReport(False))
+    assert lines(raw) == [
+        "pc    DistanceQuery",
+        "BAD no_magic: does not start with 47 53: 0102",
+        "board BumperReport on no",
+    ]
+
+
+def test_the_reason_of_the_latest_check() -> None:
+    raw = bytearray(framing.pack(r.DistanceReport(5, 5)))
+    raw[-1] ^= 1
+    (part,) = parts(framing, bytes(raw))
+    assert isinstance(part, Rejected)
+    assert part.reason == "bad_crc"  # and not the wrong size of a query
+
+
+@given(st.lists(st.sampled_from([*COMMANDS, *REPORTS]).map(framing.pack) | st.binary(max_size=9)))
+def test_every_byte_is_in_a_part(pieces: list[bytes]) -> None:
+    found = list(parts(framing, b"".join(pieces)))
+    assert sum(map(size_of, found)) == len(b"".join(pieces))
+    assert all(as_text(part, Wire()) for part in found)
