@@ -6,7 +6,6 @@ loop hangs, the scrape fails; it never returns old values.
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
-from pathlib import Path
 from typing import Any, TypeVar
 from wsgiref.simple_server import WSGIServer
 
@@ -14,19 +13,19 @@ from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from common import clock, keys, members
+from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
-from common.errors import ConfigError, LinkError
+from common.errors import LinkError
 from common.service import Node
 from services.metrics.config import MetricsConfig
 from services.metrics.robot import RobotState, prune
-from services.metrics.samples import STREAMS, certificate_expiry, metric_families
+from services.metrics.samples import STREAMS, metric_families
 
 HOST = "127.0.0.1"  # without authentication: Prometheus runs here, the bus crosses the network
 DEPTH = 2000  # pending samples of one stream, for all robots
 PATIENCE_S = 2.0  # for the loop; Prometheus waits 10 s
-CHECK_S = 60.0  # between two checks for expired robots, and of the member list
+CHECK_S = 60.0  # between two checks for expired robots
 
 
 class Exporter(Collector):
@@ -43,11 +42,8 @@ class Exporter(Collector):
             self._own = ""
             self._bus = Bus(node.config.bus, settings.robots, node.loop.post)
             self._bus.open()
-        self._certificates: dict[tuple[str, str], float] = {}
         self._subscribe()
         node.loop.every(CHECK_S, self._prune)
-        if node.config.bus.members:
-            node.loop.every(CHECK_S, lambda _: self._read_members(Path(node.config.bus.members)))
         self._server = start_server(settings.port, self)
         node.on_exit = self._close
 
@@ -76,21 +72,11 @@ class Exporter(Collector):
     def _prune(self, now_ns: int) -> None:
         prune(self._robots, self._own, now_ns)
 
-    def _read_members(self, file: Path) -> None:
-        """Read the expiry of the certificates; none if the list cannot be read."""
-        try:
-            self._certificates = certificate_expiry(members.read(file))
-        except ConfigError as error:
-            self._certificates = {}
-            self._node.counters["members_unreadable"] += 1
-            self._node.log.warning("cannot read the member list", reason=str(error))
-
     def _families(self) -> list[Metric]:
         return metric_families(
             {n: robot for n, robot in self._robots.items() if n == self._own or robot.is_robot},
             clock.now_ns(),
             connected=self._bus.connected,
-            certificates=self._certificates,
         )
 
     def collect(self) -> Iterable[Metric]:

@@ -5,30 +5,17 @@ numbers have the label ``name``. None and stale values have no sample; ``t2_robo
 ``t2_service_up`` report them.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import accumulate
 from typing import Any, get_args
 
 from msgspec import Struct
 from msgspec.structs import replace
-from prometheus_client.core import (
-    CounterMetricFamily,
-    GaugeMetricFamily,
-    HistogramMetricFamily,
-    Metric,
-)
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from common import keys
-from common.members import Members
 from common.messages import Durations, LinkState, Message, Verdict
 from services.metrics.robot import RobotState
 
-KINDS = {
-    "gauge": GaugeMetricFamily,
-    "counter": CounterMetricFamily,
-    "histogram": HistogramMetricFamily,
-}
 STREAMS: dict[str, keys.Topic[Any]] = {
     "safety": keys.SAFETY,
     "link": keys.LINK,
@@ -39,14 +26,14 @@ UNITS = {
     "linear": "_meters_per_second", "forward": "_meters_per_second",
     "backward": "_meters_per_second", "angular": "_radians_per_second",
     "round_trip": "_seconds", "uptime": "_seconds", "lateness": "_seconds", "age": "_seconds",
-    "rss": "_bytes", "rates": "_hertz",
+    "rss": "_bytes", "rates": "_hertz", "reactions": "_seconds",
 }  # fmt: skip
 WORDS = {"state": get_args(LinkState), "verdict": get_args(Verdict)}  # 0 or 1 for each of them
-# Sentences, ids and times that say nothing as a number; matrices; labels; the histograms.
+# Sentences, ids and times that say nothing as a number; matrices; labels.
 OMITTED = {
     *Message.__struct_fields__, "text", "waiting", "release_refusal", "heartbeat", "latched_by",
     "estop", "ports", "frame_id", "child_frame_id", "pose_covariance", "twist_covariance",
-    "service", "reactions", "limit_sources", "estop_keepalives",
+    "service", "limit_sources", "estop_keepalives",
 }  # fmt: skip
 OF_SERVICE = "robot", "service"
 
@@ -62,14 +49,9 @@ class Family(Struct, frozen=True):
 
 FAMILIES = (
     Family("t2_bus_connected", "gauge", (), "Whether the exporter is connected to a router"),
-    Family("t2_certificate_expiry_timestamp_seconds", "gauge", ("role", "name"),
-           "Expiry of a member's certificate"),
     Family("t2_robot_up", "gauge", ("robot",), "Whether the robot is alive"),
     Family("t2_service_up", "gauge", OF_SERVICE, "Whether the service is present and healthy"),
     Family("t2_service_instances", "gauge", OF_SERVICE, "Processes of the service on the bus"),
-    Family("t2_reaction_seconds", "histogram", (*OF_SERVICE, "reaction"),
-           "Reactions of the bridge to a hit, from its read: until BRAKE (reflex), until safety's "
-           "BRAKE (judged_stop)"),
     Family("t2_events_total", "counter", (*OF_SERVICE, "event", "level"),
            "Events received, including replayed ones"),
 )  # fmt: skip
@@ -79,20 +61,15 @@ class Scrape:
     """The metric families of one scrape."""
 
     def __init__(self) -> None:
+        kinds = {"gauge": GaugeMetricFamily, "counter": CounterMetricFamily}
         self.families: dict[str, Metric] = {
-            each.name: KINDS[each.kind](each.name, each.help, labels=each.labels)
+            each.name: kinds[each.kind](each.name, each.help, labels=each.labels)
             for each in FAMILIES
         }
 
     def add(self, name: str, value: float, *labels: str) -> None:
-        """Add a sample of a gauge or counter."""
+        """Add a sample."""
         self.families[name].add_metric(labels, float(value))  # type: ignore[attr-defined]
-
-    def add_durations(self, name: str, each: Durations, *labels: str) -> None:
-        """Add a histogram."""
-        ends = [*(f"{bound:.3g}" for bound in each.bounds), "+Inf"]
-        buckets = list(zip(ends, accumulate(each.counts), strict=True))
-        self.families[name].add_metric(labels, buckets, None)  # type: ignore[attr-defined]
 
     def add_fields(self, prefix: str, part: Struct, labels: Mapping[str, str]) -> None:
         """Add the fields of a message, also those of the structs inside."""
@@ -117,27 +94,19 @@ def _numbers(value: Any, words: Sequence[str] | None) -> Iterator[tuple[tuple[st
     elif isinstance(value, str) and value:
         yield from (((word,), word == value) for word in (words or (value,)))
     elif isinstance(value, dict):
-        yield from (((name,), number) for name, number in sorted(value.items()))
+        for name, number in sorted(value.items()):
+            yield (name,), number.worst if isinstance(number, Durations) else number
     elif isinstance(value, tuple):
         names = (one if isinstance(one, str) else one.name for one in value)
         yield from (((name,), 1) for name in dict.fromkeys(names))
 
 
 def metric_families(
-    robots: Mapping[str, RobotState],
-    now_ns: int,
-    *,
-    connected: bool,
-    certificates: Mapping[tuple[str, str], float],
+    robots: Mapping[str, RobotState], now_ns: int, *, connected: bool
 ) -> list[Metric]:
-    """Return every family, with the samples of all robots.
-
-    ``certificates`` holds their expiry by role and name, in seconds since 1970.
-    """
+    """Return every family, with the samples of all robots."""
     scrape = Scrape()
     scrape.add("t2_bus_connected", connected)
-    for member, expiry in sorted(certificates.items()):
-        scrape.add("t2_certificate_expiry_timestamp_seconds", expiry, *member)
     for name, robot in sorted(robots.items()):
         _robot(scrape, name, robot, now_ns)
         for service in sorted(robot.instances):
@@ -165,18 +134,3 @@ def _service(scrape: Scrape, name: str, robot: RobotState, service: str, now_ns:
     rates = {key.removeprefix(own): rate for key, rate in health.rates.items()}
     labels = {"robot": name, "service": service}
     scrape.add_fields("t2_service", replace(health, rates=rates), labels)
-    for reaction, each in sorted(health.reactions.items()):
-        if len(each.counts) == len(each.bounds) + 1:
-            scrape.add_durations("t2_reaction_seconds", each, name, service, reaction)
-
-
-def certificate_expiry(listed: Members) -> dict[tuple[str, str], float]:
-    """Return the expiry of the certificates by role and name, in seconds since 1970.
-
-    A renewed member is listed more than once until its old certificate expires: the latest counts.
-    """
-    found: dict[tuple[str, str], float] = {}
-    for one in listed.welcome:
-        member = one.role, one.name
-        found[member] = max(one.expires.timestamp(), found.get(member, -math.inf))
-    return found

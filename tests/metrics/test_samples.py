@@ -1,13 +1,11 @@
 """Exported samples: names, labels and freshness."""
 
 import re
-from datetime import UTC, datetime
 
 from common.freshness import NS_PER_S
-from common.members import Member, Members
 from common.messages import Durations
 from services.metrics.robot import FRESH_S, RobotState
-from services.metrics.samples import certificate_expiry, metric_families
+from services.metrics.samples import metric_families
 from tests.metrics.robots import (
     LINK,
     NOW_NS,
@@ -24,7 +22,6 @@ from tests.metrics.robots import (
     whole,
 )
 
-SOON, LATER, LAST = (datetime(2027, month, 1, tzinfo=UTC) for month in (1, 2, 3))
 LATE_NS = NOW_NS + round(FRESH_S * NS_PER_S) + 1
 # Exported for a robot without fresh values.
 ALWAYS = {"t2_bus_connected", "t2_robot_up", "t2_service_up", "t2_service_instances"}
@@ -32,7 +29,7 @@ ALWAYS = {"t2_bus_connected", "t2_robot_up", "t2_service_up", "t2_service_instan
 
 def values(robot: RobotState, now_ns: int = NOW_NS, *, connected: bool = True) -> Values:
     """Return the value of every sample by name and labels."""
-    return flat(metric_families({"007": robot}, now_ns, connected=connected, certificates={}))
+    return flat(metric_families({"007": robot}, now_ns, connected=connected))
 
 
 def value(found: Values, name: str, /, **labels: str) -> float:
@@ -130,27 +127,9 @@ def test_rates_by_key_and_counters_by_name() -> None:
     assert of_name(found, "t2_service_counters") == {"overrun": 2}
 
 
-def test_reactions_are_cumulative_histograms() -> None:
+def test_the_worst_reactions_are_exported_by_name() -> None:
     robot = whole()
-    reactions = {
-        "reflex": Durations(bounds=(0.001, 0.01), counts=(5, 0, 2), worst=1.0),
-        "of another version": Durations(bounds=(0.001, 0.01), counts=(1, 2), worst=1.0),
-    }
-    robot.on_message("tel/bridge/health", health(reactions=reactions), NOW_NS)
-    found = {
-        (dict(labels)["reaction"], dict(labels)["le"]): count
-        for (name, labels), count in values(robot).items()
-        if name == "t2_reaction_seconds_bucket"
-    }
-    assert found == {("reflex", "0.001"): 5, ("reflex", "0.01"): 5, ("reflex", "+Inf"): 7}
-
-
-def test_the_latest_valid_certificate_of_a_member_counts() -> None:
-    listed = [
-        Member(common_name=f"driver.anna.{n}", role="driver", name="anna", expires=end, revoked=off)
-        for n, (end, off) in enumerate([(SOON, False), (LATER, False), (SOON, False), (LAST, True)])
-    ]
-    certificates = certificate_expiry(Members(site="berlin", members=tuple(listed)))
-    found = flat(metric_families({}, NOW_NS, connected=True, certificates=certificates))
-    labels = frozenset({("role", "driver"), ("name", "anna")})
-    assert found["t2_certificate_expiry_timestamp_seconds", labels] == LATER.timestamp()
+    reflex = Durations(bounds=(0.001, 0.01), counts=(5, 0, 2), worst=1.0)
+    message = health(reactions={"reflex": reflex})
+    robot.on_message("tel/bridge/health", message, NOW_NS)
+    assert of_name(values(robot), "t2_service_reactions_seconds") == {"reflex": 1.0}
