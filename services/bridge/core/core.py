@@ -55,7 +55,6 @@ QUERIES: tuple[tuple[str, Frame, float], ...] = (
     ("driver_left", commands.DriverQuery(Side.LEFT), keys.DRIVER.rate_hz),
     ("driver_right", commands.DriverQuery(Side.RIGHT), keys.DRIVER.rate_hz),
 )
-STEADY = ("bumper", "mileage")  # polled at their rate, with or without answers
 
 
 class Core:
@@ -78,7 +77,7 @@ class Core:
         self.calls = Calls(readiness, settings.times.echo, self._ask)
         failover_ns = round(settings.times.failover * NS_PER_S)
         self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
-        self._polling = Polling(QUERIES, settings.times.answer, steady=STEADY, tick_s=TICK_S)
+        self._polling = Polling(QUERIES, settings.times.answer, TICK_S)
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message, as its publisher counts
         self._mileage: Latest[m.Mileage] | None = None

@@ -1,13 +1,9 @@
 """Polling: the queries that are due, and the answers that are missing. Pure.
 
-A *steady* query (bumper, mileage) is sent at its rate with or without answers. Of any other kind
-one query is open at a time: an answer that does not arrive within the timeout counts as missed and
-halves that query's rate, down to a quarter; the first answer restores it. This limits the load of a
-busy board, and recovers fast.
-
-Answers carry no number, so an answer cannot be matched to its poll, and a lost answer looks like a
-late one. Matching them in order hides losses: after one loss each answer counts for the previous
-poll. Therefore the losses of a steady query count by *slots*, the times between two polls:
+Each query is sent at its rate, with or without answers. Answers carry no number, so an answer
+cannot be matched to its poll, and a lost answer looks like a late one. Matching them in order hides
+losses: after one loss each answer counts for the previous poll. Therefore losses count by *slots*,
+the times between two polls:
 
 ============================== ====================================================================
 in a slot                      meaning
@@ -25,14 +21,11 @@ poll, so a stalled process that does not poll counts no losses.
 """
 
 from collections import deque
-from collections.abc import Collection, Iterable
-
-from msgspec import Struct
+from collections.abc import Iterable
 
 from common.freshness import NS_PER_S
 from common.wire.frame import Frame
 
-SLOWEST = 4  # maximum slowdown, in periods
 WINDOW_NS = NS_PER_S // 5  # of ``lost``
 COPY_PART = 8  # of a period; an answer this soon after another one is a copy
 
@@ -82,68 +75,72 @@ class Losses:
             self._lost_ns.popleft()
 
 
-class Query(Struct):
-    """One query and its state."""
+class Query:
+    """One query: when it is due, its newest round trip, and its lost polls."""
 
-    name: str
-    frame: Frame
-    period_ns: int
-    due_ns: int = 0
-    sent_ns: int | None = None  # send time of the oldest poll that the next answer may belong to
-    slowdown: int = 1
-    missed: int = 0
-    round_trip_ns: int | None = None
-    losses: Losses | None = None  # of a steady query
+    def __init__(self, frame: Frame, rate_hz: float, timeout_ns: int, early_ns: int) -> None:
+        """Set up; it may be sent ``early_ns`` before it is due."""
+        self.frame = frame
+        # 1 equivalent mutant: the first poll is long overdue in any case.
+        self.due_ns = 0
+        self.round_trip_ns: int | None = None
+        self._period_ns = round(NS_PER_S / rate_hz)
+        self.losses = Losses(self._period_ns, timeout_ns, WINDOW_NS)
+        self._timeout_ns = timeout_ns
+        self._early_ns = early_ns
+        # Send time of the oldest poll that the next answer may belong to.
+        self._sent_ns: int | None = None
+
+    def poll(self, now_ns: int) -> bool:
+        """Return whether it is due; then it counts as sent."""
+        if now_ns + self._early_ns < self.due_ns:
+            return False
+        # Keep the period while on time; after a stall start a new one instead of catching up.
+        late = now_ns - self.due_ns >= self._period_ns
+        due_ns = (now_ns if late else self.due_ns) + self._period_ns
+        # After a late poll, wait half a period at least: the answer needs that time.
+        self.due_ns = max(due_ns, now_ns + self._period_ns // 2 + self._early_ns)
+        if self._sent_ns is None or now_ns - self._sent_ns >= self._timeout_ns:
+            self._sent_ns = now_ns
+        self.losses.on_poll(now_ns)
+        return True
+
+    def answered(self, now_ns: int) -> int:
+        """Record an answer; return the time of its poll, or its own if it is unsolicited."""
+        self.losses.on_answer(now_ns)
+        if self._sent_ns is None:
+            return now_ns
+        sent_ns, self._sent_ns = self._sent_ns, None
+        self.round_trip_ns = now_ns - sent_ns
+        return sent_ns
 
 
 class Polling:
     """The queries of a board, each at its own rate."""
 
     def __init__(
-        self,
-        queries: Iterable[tuple[str, Frame, float]],
-        timeout_s: float,
-        steady: Collection[str] = (),
-        tick_s: float = 0.0,
+        self, queries: Iterable[tuple[str, Frame, float]], timeout_s: float, tick_s: float = 0.0
     ) -> None:
-        """Set up with name, frame and rate (Hz) of each query, and the names of the steady ones.
+        """Set up with name, frame and rate (Hz) of each query.
 
         ``tick_s``: the period at which ``due`` is called. A query is sent at the nearest tick.
         """
-        self._early_ns = round(tick_s * NS_PER_S) // 2
+        timeout_ns, early_ns = round(timeout_s * NS_PER_S), round(tick_s * NS_PER_S) // 2
         self.queries = {
-            name: Query(name, frame, round(NS_PER_S / rate_hz)) for name, frame, rate_hz in queries
+            name: Query(frame, rate_hz, timeout_ns, early_ns) for name, frame, rate_hz in queries
         }
-        self._timeout_ns = round(timeout_s * NS_PER_S)
-        for name in steady:
-            query = self.queries[name]
-            query.losses = Losses(query.period_ns, self._timeout_ns, WINDOW_NS)
 
     def due(self, now_ns: int) -> list[Frame]:
         """Return the queries to send now."""
-        return [query.frame for query in self.queries.values() if self._is_due(query, now_ns)]
+        return [query.frame for query in self.queries.values() if query.poll(now_ns)]
 
     def answered(self, name: str, now_ns: int) -> int:
-        """Record an answer; return the time of its query, which bounds its age.
-
-        After an unsolicited answer this is the time of the answer.
-        """
-        query = self.queries[name]
-        if query.slowdown > 1:
-            query.slowdown = 1
-            query.due_ns = min(query.due_ns, now_ns + query.period_ns)
-        if query.losses is not None:
-            query.losses.on_answer(now_ns)
-        if query.sent_ns is None:
-            return now_ns
-        asked_ns, query.sent_ns = query.sent_ns, None
-        query.round_trip_ns = now_ns - asked_ns
-        return asked_ns
+        """Record an answer; return the time of its query, which bounds its age."""
+        return self.queries[name].answered(now_ns)
 
     def lost(self, name: str, now_ns: int) -> int:
-        """Return how many polls of a steady query were lost within the last 0.2 s."""
-        losses = self.queries[name].losses
-        return losses.lost(now_ns) if losses is not None else 0
+        """Return how many polls of a query were lost within the last 0.2 s."""
+        return self.queries[name].losses.lost(now_ns)
 
     def round_trip_s(self) -> float | None:
         """Return the median of the newest round trip of each query, in seconds."""
@@ -153,30 +150,5 @@ class Polling:
         return trips[len(trips) // 2] / NS_PER_S if trips else None
 
     def missed(self) -> dict[str, int]:
-        """Return the number of missed answers, by query."""
-        counts = {
-            query.name: query.missed if query.losses is None else query.losses.total
-            for query in self.queries.values()
-        }
-        return {name: count for name, count in counts.items() if count}
-
-    def _is_due(self, query: Query, now_ns: int) -> bool:
-        if query.losses is None and query.sent_ns is not None:
-            if now_ns - query.sent_ns < self._timeout_ns:
-                return False
-            query.sent_ns = None
-            query.missed += 1
-            query.slowdown = min(2 * query.slowdown, SLOWEST)
-        if now_ns + self._early_ns < query.due_ns:
-            return False
-        # Keep the period while on time; after a stall start a new one instead of catching up.
-        period_ns = query.period_ns * query.slowdown
-        late = now_ns - query.due_ns >= period_ns
-        query.due_ns = now_ns + period_ns if late else query.due_ns + period_ns
-        if query.sent_ns is None or now_ns - query.sent_ns >= self._timeout_ns:
-            query.sent_ns = now_ns
-        if query.losses is not None:
-            query.losses.on_poll(now_ns)
-            # After a late poll, wait half a period at least: the answer needs that time.
-            query.due_ns = max(query.due_ns, now_ns + period_ns // 2 + self._early_ns)
-        return True
+        """Return the number of lost polls, by query."""
+        return {name: q.losses.total for name, q in self.queries.items() if q.losses.total}

@@ -1,7 +1,5 @@
 """Which query is due, which answer is overdue, and which polls are lost."""
 
-from collections.abc import Callable
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +8,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from common.freshness import NS_PER_S
 from common.wire.commands import BumperQuery, DistanceQuery
 from common.wire.frame import Frame
-from services.bridge.core.polling import SLOWEST, Losses, Polling
+from services.bridge.core.polling import Losses, Polling
 
 MS = NS_PER_S // 1000
 PERIOD, TIMEOUT, WINDOW = 20 * MS, 100 * MS, 200 * MS
@@ -21,24 +19,7 @@ def polling() -> Polling:
     return Polling([("bumper", BumperQuery(), 50.0), ("mileage", DistanceQuery(), 10.0)], 0.1)
 
 
-def steady() -> Polling:
-    queries = [("bumper", BumperQuery(), 50.0), ("mileage", DistanceQuery(), 50.0)]
-    return Polling(queries, 0.1, ("bumper",))
-
-
-def sent(polled: Polling, name: str, ticks: range) -> list[int]:
-    """Tick at these milliseconds, answer all but ``name``, and return when that was sent."""
-    frame = polled.queries[name].frame
-    times = []
-    for tick in ticks:
-        if frame in polled.due(tick * MS):
-            times.append(tick)
-        for other in set(polled.queries) - {name}:
-            polled.answered(other, tick * MS)
-    return times
-
-
-# --- one open query -------------------------------------------------------------------------------
+# --- queries -------------------------------------------------------------------------------------
 
 
 def test_each_at_its_own_rate_when_answers_come() -> None:
@@ -53,36 +34,11 @@ def test_each_at_its_own_rate_when_answers_come() -> None:
     assert (polled.round_trip_s(), polled.missed()) == (0.003, {})
 
 
-def test_a_missed_answer_halves_the_rate_down_to_a_quarter_and_the_next_restores_it() -> None:
+def test_an_answer_or_none_leaves_the_rate() -> None:
     polled = polling()
-    assert sent(polled, "bumper", range(1000, 1500, 10)) == [1000, 1100, 1200, 1300, 1400]
-    assert polled.missed() == {"bumper": 4}
-    assert polled.queries["bumper"].slowdown == SLOWEST
-    polled.answered("bumper", 1490 * MS)
-    assert polled.queries["bumper"].slowdown == 1
-    assert sent(polled, "bumper", range(1500, 1510, 10)) == [1500]
-    slow = Polling([("slow", BumperQuery(), 2.0)], 0.1)
-    assert sent(slow, "slow", range(1000, 7000, 10)) == [1000, 1500, 2500, 4500, 6500]
-    assert slow.missed() == {"slow": 5}
-    slow.answered("slow", 7000 * MS)
-    assert sent(slow, "slow", range(7010, 8500, 10)) == [7500, 8000]
-
-
-def test_after_one_missed_answer_the_next_answer_restores_the_rate() -> None:
-    slow = Polling([("slow", BumperQuery(), 2.0)], 0.1)
-    assert sent(slow, "slow", range(1000, 1550, 10)) == [1000, 1500]
-    slow.answered("slow", 1550 * MS)
-    assert sent(slow, "slow", range(1560, 2600, 10)) == [2050, 2550]
-
-
-def test_an_early_answer_leaves_the_rate() -> None:
-    slow = Polling([("slow", BumperQuery(), 2.0)], 0.1, tick_s=0.02)
-    times = []
-    for tick in range(1000, 3000, 10):
-        if slow.due(tick * MS):
-            times.append(tick)
-            slow.answered("slow", tick * MS + 1)
-    assert times == [1000, 1490, 1990, 2490, 2990]
+    times = [tick for tick in range(1000, 2000, 10) if BumperQuery() in polled.due(tick * MS)]
+    assert times == list(range(1000, 2000, 20))
+    assert (polled.lost("bumper", 1980 * MS), polled.missed()) == (11, {"bumper": 49, "mileage": 9})
 
 
 def test_an_answer_is_no_older_than_its_query_and_an_unsolicited_one_changes_nothing() -> None:
@@ -104,19 +60,16 @@ def test_the_round_trip_is_the_median_of_the_queries() -> None:
 
 
 @pytest.mark.parametrize(
-    ("queries", "due"),
+    "due",
     [
-        # the period is kept while less than a period late; a pause is not caught up in a burst
-        (polling, ((1000, 1020), (1023, 1040), (1059, 1060), (1080, 1100))),
-        (polling, ((1000, 1020), (5000, 5020), (5010, 5020), (5020, 5040))),
-        # a late steady poll is not followed at once by the next
-        (steady, ((1000, 1020), (1025, 1040), (1045, 1060), (1075, 1085), (1105, 1125))),
+        # the period is kept while less than a period late; a late poll is not followed at once
+        ((1000, 1020), (1023, 1040), (1045, 1060), (1075, 1085), (1105, 1125)),
+        # a pause is not caught up in a burst
+        ((1000, 1020), (5000, 5020), (5010, 5020), (5020, 5040)),
     ],
 )
-def test_when_the_next_is_due(
-    queries: Callable[[], Polling], due: tuple[tuple[int, int], ...]
-) -> None:
-    polled = queries()
+def test_when_the_next_is_due(due: tuple[tuple[int, int], ...]) -> None:
+    polled = polling()
     for tick, next_tick in due:
         polled.due(tick * MS)
         polled.answered("bumper", tick * MS)
@@ -124,9 +77,8 @@ def test_when_the_next_is_due(
         assert isinstance(polled.queries["bumper"].due_ns, int)
 
 
-@pytest.mark.parametrize("names", [(), ("bumper",)])
-def test_a_query_is_sent_at_the_nearest_tick(names: tuple[str, ...]) -> None:
-    polled = Polling([("bumper", BumperQuery(), 50.0)], 0.1, names, tick_s=0.02)
+def test_a_query_is_sent_at_the_nearest_tick() -> None:
+    polled = Polling([("bumper", BumperQuery(), 50.0)], 0.1, tick_s=0.02)
     for tick in (1001, 1020, 1041, 1059, 1080):  # jitter of a millisecond costs no poll
         assert polled.due(tick * MS), tick
         polled.answered("bumper", tick * MS)
@@ -137,7 +89,7 @@ def test_a_query_is_sent_at_the_nearest_tick(names: tuple[str, ...]) -> None:
 
 
 def test_after_a_late_tick_the_answer_has_half_a_period() -> None:
-    polled = Polling([("bumper", BumperQuery(), 50.0)], 0.1, ("bumper",), tick_s=0.02)
+    polled = Polling([("bumper", BumperQuery(), 50.0)], 0.1, tick_s=0.02)
     polled.due(1000 * MS)
     polled.answered("bumper", 1004 * MS)
     assert polled.due(1039 * MS)  # 19 ms late
@@ -147,20 +99,8 @@ def test_after_a_late_tick_the_answer_has_half_a_period() -> None:
     assert polled.lost("bumper", 1060 * MS) == 0
 
 
-# --- steady queries -------------------------------------------------------------------------------
-
-
-def test_a_steady_query_keeps_its_rate_without_any_answer() -> None:
-    polled = steady()
-    times = [tick for tick in range(1000, 2000, 10) if BumperQuery() in polled.due(tick * MS)]
-    assert times == list(range(1000, 2000, 20))
-    assert polled.queries["bumper"].slowdown == 1
-    assert (polled.lost("bumper", 1980 * MS), polled.missed()["bumper"]) == (11, 49)
-    assert polled.lost("mileage", 2 * NS_PER_S) == 0
-
-
 def test_a_process_that_stalls_loses_nothing() -> None:
-    polled = steady()
+    polled = polling()
     for tick in (1000, 1020, 1340, 1350, 1370, 1900):
         if BumperQuery() in polled.due(tick * MS):
             polled.answered("bumper", (tick + 5) * MS)
@@ -169,7 +109,7 @@ def test_a_process_that_stalls_loses_nothing() -> None:
 
 
 def test_an_answer_after_a_loss_may_be_that_of_the_poll_before() -> None:
-    polled = steady()
+    polled = polling()
     polled.due(NS_PER_S)
     polled.due(NS_PER_S + 20 * MS)
     assert polled.answered("bumper", NS_PER_S + 22 * MS) == NS_PER_S
@@ -179,8 +119,8 @@ def test_an_answer_after_a_loss_may_be_that_of_the_poll_before() -> None:
     assert polled.answered("bumper", NS_PER_S + 162 * MS) == NS_PER_S + 140 * MS, late
 
 
-def test_a_steady_query_takes_back_a_loss_for_a_late_answer() -> None:
-    polled = steady()
+def test_a_query_takes_back_a_loss_for_a_late_answer() -> None:
+    polled = polling()
     for tick in (1000, 1020, 1040):
         polled.due(tick * MS)
     for tick in (1045, 1055):
