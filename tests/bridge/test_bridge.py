@@ -1,58 +1,32 @@
-"""The bridge as a process: real UDP on one side, a real router on the other."""
+"""The bridge as a process: real UDP on one side, a real router on the other; and its ends."""
 
+import os
+import signal
+import subprocess
+import sys
 import threading
 import time
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
+
+import pytest
 
 from common import codec, keys
 from common import messages as m
+from common.config import Sources, load
 from common.loop import Loop
 from common.motion import Command
+from common.service import Node, serve
 from common.wire import reports
 from common.wire.commands import MotionKind
 from common.wire.framing import Framing
-from tests.bridge.bridge_fixture import BridgeFixture
+from services.bridge.bridge import Bridge
+from services.bridge.config import BridgeConfig
+from tests.bridge.conftest import BridgeFixture, bridge_command
 from verification.harness.bus import bus_on, running
+from verification.harness.fake_board import Board, board
 from verification.harness.waiting import wait_until
-
-
-def test_everything_the_board_says_reaches_the_bus_with_its_raw_frame(
-    bridge: BridgeFixture,
-) -> None:
-    names = ["velocity", "mileage", "ultrasonic", "bumper", "driver/left", "driver/right"]
-    wait_until(lambda: {f"tel/bridge/{name}" for name in names} <= set(bridge.seen), "all streams")
-    wait_until(lambda: (link := bridge.link()) and link.state == "up", "link up")
-    wait_until(
-        lambda: (
-            (s := bridge.newest("tel/bridge/switches")) and s.ultrasonic_brake and s.bumper_brake
-        ),
-        "both switches on and echoed",
-    )
-    assert bridge.newest("tel/bridge/mileage").distance == 1.0
-    assert bridge.raw["tel/bridge/bumper"] == Framing().pack(reports.BumperReport(False))
-    assert bridge.newest("tel/bridge/ultrasonic").ranges == (1.0,) * 8
-
-
-def test_a_motion_from_the_router_is_not_even_read(bridge: BridgeFixture) -> None:
-    bridge.drive()
-    rejected = m.Motion(command=Command.RUN, linear=0.9, boot=bridge.bus.boot, seq=2**62)
-    with running(Loop()) as loop, bus_on(bridge.endpoint, loop, lambda _: None) as foreign:
-        session = foreign.sessions[0].zenoh
-        assert session is not None
-        for _ in range(50):
-            session.put(keys.MOTION.on("001"), codec.encode(rejected))
-            time.sleep(0.02)
-    assert not any(motion.linear_mmps == 900 for motion in bridge.board.motions)
-    assert "second_authority" not in bridge.events()
-    assert bridge.board.last().kind is MotionKind.RUN  # type: ignore[union-attr]
-
-
-# --- calls ----------------------------------------------------------------------------------------
-
-
-def switches(bridge: BridgeFixture, **brakes: bool) -> m.SwitchesRequest:
-    """Return the request of an operator who sees the newest state of safety."""
-    return m.SwitchesRequest(**brakes, echo=bridge.heartbeat)
 
 
 def send_request(bridge: BridgeFixture, call: Any, request: Any) -> Any:
@@ -68,25 +42,140 @@ def send_request(bridge: BridgeFixture, call: Any, request: Any) -> Any:
     return answers[0]
 
 
-def ready(bridge: BridgeFixture) -> None:
-    """Wait until the bridge has its board and receives safety's state."""
-    wait_until(lambda: (link := bridge.link()) and link.state == "up", "link up")
-    wait_until(
-        lambda: isinstance(send_request(bridge, keys.SET_SWITCHES, switches(bridge)), m.Switches),
-        "a call that is in time",
-    )
+def test_reports_reach_the_bus_with_their_raw_frames_and_calls_the_board(
+    bridge: BridgeFixture,
+) -> None:
+    names = ["velocity", "mileage", "ultrasonic", "bumper", "driver/left", "driver/right"]
+    wait_until(lambda: {f"tel/bridge/{name}" for name in names} <= set(bridge.seen), "all streams")
+    wait_until(lambda: (s := bridge.newest("tel/bridge/switches")) and s.bumper_brake, "its echo")
+    assert bridge.board.motions[0].kind is MotionKind.BREAK
+    assert bridge.newest("tel/bridge/mileage").distance == 1.0
+    assert bridge.seen["tel/bridge/bumper"][0].raw == Framing().pack(reports.BumperReport(False))
+    assert bridge.newest("tel/bridge/ultrasonic").ranges == (1.0,) * 8
 
+    def switched(on: bool) -> bool:
+        """Return whether the board's echo answers a call with the newest heartbeat."""
+        request = m.SwitchesRequest(bumper_brake=on, echo=bridge.heartbeat)
+        answer = send_request(bridge, keys.SET_SWITCHES, request)
+        return isinstance(answer, m.Switches) and answer.bumper_brake is on
 
-def test_switches_and_lamps_answer_with_the_boards_own_echo(bridge: BridgeFixture) -> None:
-    ready(bridge)
-    answer = send_request(bridge, keys.SET_SWITCHES, switches(bridge, bumper_brake=False))
-    assert answer.bumper_brake is False
-    bridge.command(Command.STOP)
-    wait_until(lambda: (link := bridge.link()) and "brakes" in link.waiting, "not ready")
-    assert (
-        send_request(bridge, keys.SET_SWITCHES, switches(bridge, bumper_brake=True)).bumper_brake
-        is True
-    )
+    wait_until(lambda: switched(False), "an answer")  # until safety's state has arrived there
+    assert switched(True)
     lamp = m.LedRequest(channel=3, mode=1)
     assert isinstance(send_request(bridge, keys.SET_LED, lamp), m.Done)
     assert bridge.board.leds[0].channel == 3
+
+
+def test_a_motion_from_the_router_is_not_even_read(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    rejected = m.Motion(command=Command.RUN, linear=0.9, boot=bridge.bus.boot, seq=2**62)
+    with running(Loop()) as loop, bus_on(bridge.endpoint, loop, lambda _: None) as foreign:
+        session = foreign.sessions[0].zenoh
+        assert session is not None
+        for _ in range(25):
+            session.put(keys.MOTION.on("001"), codec.encode(rejected))
+            time.sleep(0.02)
+    assert not any(motion.linear_mmps == 900 for motion in bridge.board.motions)
+    assert "second_authority" not in bridge.events()
+    bridge.board.wait_for(MotionKind.RUN, 500)
+
+
+# --- its ends: the board is not left with a RUN, for it stops nothing by itself -----------------
+
+
+def bridge_pid(guard: int) -> int:
+    """Return the process that the guard watches, once there is one."""
+    children = Path(f"/proc/{guard}/task/{guard}/children")
+    return int(wait_until(lambda: children.read_text().split(), "a bridge under the guard")[0])
+
+
+def ended(made: Board, pid: int) -> None:
+    """Wait for the end of a process, after which no frame is sent."""
+    wait_until(lambda: not Path(f"/proc/{pid}").exists(), "the end of the bridge")
+    count = len(made.motions)
+    time.sleep(0.3)
+    assert len(made.motions) == count
+
+
+def breaks_since(made: Board, count: int) -> int:
+    """Return how many BRAKEs the board received after that many commands."""
+    return [motion.kind for motion in made.motions[count:]].count(MotionKind.BREAK)
+
+
+def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(bridge: BridgeFixture) -> None:
+    bridge.drive()
+    pid = bridge_pid(bridge.process.pid)
+    assert os.getsid(pid) == pid  # a kill of the guard's session spares the bridge
+    for each in (pid, bridge.process.pid):  # as systemd does when the guard hangs
+        os.kill(each, signal.SIGQUIT)
+    assert bridge.process.wait(20) == -signal.SIGQUIT
+    bridge.board.wait_for(MotionKind.STOP)
+    ended(bridge.board, pid)
+    assert "guard_gone" in bridge.events()
+
+
+def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(
+    bridge: BridgeFixture,
+) -> None:
+    bridge.drive()
+    count = len(bridge.board.motions)
+    os.kill(bridge_pid(bridge.process.pid), signal.SIGHUP)
+    bridge.process.send_signal(signal.SIGHUP)
+    assert bridge.process.wait(20) == 0
+    assert breaks_since(bridge.board, count) == 0
+    bridge.board.wait_for(MotionKind.STOP)
+
+
+SUPERVISOR = """
+import sys
+from cli.run.supervisor import Supervisor
+Supervisor([("bridge", sys.argv[1:])]).run()
+"""
+
+
+def test_a_killed_supervisor_leaves_a_vehicle_that_was_braked() -> None:
+    """The guard passes two signals on: the second one brakes a bridge that waits for rest."""
+    with board() as made:
+        made.speed_mmps = 500
+        command = [sys.executable, "-c", SUPERVISOR, *bridge_command(made, "tcp/127.0.0.1:1")]
+        supervisor = subprocess.Popen(command)
+        made.wait_for(MotionKind.STOP)
+        guard = int(Path(f"/proc/{supervisor.pid}/task/{supervisor.pid}/children").read_text())
+        pid = bridge_pid(guard)
+        count, killed_s = len(made.motions), time.monotonic()
+        supervisor.kill()
+        supervisor.wait()
+        wait_until(lambda: breaks_since(made, count), "BRAKE, not the STOP of a normal end")
+        ended(made, pid)
+        made.wait_for(MotionKind.BREAK)
+        assert made.times[-1] - killed_s < 5.0
+
+
+@pytest.fixture
+def _signals() -> Iterator[None]:
+    """Give the handlers back that ``serve`` replaces."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("_signals")
+def test_a_bug_of_ours_leaves_a_break() -> None:
+    def bug(_: int) -> None:
+        made.wait_for(MotionKind.STOP)
+        raise ZeroDivisionError
+
+    with board() as made:
+        sets = [
+            f"board.port={made.address[1]}",
+            f"board.listen_ports={made.ports}",
+            "bus.connect=tcp/127.0.0.1:1",
+        ]
+        node = Node("bridge", load(BridgeConfig, Sources(environ={}, sets=sets)))
+        bridge = Bridge(node)
+        node.loop.every(1.0, bug)
+        with pytest.raises(ZeroDivisionError):
+            serve(node)
+        made.wait_for(MotionKind.BREAK)
+        bridge._sockets.close()  # the end of the process does it otherwise

@@ -1,4 +1,4 @@
-"""The guard with real processes: the board receives BRAKE whenever the bridge fails."""
+"""The guard: the board receives BRAKE whenever the program that it watches fails."""
 
 import contextlib
 import errno
@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,128 +18,50 @@ import pytest
 
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.config import Sources, load
+from common.errors import LinkError
 from common.settings import Board as BoardSettings
 from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
+from services.bridge import guard as guard_module
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard, Heartbeat
 from services.bridge.udp import Sockets
-from tests.bridge.bridge_fixture import (
-    PROC,
-    BridgeFixture,
-    breaks_since,
-    bridge_pid,
-    bridge_process,
-)
+from tests.common.rights import needs_right
+from tests.common.systemd_manager import PATIENCE_US, Manager
 from verification.harness.fake_board import Board, board
 from verification.harness.waiting import wait_until
 
-
-def test_break_goes_first_then_the_bridges_stop() -> None:
-    with guarded_rig(0.6) as (made, _):
-        kinds = [motion.kind for motion in made.motions]
-    first_stop = kinds.index(MotionKind.STOP)
-    assert first_stop > 0
-    assert set(kinds[:first_stop]) == {MotionKind.BREAK}
-
-
-def test_a_bridge_that_dies_is_braked_for_and_started_again(bridge: BridgeFixture) -> None:
-    bridge.drive()
-    source = bridge.board.sources[-1]
-    first = bridge_pid(bridge.process)
-    count = len(bridge.board.motions)
-    os.kill(first, signal.SIGKILL)
-    wait_until(lambda: breaks_since(bridge.board, count), "BRAKE")
-    wait_until(lambda: bridge_pid(bridge.process) != first, "the next bridge")
-    bridge.board.wait_for(MotionKind.STOP)
-    bridge.drive()
-    assert bridge.board.sources[-1] == source, "from the same port, and the same socket"
+# In the bridge's place: each heartbeat names the second port.
+CHILD = f"""
+import os, signal, sys, time
+from pathlib import Path
+*_, pipe = map(int, os.environ["T2_BRIDGE_DESCRIPTORS"].split(","))
+def beat():
+    os.write(pipe, bytes((1,)))
+def end():
+    sys.exit({EXIT_LINK})  # the guard does not restart it
+lives = Path("lives")
+lives.write_text(lives.read_text() + "x" if lives.exists() else "x")
+first = lives.read_text() == "x"
+"""
 
 
-def test_a_bridge_that_hangs_is_braked_for_and_killed() -> None:
-    with guarded_rig(0.0) as (made, process):
-        first = bridge_pid(process)
-        count = len(made.motions)
-        os.kill(first, signal.SIGSTOP)
-        wait_until(lambda: breaks_since(made, count) > 3, "BRAKE, again and again")
-        wait_until(lambda: bridge_pid(process) != first, "the next bridge")
-        made.wait_for(MotionKind.STOP)
-
-
-@pytest.mark.timed  # more delay than its own, and the bridge is killed
-def test_a_bridge_that_was_only_held_up_lives_on() -> None:
-    with guarded_rig(0.0) as (made, process):
-        first = bridge_pid(process)
-        count = len(made.motions)
-        os.kill(first, signal.SIGSTOP)
-        wait_until(lambda: breaks_since(made, count), "BRAKE")
-        os.kill(first, signal.SIGCONT)
-        made.wait_for(MotionKind.STOP)
-        wait_until(lambda: {sent.kind for sent in made.motions[-20:]} == {MotionKind.STOP}, "STOPs")
-        assert bridge_pid(process) == first
-
-
-def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(bridge: BridgeFixture) -> None:
-    bridge.drive()
-    first = bridge_pid(bridge.process)
-    assert os.getsid(first) == first  # a kill of the guard's session spares the bridge
-    bridge.process.kill()
-    bridge.board.wait_for(MotionKind.STOP)
-    wait_until(lambda: not (PROC / str(first)).exists(), "the end of the bridge")
-    assert "guard_gone" in bridge.events()
-    count = len(bridge.board.motions)
-    with pytest.raises(AssertionError):
-        wait_until(
-            lambda: len(bridge.board.motions) > count,
-            "a frame after both have ended",
-            patience_s=0.3,
-        )
-
-
-def test_a_second_bridge_is_refused_with_the_port(bridge: BridgeFixture) -> None:
-    bridge.board.wait_for(MotionKind.STOP)  # the first one has the ports
-    with bridge_process(bridge.board, bridge.endpoint) as second:
-        assert second.stderr is not None
-        said = second.stderr.read().decode()
-        assert second.wait(20) == EXIT_LINK
-    port = bridge.board.ports[0]
-    assert f"cannot listen on UDP 127.0.0.1:{port}: another program has it" in said
-    assert bridge.process.poll() is None
-
-
-@contextmanager
-def guarded_rig(stall_s: float) -> Iterator[tuple[Board, "subprocess.Popen[bytes]"]]:
-    """Run guard and bridge without a router; the bridge sends STOP."""
-    with (
-        board() as made,
-        bridge_process(made, "tcp/127.0.0.1:1", f"bridge.stall={stall_s}") as process,
-    ):
-        made.wait_for(MotionKind.STOP)
-        yield made, process
-
-
-# --- with a child of our own in the bridge's place ----------------------------------------------
+@pytest.fixture
+def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Board]:
+    monkeypatch.chdir(tmp_path)
+    numbers = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+    before = {number: signal.getsignal(number) for number in numbers}
+    with board() as it:
+        yield it
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def guard_of(made: Board, code: str) -> Guard:
     """Return a guard over a program of ours."""
     sets = [f"board.port={made.address[1]}", f"board.listen_ports={made.ports}"]
     config = load(BridgeConfig, Sources(environ={}, sets=sets)).config
-    return Guard(config, Sockets(config.board), [sys.executable, "-c", code])
-
-
-@pytest.fixture
-def made() -> Iterator[Board]:
-    with board() as it:
-        yield it
-
-
-@pytest.fixture(autouse=True)
-def _signals() -> Iterator[None]:
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    return Guard(config, Sockets(config.board), [sys.executable, "-S", "-c", CHILD + code])
 
 
 def run(guard: Guard) -> int:
@@ -150,43 +71,49 @@ def run(guard: Guard) -> int:
         guard._sockets.close()
 
 
-def test_a_hopeless_end_is_passed_on_and_braked_for(made: Board) -> None:
+def lives() -> int:
+    """Return how often the child was started."""
+    return len(Path("lives").read_text())
+
+
+@pytest.mark.parametrize(
+    ("code", "brakes"),  # one at each start and each end, five before it is killed
+    [
+        ("beat(); first and os.kill(os.getpid(), signal.SIGKILL); end()", 4),
+        ("beat(); first and time.sleep(1000); end()", 4 + 5),
+        ("beat(); first and os.kill(os.getpid(), signal.SIGSTOP); end()", 4 + 5),
+    ],
+    ids=["dies", "hangs", "is stopped"],
+)
+def test_a_bridge_that_fails_is_braked_for_and_started_again(
+    made: Board, code: str, brakes: int
+) -> None:
+    assert run(guard_of(made, code)) == EXIT_LINK
+    assert lives() == 2
+    wait_until(lambda: len(made.motions) >= brakes, "BRAKE")
+    assert {motion.kind for motion in made.motions} == {MotionKind.BREAK}
+    assert made.sources[-1][1] == made.ports[1], "the port that the bridge used"
+
+
+def test_a_bridge_that_was_only_held_up_lives_on(
+    made: Board, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guard_module, "HANG_BRAKES_MAX", 1000)
+    assert run(guard_of(made, "beat(); time.sleep(0.5); beat(); end()")) == EXIT_LINK
+    assert lives() == 1
+    wait_until(lambda: len(made.motions) > 4, "BRAKE meanwhile")
+
+
+def test_a_permanent_error_is_passed_on_and_braked_for(made: Board) -> None:
     assert run(guard_of(made, f"raise SystemExit({EXIT_CONFIG})")) == EXIT_CONFIG
-    made.wait_for(MotionKind.BREAK)
-
-
-BEAT = """
-import os, signal, sys, time
-*_, pipe = map(int, os.environ["T2_BRIDGE_DESCRIPTORS"].split(","))
-os.write(pipe, bytes((1,)))
-"""
-
-
-def test_a_child_that_outlives_its_last_word_is_killed(made: Board) -> None:
-    code = (
-        BEAT
-        + """
-signal.signal(signal.SIGTERM, signal.SIG_IGN)
-os.kill(os.getppid(), signal.SIGTERM)
-os.close(pipe)
-time.sleep(1000)
-"""
-    )
-    guard = guard_of(made, code)
-    assert run(guard) == 128 + signal.SIGKILL
-    made.wait_for(MotionKind.BREAK)
-
-
-def test_breaks_leave_from_the_port_that_the_bridge_used(made: Board) -> None:
-    assert run(guard_of(made, BEAT + f"sys.exit({EXIT_LINK})")) == EXIT_LINK
-    wait_until(lambda: made.sources[-1][1] == made.ports[1], "BRAKE from the second port")
+    wait_until(lambda: len(made.motions) == 2, "BRAKE before and after it")
 
 
 @pytest.mark.parametrize("what", ["pipe", "Popen"])
 def test_a_bridge_that_cannot_be_started_is_braked_for_and_tried_again(
     made: Board, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
-    guard = guard_of(made, f"raise SystemExit({EXIT_LINK})")
+    guard = guard_of(made, "end()")
     tries: list[float] = []
     owner: Any = os if what == "pipe" else subprocess
     real = getattr(owner, what)
@@ -207,45 +134,103 @@ def test_a_bridge_that_cannot_be_started_is_braked_for_and_tried_again(
     assert max(b - a for a, b in itertools.pairwise(breaks)) < 0.3
 
 
-# --- the pipe -------------------------------------------------------------------------------------
+# --- under a supervisor -------------------------------------------------------------------------
 
 
-@pytest.fixture
-def pipe() -> Iterator[tuple[int, int]]:
+def test_the_supervisor_learns_that_it_is_ready_that_it_lives_and_that_it_stops(
+    made: Board, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The child ignores the signal that is passed on, and is killed."""
+    monkeypatch.setattr(guard_module, "HANG_BRAKES_MAX", 10)
+    monkeypatch.setattr(guard_module, "STOP_TIMEOUT_S", 0.1)
+    monkeypatch.setattr(guard_module, "EXIT_BRAKES_MAX", 3)
+    code = """
+assert "NOTIFY_SOCKET" not in os.environ, "the bridge does not speak for its guard"
+signal.signal(signal.SIGTERM, signal.SIG_IGN)
+beat()
+time.sleep(0.6)
+os.kill(os.getppid(), signal.SIGTERM)
+os.close(pipe)
+time.sleep(1000)
+"""
+    with contextlib.closing(Manager(str(tmp_path / "notify"))) as manager:
+        monkeypatch.setenv("NOTIFY_SOCKET", manager.environ["NOTIFY_SOCKET"])
+        monkeypatch.setenv("WATCHDOG_USEC", str(PATIENCE_US))
+        assert run(guard_of(made, code)) == 128 + signal.SIGKILL
+        messages = manager.read()
+    assert messages.count("READY=1") == messages.count("STOPPING=1") == 1
+    assert messages.count("WATCHDOG=1") >= 4, "while it brakes, too"
+    assert lives() == 1
+
+
+SPIN = """
+import os
+from common import realtime
+from services.bridge.guard import DESCRIPTORS_ENV
+realtime.request(realtime.BRIDGE)
+realtime.limit()
+os.write(int(os.environ[DESCRIPTORS_ENV].split(",")[-1]), b"\\0")
+while True:
+    pass
+"""
+GUARD = f"""
+import os, sys
+os.sched_setaffinity(0, {{min(os.sched_getaffinity(0))}})
+from common import log, realtime
+from common.config import Sources, load
+from services.bridge.config import BridgeConfig
+from services.bridge.guard import Guard
+from services.bridge.udp import Sockets
+config = load(BridgeConfig, Sources(environ={{}}, sets=sys.argv[1:])).config
+log.configure(config.log, "guard")
+realtime.request(realtime.GUARD, alone=True)
+sys.exit(Guard(config, Sockets(config.board), [sys.executable, "-c", {SPIN!r}]).run())
+"""
+
+
+@needs_right
+@pytest.mark.timed  # it takes a whole core
+def test_a_bridge_that_runs_away_on_the_only_core_is_braked_for_and_killed() -> None:
+    with board() as made:
+        sets = [f"board.port={made.address[1]}", f"board.listen_ports={made.ports}"]
+        command = [sys.executable, "-c", GUARD, *sets]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as guard:
+            try:
+                assert guard.stderr is not None
+                said = guard.stderr.readline()
+                count = len(made.motions)
+                wait_until(lambda: len(made.motions) > count, "BRAKE")
+            finally:
+                guard.terminate()
+    # A guard that had to wait would have found that Linux had ended it, after a second.
+    assert "the bridge hangs: killed" in said
+
+
+# --- the pipe and the ports ---------------------------------------------------------------------
+
+
+def test_a_beat_names_the_port_waits_for_nobody_and_the_end_is_final() -> None:
     out, into = os.pipe()
-    yield out, into
-    for descriptor in (out, into):
-        with contextlib.suppress(OSError):
-            os.close(descriptor)
-
-
-def test_a_beat_names_the_port_and_the_end_is_final(pipe: tuple[int, int]) -> None:
-    heartbeat = Heartbeat(pipe[1], pytest.fail)
+    heartbeat = Heartbeat(into, pytest.fail)
     for port in (0, 1, 0):
         heartbeat.beat(port)
-    assert os.read(pipe[0], 10) == b"\0\1\0"
+    assert os.read(out, 10) == b"\0\1\0"
+    for _ in range(100_000):  # more than a pipe takes
+        heartbeat.beat(0)
     heartbeat.end()
     heartbeat.end()
     heartbeat.beat(0)
-    assert os.read(pipe[0], 10) == b""
-
-
-def test_a_guard_that_does_not_read_delays_no_beat(pipe: tuple[int, int]) -> None:
-    heartbeat = Heartbeat(pipe[1], pytest.fail)
-    for _ in range(100_000):
-        heartbeat.beat(0)
-
-
-# --- the program --------------------------------------------------------------------------------
+    while os.read(out, 65536):
+        pass
+    os.close(out)
 
 
 def test_a_wrong_setting_ends_it_before_anything_opens(capsys: pytest.CaptureFixture[str]) -> None:
-    assert program.main(["--set", "bridge.stall=0.1"]) == EXIT_CONFIG
-    assert "stall" in capsys.readouterr().err
     assert program.main(["--set", "bridge.stall=-1"]) == EXIT_CONFIG
+    assert "stall" in capsys.readouterr().err
 
 
-def test_a_port_that_becomes_free_is_taken(made: Board) -> None:
+def test_a_port_that_becomes_free_is_taken(made: Board, monkeypatch: pytest.MonkeyPatch) -> None:
     settings = BoardSettings(port=made.address[1], listen_ports=tuple(made.ports))
     taken = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     taken.bind((settings.listen_address, made.ports[0]))
@@ -253,3 +238,7 @@ def test_a_port_that_becomes_free_is_taken(made: Board) -> None:
     leaver.start()
     program.bound(settings).close()
     leaver.join()
+    monkeypatch.setattr(program, "BIND_TIMEOUT_S", 0.0)
+    text = f"cannot listen on UDP 127.0.0.1:{made.ports[0]}: another program has it"
+    with contextlib.closing(program.bound(settings)), pytest.raises(LinkError, match=text):
+        program.bound(settings)
