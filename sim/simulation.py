@@ -10,6 +10,7 @@ same outputs. One step::
 import math
 from collections import Counter
 from collections.abc import Sequence
+from functools import singledispatchmethod
 
 from msgspec import Struct
 
@@ -19,13 +20,14 @@ from common.wire import reports as r
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Side
 from common.wire.framing import Framing, Received
+from sim import requests as q
 from sim import trace as t
 from sim.board import STOP, Board, Switch
 from sim.faults import Cable, Datagram
 from sim.firmware import Output
-from sim.geometry import Rectangle
+from sim.geometry import Pose, Rectangle
 from sim.model import Model
-from sim.requests import Asked, GetTruth
+from sim.requests import Asked
 from sim.sonar import Sonars
 from sim.vehicle import Motors, move, rebounded
 from sim.world import Plan, World
@@ -68,16 +70,16 @@ class Simulation:
         self.body = Rectangle(model.vehicle.length / 2, model.vehicle.width / 2)
         self.pose = plan.start.pose
         self.twist = STILL
-        self.pressed_by_hand = False
-        self.sonars = Sonars(model.vehicle, model.sonar, seed)
-        self._ranges = self.sonars.measure(self.world, self.pose)
+        self._pressed_by_hand = False
+        self._sonars = Sonars(model.vehicle, model.sonar, seed)
+        self._ranges = self._sonars.measure(self.world, self.pose)
         self.board = Board(model, self._ranges, seed)
         self.to_pc = Cable(seed + 1, model.cable.to_pc, ports)
         self.to_board = Cable(seed + 2, model.cable.to_board, ports)
         self.counters: Counter[str] = Counter()
         self._ports = ports
         self._framing = Framing(model.wire.crc, model.wire.crc_covers)
-        self.output = Output(model.firmware, self._framing, ports, seed)
+        self._output = Output(model.firmware, self._framing, ports, seed)
         self._motors = Motors(model.drive, model.vehicle.track)
         self._rebound = model.body.rebound
         self._switch = Switch(model.bumper.bounce, seed)
@@ -88,7 +90,7 @@ class Simulation:
         self._contact = self.world.contact(self.body, self.pose)
         self._silent_until_ns = now_ns
         self._powered = True
-        self._flood: tuple[int, bytes | None] = 0, None  # datagrams a step; their bytes
+        self._flood = q.Flood()
         self._flood_until_ns = now_ns
         self._reported_pressed = False
         self._command = t.Command(mono_ns=now_ns, kind=Command.STOP, linear=0.0, angular=0.0)
@@ -126,36 +128,72 @@ class Simulation:
 
     def handle(self, request: Asked, now_ns: int) -> Reply:
         """Apply one request; a refused one changes nothing."""
-        if isinstance(request, GetTruth):
+        if isinstance(request, q.GetTruth):
             return Reply(ok=True, truth=self.truth(now_ns))
-        error = request._apply(self, now_ns) or ""
+        error = self._apply(request, now_ns) or ""
         self._records.append(t.Disturbed(mono_ns=now_ns, request=request, error=error))
         return Reply(ok=not error, error=error)
 
-    def freeze(self, seconds: float, now_ns: int) -> None:
-        """Make the board neither receive nor send for this long."""
-        self._silent_until_ns = now_ns + round(seconds * NS_PER_S)
+    @singledispatchmethod
+    def _apply(self, request: Asked, now_ns: int) -> str | None:
+        """Apply a request; return the reason of a refusal, if any."""
+        raise NotImplementedError
 
-    def power_cycle(self, seconds: float, now_ns: int) -> None:
-        """Power-cycle the board; it sends again after this time, with all counters at zero."""
-        self._powered = False
-        self.twist = STILL  # unpowered wheels hold: their motors are geared and shorted
-        self.board.power_on()
-        self._hold(self.board.command, now_ns)
-        self.freeze(seconds, now_ns)
-        self._records.append(t.Power(mono_ns=now_ns, on=False))
+    @_apply.register
+    def _(self, request: q.Bumper, now_ns: int) -> None:
+        self._pressed_by_hand = request.pressed
+        self._update_bumper(now_ns)
 
-    def flood(self, rate: int, seconds: float, garbage: bool, now_ns: int) -> None:
-        """Send this many extra datagrams a second, for this long."""
-        self._flood = rate * STEP_NS // NS_PER_S, GARBAGE if garbage else None
-        self._flood_until_ns = now_ns + round(seconds * NS_PER_S)
+    @_apply.register
+    def _(self, request: q.Sonar, _: int) -> None:
+        self._sonars.inject(request)
 
-    def set_driver(self, side: Side, bits: int, now_ns: int) -> None:
-        """Set a driver's fault bits; the board reports a fault unsolicited."""
-        changed = bits != self.board.driver_bits[side]
-        self.board.driver_bits[side] = bits
-        if changed and bits:
-            self._send(self.output.unasked(self.board.driver(side)), now_ns)
+    @_apply.register
+    def _(self, request: q.Driver, now_ns: int) -> None:
+        side = Side[request.side.upper()]
+        changed = request.bits != self.board.driver_bits[side]
+        self.board.driver_bits[side] = request.bits
+        if changed and request.bits:
+            self._send(self._output.unasked(self.board.driver(side)), now_ns)
+
+    @_apply.register
+    def _(self, request: q.Freeze | q.PowerCycle, now_ns: int) -> None:
+        self._silent_until_ns = now_ns + round(request.seconds * NS_PER_S)
+        if isinstance(request, q.PowerCycle):
+            self._powered = False
+            self.twist = STILL  # unpowered wheels hold: their motors are geared and shorted
+            self.board.power_on()
+            self._hold(self.board.command, now_ns)
+            self._records.append(t.Power(mono_ns=now_ns, on=False))
+
+    @_apply.register
+    def _(self, request: q.Mute, _: int) -> None:
+        self._output.mute([q.REPORTS[name] for name in request.reports], request.every)
+
+    @_apply.register
+    def _(self, request: q.Firmware, _: int) -> None:
+        self._output.firmware = request
+
+    @_apply.register
+    def _(self, request: q.Flood, now_ns: int) -> None:
+        self._flood = request
+        self._flood_until_ns = now_ns + round(request.seconds * NS_PER_S)
+
+    @_apply.register
+    def _(self, request: q.Wire, _: int) -> None:
+        if request.direction != "to_board":
+            self.to_pc.faults = request
+        if request.direction != "to_pc":
+            self.to_board.faults = request
+
+    @_apply.register
+    def _(self, request: q.Place, now_ns: int) -> str | None:
+        pose = Pose(request.x, request.y, request.heading)
+        if self.world.blocks(self.body, pose):
+            return f"an obstacle is at x {request.x:g}, y {request.y:g}"
+        self.pose, self.twist = pose, STILL
+        self._update_bumper(now_ns)
+        return None
 
     def truth(self, now_ns: int) -> t.Truth:
         """Return the true state."""
@@ -178,8 +216,8 @@ class Simulation:
             silent=self._silent(now_ns),
         )
 
-    def update_bumper(self, now_ns: int) -> None:
-        """Update the bumper after a change of world, pose or hand."""
+    def _update_bumper(self, now_ns: int) -> None:
+        """Update the bumper after a change of pose or hand."""
         self._contact = self.world.contact(self.body, self.pose)
         self._sense(now_ns)
 
@@ -189,14 +227,14 @@ class Simulation:
         self._update_watchdog()
         self._move(STEP_NS / NS_PER_S)
         if self._steps % SONAR_STEPS == 0:
-            self._ranges = self.sonars.measure(self.world, self.pose)
+            self._ranges = self._sonars.measure(self.world, self.pose)
         self._sense(self.now_ns)
         if self._steps % STREAM_STEPS == 0:
-            self._send(self.output.unasked(self.board.velocity()), self.now_ns)
+            self._send(self._output.unasked(self.board.velocity()), self.now_ns)
         if self.now_ns < self._flood_until_ns:
-            self._send_flood(*self._flood)
+            self._send_flood(self._flood)
         if self._is_merged():
-            self._send(self.output.merged(), self.now_ns)
+            self._send(self._output.merged(), self.now_ns)
         if self._steps % TRUTH_STEPS == 0:
             self._records.append(self.truth(self.now_ns))
 
@@ -206,12 +244,12 @@ class Simulation:
             self._records.append(t.Power(mono_ns=self.now_ns, on=True))
 
     def _is_merged(self) -> bool:
-        wait_ns = self.output.firmware.merge * NS_PER_S
+        wait_ns = self._output.firmware.merge * NS_PER_S
         return wait_ns > 0 and self._steps % max(1, round(wait_ns / STEP_NS)) == 0
 
     def _update_watchdog(self) -> None:
         silence_s = (self.now_ns - self._commanded_ns) / NS_PER_S
-        if 0 < self.output.firmware.watchdog < silence_s:
+        if 0 < self._output.firmware.watchdog < silence_s:
             self.board.command = STOP
 
     def _move(self, dt: float) -> None:
@@ -245,11 +283,11 @@ class Simulation:
                 self._hold(part.frame, now_ns)
                 self._records.append(self._command)
                 self._commanded_ns = now_ns
-                if self._command.kind in self.output.firmware.ignores:
+                if self._command.kind in self._output.firmware.ignores:
                     continue
             answer = self.board.answer(part.frame)
             if answer is not None:
-                self._send(self.output.answer(answer, datagram.port), now_ns)
+                self._send(self._output.answer(answer, datagram.port), now_ns)
 
     def _hold(self, command: MotionCommand, now_ns: int) -> None:
         target = self.board.target(command)
@@ -260,11 +298,11 @@ class Simulation:
             angular=target.angular,
         )
 
-    def _send_flood(self, count: int, garbage: bytes | None) -> None:
-        payload = garbage or self._framing.pack(self.board.velocity())
-        for number in range(0 if self._silent(self.now_ns) else count):
+    def _send_flood(self, flood: q.Flood) -> None:
+        payload = GARBAGE if flood.garbage else self._framing.pack(self.board.velocity())
+        for number in range(flood.rate * STEP_NS // NS_PER_S):
             port = self._ports[number % len(self._ports)]
-            self.to_pc.put(Datagram(payload, port), self.now_ns)
+            self._send([Datagram(payload, port)], self.now_ns)
 
     def _send(self, datagrams: Sequence[Datagram], now_ns: int) -> None:
         if not self._silent(now_ns):
@@ -282,7 +320,7 @@ class Simulation:
                 self._records.append(t.BumperSent(mono_ns=now_ns, pressed=self._reported_pressed))
 
     def _sense(self, now_ns: int) -> None:
-        self._switch.touch(self._contact or self.pressed_by_hand, now_ns)
+        self._switch.touch(self._contact or self._pressed_by_hand, now_ns)
         self.board.sense(self.twist, self._ranges, self._switch.closed)
 
     def _silent(self, now_ns: int) -> bool:

@@ -9,7 +9,7 @@ import pytest
 from common.freshness import NS_PER_S
 from common.wire import commands as c
 from sim import trace as t
-from sim.requests import Asked, PowerCycle, Wire
+from sim.requests import Asked, Bumper, PowerCycle, Wire
 from tests.sim.sim_fixture import START_NS, WALL_AHEAD, SimFixture, model, room
 
 
@@ -51,8 +51,7 @@ def test_the_trace_knows_when_the_first_frame_said_so() -> None:
 @pytest.mark.parametrize("lost", [Wire(foreign=1.0), Wire(drop=1.0)])
 def test_a_frame_that_does_not_arrive_said_nothing(lost: Wire) -> None:
     sim = SimFixture()
-    sim.simulation.pressed_by_hand = True
-    sim.simulation.update_bumper(sim.now_ns)
+    sim.do(Bumper(pressed=True))
     sim.simulation.to_pc.faults = lost
     sim.say(c.BumperQuery())
     assert sim.of(t.BumperSent) == []
