@@ -25,7 +25,7 @@ import zenoh
 
 from bench.child_process import ChildProcess, serve
 from bench.load import MARGIN
-from bench.processes import CpuShares
+from bench.processes import cpu_shares
 from bench.series import CPU, MS, ONE, Column, Limits, Series, Unit
 from common import clock, keys
 from common.bus.session import client_config
@@ -93,13 +93,12 @@ def window(
         frames.follow().forget()
         consumer.begin()
         source.begin()
-        with CpuShares({"site": pid}) as shares:
-            time.sleep(seconds)
+        shares = cpu_shares({"site": pid}, seconds)
         came, asked = consumer.end(), source.end()
         time.sleep(ANSWER_S)
     took: Sequence[int | None] = answers_ns(asked, frames.follow().commands)
     figures: dict[str, Sequence[float]] = {
-        "site": [shares.ns["site"]],
+        "site": [shares["site"]],
         "memory": [stat(pid).rss], "arrived": [came["hz"]],
         "bytes": [came["bytes_per_s"] / int(name[0])], "age": came["ages_ns"],
         "request": [ns for ns in took if ns is not None], "unanswered": [took.count(None)],

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.child_process import ChildProcess
-from bench.processes import CpuShares, module, one_pool, running
+from bench.processes import cpu_shares, module, one_pool, running
 from bench.reaction import SEED
 from bench.series import CPU, ONE, US, Column, Limits, Series, Unit
 from common import keys
@@ -40,13 +40,6 @@ def pids_of(it: RunningStack) -> Pids:
     found = {name: it.processes[name].pid for name in ("router", "safety", "odom")}
     guard = it.processes["bridge"].pid
     return found | {"guard": guard, "bridge": wait_until(lambda: children(guard), "a bridge")[0]}
-
-
-def watched(pids: Pids, seconds: float) -> dict[str, int]:
-    """Return the CPU share of these processes, in ns/s."""
-    with CpuShares(pids) as shares:
-        time.sleep(seconds)
-    return {name: ns for name, ns in shares.ns.items() if name in pids}
 
 
 @contextlib.contextmanager
@@ -88,7 +81,7 @@ def cpu(turns: int = TURNS, seconds: float = TURN_S) -> list[Series]:
     for _ in range(turns):
         for name, run in shuffler.sample([(T2, chain_of_t2), (PAIR, bare_pair)], 2):
             with tempfile.TemporaryDirectory() as folder, run(Path(folder)) as pids:
-                shares = watched(pids, seconds)
+                shares = cpu_shares(pids, seconds)
             for process, ns in {**shares, TOGETHER: sum(shares.values())}.items():
                 samples[name, process, "cpu"].append(ns)
     return [Series(name=name, samples=some) for name, some in samples.items()]
@@ -111,7 +104,7 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
             time.sleep(SETTLE_S)
             for each in some:
                 each.begin()
-            shares = watched(pids_of(it), seconds)
+            shares = cpu_shares(pids_of(it), seconds)
             results: list[Any] = [each.end() for each in some]
             figures: dict[str, Sequence[float]] = {
                 "router": [shares["router"]], "bridge": [shares["bridge"]],

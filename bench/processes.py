@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Self
 
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.freshness import NS_PER_S
@@ -54,31 +53,19 @@ def compiled(name: str, folder: Path) -> str:
     return made
 
 
-class CpuShares:
-    """CPU share of processes over the context: user and system, all threads.
+def cpu_shares(pids: Mapping[str, int], seconds: float) -> dict[str, int]:
+    """Return the CPU share of processes, all threads, in ns/s; without those that end meanwhile."""
+    before, since_s = _cpu_s(pids), time.monotonic()
+    time.sleep(seconds)
+    past_s = time.monotonic() - since_s
+    return {
+        name: round((now - before[name]) * NS_PER_S / past_s) for name, now in _cpu_s(pids).items()
+    }
 
-    ``ns`` has it in nanoseconds per second, without processes that ended meanwhile.
-    """
 
-    def __init__(self, pids: Mapping[str, int]) -> None:
-        self.ns: dict[str, int] = {}
-        self._pids = pids
-
-    def __enter__(self) -> Self:
-        self._before, self._since_s = self._read(), time.monotonic()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        past_s = time.monotonic() - self._since_s
-        after = self._read()
-        self.ns = {
-            name: round((now - self._before[name]) * NS_PER_S / past_s)
-            for name, now in after.items()
-        }
-
-    def _read(self) -> dict[str, float]:
-        found: dict[str, float] = {}
-        for name, pid in self._pids.items():
-            with contextlib.suppress(*GONE):
-                found[name] = stat(pid).cpu_s
-        return found
+def _cpu_s(pids: Mapping[str, int]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for name, pid in pids.items():
+        with contextlib.suppress(*GONE):
+            found[name] = stat(pid).cpu_s
+    return found

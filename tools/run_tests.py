@@ -34,8 +34,7 @@ def main(arguments: Sequence[str]) -> int:
     if not 0 < len(failed) <= RETRIED_MAX:
         return code
     print(f"\nrun_tests: {len(failed)} failed; they run once more, one by one", flush=True)
-    appended = ["--cov-append"] if "--cov" in arguments else []
-    again = ["--last-failed", "--last-failed-no-failures=none", "-n", "0", *appended]
+    again = ["--last-failed", "--last-failed-no-failures=none", "-n", "0"]
     code = pytest([*arguments, *again])
     if code == 0:
         NAMES.parent.mkdir(exist_ok=True)
