@@ -47,6 +47,12 @@ def sources(options: argparse.Namespace) -> Sources:
     return Sources(files=(DEFAULT_FILE, *(options.config or ())), sets=options.sets)
 
 
+def source_words(options: argparse.Namespace) -> list[str]:
+    """Return the options that name sources of settings, as given, for another program."""
+    files = [word for file in options.config or () for word in ("--config", str(file))]
+    return files + [word for text in options.sets for word in ("--set", text)]
+
+
 def add_setting(parser: argparse.ArgumentParser, option: str, path: str, text: str) -> None:
     """Add an option for one setting; it has the effect of ``--set PATH=VALUE``."""
     parser.add_argument(

@@ -4,7 +4,7 @@ from functools import cache
 
 import pytest
 
-from cli.demo.lap import QUICK, Lap
+from cli.demo.lap import Lap
 from cli.demo.score import Trace, good, results, stops
 from sim import trace as t
 from t2.messages import Odometry
@@ -13,16 +13,12 @@ from tests.simulated_robot import SimulatedStack, simulated_robot
 
 
 @cache
-def driven() -> tuple[SimulatedStack, Lap, list[tuple[str, str]]]:
-    """Drive a lap; return the stack, the lap, and safety's answers to its steps."""
-    stack, answers = SimulatedStack(), []
+def driven() -> tuple[SimulatedStack, list[str]]:
+    """Drive a lap; return the stack and what it prints."""
+    stack, shown = SimulatedStack(), list[str]()
     with pytest.MonkeyPatch.context() as patch, simulated_robot(stack, patch) as robot:
-        lap = Lap(
-            robot, QUICK, check=lambda: None,
-            show=lambda step, answer: answers.append((step, answer)) if answer else None,
-        )  # fmt: skip
-        lap.drive()
-    return stack, lap, answers
+        Lap(robot, 1.0, check=lambda: None, show=shown.append).drive()
+    return stack, shown
 
 
 def trace_of(stack: SimulatedStack) -> Trace:
@@ -34,11 +30,10 @@ def trace_of(stack: SimulatedStack) -> Trace:
 
 
 def test_the_lap_is_driven_as_it_should_be() -> None:
-    stack, lap, _ = driven()
+    stack, _ = driven()
     trace = trace_of(stack)
-    rows = results(trace, [as_client(pose, Odometry) for pose in stack.poses], lap)
+    rows = results(trace, [as_client(pose, Odometry) for pose in stack.poses])
     assert good(rows), rows
-    assert lap.unplanned == []
     assert stack.oracle.violations == []
     assert min(x.clearance for x in trace.truth if x.clearance is not None) > 0.15
     (stop,) = stops(trace)
@@ -47,10 +42,15 @@ def test_the_lap_is_driven_as_it_should_be() -> None:
 
 
 def test_safety_answers_as_the_steps_expect() -> None:
-    stack, _, shown = driven()
+    stack, shown = driven()
     answers = stack.answers
     assert (answers[0], answers[-1]) == (False, True)
-    assert shown[0][0] == "reset, refused"
-    assert shown[0][1].startswith("refused: ")
-    assert shown[-1][0] == "reset"
-    assert shown[-1][1].startswith("granted: ")
+    refused, granted = shown.index("  reset, refused"), shown.index("  reset")
+    assert shown[refused + 1].startswith("    refused: ")
+    assert shown[granted + 1].startswith("    granted: ")
+    assert shown[granted + 2 :] == [
+        "  back off",
+        "  turn home",
+        "  drive home",
+        "  turn as at the start",
+    ]

@@ -1,9 +1,8 @@
 """Scheduling stalls of this host, and the demo's time limits for them.
 
-T2's time limits are made for a vehicle's computer, which answers within milliseconds. On a shared
-virtual machine processes stall for tenths of a second, and safety then stops the vehicle all the
-time. There the demo uses longer limits and drives slower, because safety's stopping distance
-includes the reaction time.
+On a shared virtual machine processes stall for tenths of a second, and with the limits for a
+vehicle's computer safety stops the vehicle all the time. There the demo uses longer limits, and
+drives slower: safety's stopping distance includes the reaction time.
 """
 
 import time

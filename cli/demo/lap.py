@@ -11,7 +11,6 @@ import math
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TypeVar
 
 import t2
@@ -27,86 +26,68 @@ TURNS_MAX = 3  # old measurements make a turn end late; the next one corrects it
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Pace:
-    """Speeds of the lap."""
-
-    cruise: float  # m/s
-    careful: float  # m/s
-    spin: float  # rad/s
-
-
-QUICK = Pace(0.8, 0.4, 0.8)
-# For a host with scheduling stalls: measurements are old when the program acts on them.
-PATIENT = Pace(0.5, 0.25, 0.3)
-
-
 class Lap:
-    """One lap of a robot.
+    """One lap of a robot at ``pace``, 1.0 or less.
 
-    ``show`` receives each step, and safety's answers to it; the answer is empty at the start of a
-    step. ``check`` is called before each attempt of a motion, and raises to end the lap.
+    ``show`` receives each line to print, ``check`` is called before each attempt of a motion, and
+    raises to end the lap.
     """
 
     def __init__(
         self,
         robot: t2.Robot,
-        pace: Pace,
+        pace: float,
         *,
-        show: Callable[[str, str], None],
-        check: Callable[[], None],
+        show: Callable[[str], object],
+        check: Callable[[], object],
     ) -> None:
-        self.steps: list[str] = []  # begun
-        self.finished = False
-        self.unplanned: list[str] = []  # latches that the lap does not expect
-        self._robot, self._pace = robot, pace
-        self._show, self._check = show, check
-        self._answer = ""
+        self._robot, self._show, self._check = robot, show, check
+        self._cruise, self._careful, self._spin = 0.8 * pace, 0.4 * pace, 0.8 * pace
+        self._shown = ""
 
     def drive(self) -> None:
         """Drive the lap."""
-        self._step("wait for safety")
+        self._print("  wait for safety")
         self._motion(lambda _: None)
 
-        self._step("drive off to the wall")
+        self._print("  drive off to the wall")
         with suppress(t2.Blocked):
-            self._forward(FAR, self._pace.cruise, expected="blocked")
+            self._forward(FAR, self._cruise, expected="blocked")
 
-        self._step("back off")
-        self._forward(-0.45, self._pace.careful)
+        self._print("  back off")
+        self._forward(-0.45, self._careful)
 
-        self._step("turn left")
+        self._print("  turn left")
         self._turn(math.pi / 2)
 
-        self._step("drive on")
+        self._print("  drive on")
         with suppress(t2.Latched):
-            self._forward(FAR, self._pace.cruise, expected="contact")
+            self._forward(FAR, self._cruise, expected="contact")
 
-        self._step("reset, refused")
+        self._print("  reset, refused")
         try:
             self._robot.reset()
         except t2.T2Error as refusal:  # the bumper is pressed
-            self._answered(f"refused: {refusal}")
+            self._print(f"    refused: {refusal}")
 
-        self._step("release")
+        self._print("  release")
         self._repeat(lambda: self._robot.release("backward", OPERATOR))
 
-        self._step("reset")
+        self._print("  reset")
         self._reset()
 
-        self._step("back off")
-        self._forward(-0.6, self._pace.careful)
+        self._print("  back off")
+        self._forward(-0.6, self._careful)
 
-        self._step("turn home")
+        self._print("  turn home")
         here = self._pose()
         self._turn(wrapped(math.atan2(-here.y, -here.x) - here.heading))
 
-        self._step("drive home")
-        self._forward(math.hypot(here.x, here.y), self._pace.cruise)
+        self._print("  drive home")
+        self._forward(math.hypot(here.x, here.y), self._cruise)
 
-        self._step("turn as at the start")
+        self._print("  turn as at the start")
         self._turn(-self._pose().heading)
-        self.finished = True
 
     def _forward(self, distance: float, speed: float, expected: str = "") -> None:
         """Drive straight, m and m/s; an ``expected`` cause raises ``Blocked`` or ``Latched``."""
@@ -127,7 +108,7 @@ class Lap:
                 left = wrapped(goal - self._robot.odometry.latest().heading)
                 if abs(left) < FACING:
                     return
-                drive.turn(left, self._pace.spin, PATIENCE_S)
+                drive.turn(left, self._spin, PATIENCE_S)
 
         self._motion(go)
 
@@ -139,7 +120,7 @@ class Lap:
 
         def clear() -> None:
             while self._robot.safety.latest().latched:
-                self._answered(f"granted: {self._robot.reset().text}")
+                self._print(f"    granted: {self._robot.reset().text}")
 
         self._repeat(clear)
 
@@ -161,24 +142,18 @@ class Lap:
                 if expected in names and isinstance(stop, t2.Blocked | t2.Latched):
                     raise
                 if isinstance(stop, t2.Latched):
-                    self.unplanned.append(", ".join(names))
                     self._reset()
             except t2.Refused as refusal:
-                self._answered(f"refused: {refusal}")
+                self._print(f"    refused: {refusal}")
             except t2.T2Error:  # no data, for example: wait for it
                 pass
             time.sleep(RETRY_S)
 
-    def _step(self, name: str) -> None:
-        self.steps.append(name)
-        self._answer = ""
-        self._show(name, "")
-
-    def _answered(self, text: str) -> None:
-        """Show safety's answer to a step, once."""
-        if text != self._answer:
-            self._answer = text
-            self._show(self.steps[-1], text)
+    def _print(self, line: str) -> None:
+        """Print a step, or safety's answer to it, once."""
+        if line != self._shown:
+            self._shown = line
+            self._show(line)
 
 
 def travelled(start: Odometry, now: Odometry) -> float:

@@ -10,6 +10,7 @@ and latches when this program ends, hangs or loses the robot.
 
 import argparse
 import select
+import shlex
 import sys
 import time
 from collections.abc import Sequence
@@ -18,9 +19,10 @@ from typing import TextIO
 from cli.inspect import output
 from cli.inspect.addressing import chunks
 from cli.inspect.client import SafetyClient
-from cli.inspect.session import add_options, open_session, repeated, until_interrupt
+from cli.inspect.session import add_options, open_session, until_interrupt
 from common import keys
 from common.bus.probe import Probe
+from common.cli_args import source_words
 from common.errors import LinkError, RobotError
 from common.messages import EstopKeepalive, KeepaliveState, SafetyState
 
@@ -48,13 +50,13 @@ def run(options: argparse.Namespace) -> int:
         try:
             with open_session(options) as session:
                 client = SafetyClient(session.probe, session.robot)
-                return stop(client, repeated(options))
+                return stop(client, source_words(options))
         except LinkError as error:
             if time.monotonic() > end_s:
                 raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
 
 
-def stop(client: SafetyClient, settings: str = "") -> int:
+def stop(client: SafetyClient, settings: Sequence[str] = ()) -> int:
     """Stop one robot, or several by a key expression; return 1 if one does not confirm in time.
 
     ``settings`` are the options that advised commands repeat.
@@ -86,16 +88,17 @@ def expected_robots(probe: Probe, robot: str) -> set[str]:
     return {name for name, path in tokens if path.split("/")[1] in MOVES}
 
 
-def report(confirmed: set[str], missing: Sequence[str], settings: str) -> None:
+def report(confirmed: set[str], missing: Sequence[str], settings: Sequence[str]) -> None:
     """Print each stopped robot, and a warning for each that does not confirm."""
     for each in sorted(confirmed):
-        release = f"t2 call safety/reset --robot {each}{settings}"
+        release = shlex.join(["t2", "call", "safety/reset", "--robot", each, *settings])
         print(f"Robot {each} is stopped. `{release}` releases it.")
     sys.stdout.flush()
     for each in missing:
+        doctor = shlex.join(["t2", "doctor", "--robot", each, *settings])
         output.warn(
             f"t2 estop: sent, but safety of robot {each} does not confirm. "
-            f"{SWITCH}, then `t2 doctor --robot {each}{settings}`."
+            f"{SWITCH}, then `{doctor}`."
         )
     robots = len(confirmed) + len(missing)
     if missing and robots > 1:
@@ -103,7 +106,8 @@ def report(confirmed: set[str], missing: Sequence[str], settings: str) -> None:
         output.warn(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}")
     if not robots:
         output.warn(
-            f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. `t2 robots` lists ids"
+            f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. "
+            "`t2 health --all` lists ids"
         )
 
 

@@ -1,10 +1,11 @@
-"""``t2 health``: service health, from the health messages at 1 Hz.
+"""``t2 health``: service health, from the health messages at 1 Hz, and the state of each robot.
 
 ``t2 health safety`` queries one service, which answers in its own loop. The command ends with the
 answer, so a container's health check can run it often.
 """
 
 import argparse
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import msgspec
@@ -15,7 +16,8 @@ from cli.inspect.diagnosis import LATE_S, NEEDED
 from cli.inspect.session import BusSession, add_options, open_session
 from common import keys
 from common.errors import MessageError
-from common.messages import Health
+from common.messages import Health, SafetyState
+from common.text import printable
 
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
 LISTEN_S = 2.5  # two periods of the health messages, and a margin
@@ -30,12 +32,13 @@ REASONS = {
 
 
 class Row(NamedTuple):
-    """One service with its state and last health message."""
+    """One service with its state and last messages."""
 
     robot: str
     name: str
     state: str  # ok, or a key of REASONS
     health: Health | None
+    safety: SafetyState | None = None  # of the service safety
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +68,7 @@ def show(rows: list[Row], *, as_json_lines: bool) -> int:
             output.line(as_json(row))
     else:
         table = output.table(HEAD, list(map(as_cells, rows)))
-        print("\n".join([table, *reaction_lines(rows)]), flush=True)
+        print("\n".join([table, *reaction_lines(rows), *robot_lines(rows)]), flush=True)
     unhealthy = [row for row in rows if row.state != "ok"]
     for row in unhealthy:
         output.warn(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}")
@@ -94,11 +97,16 @@ def query(session: BusSession, name: str) -> list[Row]:
 def listen_to_all(session: BusSession) -> list[Row]:
     """Listen to all services, and list those without a health message from their tokens."""
     newest: dict[tuple[str, str], Health] = {}
+    states: dict[tuple[str, str], SafetyState] = {}
     session.probe.listen(keys.HEALTH.on(session.robot, service="*"))
+    session.probe.listen(keys.SAFETY.on(session.robot))
     for sample in session.probe.samples(LISTEN_S):
+        robot, path = chunks(sample.key)
         try:
-            health = decode(sample, Health)
-            newest[chunks(sample.key)[0], health.service] = health
+            if path == keys.SAFETY.path:
+                states[robot, "safety"] = decode(sample, SafetyState)
+            else:
+                newest[robot, path.split("/")[1]] = decode(sample, Health)
         except MessageError as error:
             output.warn(f"t2 health: {sample.key}: {error}")
     tokens = map(chunks, session.probe.alive(keys.live_key(session.robot, "*", "*")))
@@ -107,7 +115,7 @@ def listen_to_all(session: BusSession) -> list[Row]:
     needed = {(robot, name) for robot in robots for name in NEEDED}
     return [
         Row(*each, "ok" if each in newest else "hangs" if each in alive else "missing",
-            newest.get(each))
+            newest.get(each), states.get(each))
         for each in sorted(newest.keys() | alive | needed)
     ]  # fmt: skip
 
@@ -116,6 +124,9 @@ def as_json(row: Row) -> dict[str, Any]:
     """Return one service as a JSON object."""
     fields = msgspec.to_builtins(row.health) if row.health else {}
     alive, has_health = row.state in ("ok", "hangs"), row.health is not None
+    if row.safety:
+        names = ("verdict", "latched", "source", "text")
+        fields |= {name: getattr(row.safety, name) for name in names}
     return {"robot": row.robot, "service": row.name, "alive": alive, "told": has_health} | fields
 
 
@@ -149,6 +160,14 @@ def reaction_lines(rows: list[Row]) -> list[str]:
         for name, each in row.health.reactions.items()
         if any(each.counts)
     ]
+
+
+def robot_lines(rows: list[Row]) -> Iterator[str]:
+    """Yield a line for the state of each robot: verdict, source and text of safety."""
+    for row in rows:
+        if state := row.safety:
+            source = f" by {state.source}" if state.source else ""
+            yield printable(f"robot {row.robot}: {state.verdict.upper()}{source}. {state.text}")
 
 
 def duration(seconds: float) -> str:

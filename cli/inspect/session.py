@@ -1,11 +1,12 @@
 """Options, bus session and handling of Ctrl-C that the commands share."""
 
 import argparse
-import shlex
 import signal
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+
+from msgspec.structs import replace
 
 from cli.inspect.addressing import EVERY_ROBOT, parse_site
 from common import codec
@@ -88,21 +89,10 @@ def whole(text: str) -> int:
 
 def settings(options: argparse.Namespace) -> Shared:
     """Return the effective shared settings; ``--robot`` with one name sets ``robot.id``."""
+    given = sources(options)
     if options.robot and "*" not in options.robot:
-        options.sets = [*options.sets, f"robot.id={options.robot}"]
-    return load(Shared, sources(options)).config
-
-
-def repeated(options: argparse.Namespace) -> str:
-    """Return the options that name sources of settings, for a command to copy; " --set A=B".
-
-    ``robot.id`` is left out: the command names its robot.
-    """
-    words = [word for file in options.config or () for word in ("--config", str(file))]
-    for each in options.sets:
-        if not each.startswith("robot.id="):
-            words += ["--set", each]
-    return "".join(f" {shlex.quote(word)}" for word in words)
+        given = replace(given, sets=(*given.sets, f"robot.id={options.robot}"))
+    return load(Shared, given).config
 
 
 @contextmanager

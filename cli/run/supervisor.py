@@ -11,7 +11,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -58,9 +58,9 @@ class Supervisor:
     """
 
     def __init__(
-        self, commands: Sequence[tuple[str, Sequence[str]]], output: BinaryIO | None = None
+        self, commands: Mapping[str, Sequence[str]], output: BinaryIO | None = None
     ) -> None:
-        self.children = [Child(name, command) for name, command in commands]
+        self.children = [Child(name, command) for name, command in commands.items()]
         self._output = output
         self._stopped = False
         self._log = Logger()

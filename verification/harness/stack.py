@@ -16,6 +16,7 @@ from cli.demo.score import Trace, read
 from cli.run.up import commands
 from cli.settings import Everything
 from common import clock
+from common.cli_args import source_words
 from common.config import Sources, load
 from sim.sockets import Control
 from verification.harness.bus import set_options
@@ -111,8 +112,9 @@ def running_stack(
     sets = _all_settings(sets, shipped, listen, control)
     config = load(Everything, Sources(sets=sets)).config
     files = [file for file in (folder / SETTINGS_FILE,) if file.exists()]
-    options = Namespace(no_sim=False, world=world, profile=profiles, config=files, sets=sets)
-    made = {name: list(command) for name, command in commands(options)}
+    options = Namespace(config=files, sets=[*sets, f"sim.world={world}"])
+    started = commands(source_words(options), profiles)
+    made = {name: list(command) for name, command in started.items()}
     if route:
         made["router"] = route(sets)
     trace_file = folder / "trace.jsonl"

@@ -1,6 +1,5 @@
-"""``t2 demo``: one real lap, Ctrl-C, and failures at the start."""
+"""``t2 demo``: one real lap, and failures at the start."""
 
-import signal
 import socket
 import subprocess
 from pathlib import Path
@@ -11,8 +10,7 @@ from cli.__main__ import main
 from cli.demo import host_stalls
 from cli.demo.score import read
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from tests.cli.processes import PATIENCE_S, children, ran, running, sets, t2, wait_gone
-from verification.harness.waiting import wait_until
+from tests.cli.processes import ran, sets, t2
 
 LAP_S = 200.0  # with scheduling stalls; without them a quarter of it
 
@@ -31,7 +29,7 @@ def test_a_lap(tmp_path: Path) -> None:
     lines = result.stdout.splitlines()
     refused = lines.index("  reset, refused") + 1
     assert lines[refused].startswith("    refused: ")
-    for words in ("12 steps", "contact 1: frame to BRAKE frame", f"plot: {out}/lap.png"):
+    for words in ("contact 1: frame to BRAKE frame", f"plot: {out}/lap.png"):
         assert words in result.stdout, words
     assert "WRONG" not in result.stdout
     assert "Traceback" not in everything
@@ -42,19 +40,6 @@ def test_a_lap(tmp_path: Path) -> None:
     assert any(hit.pressed for hit in trace.bumper)
     assert {command.kind for command in trace.commands} == {"stop", "run", "brake"}
     assert '"event": "stopped"' in (out / "processes.log").read_text()
-
-
-def test_ctrl_c_ends_it_and_its_processes(tmp_path: Path) -> None:
-    shown = tmp_path / "shown"
-    with running(t2("demo", "--out", str(tmp_path)), shown) as process:
-        wait_until(lambda: "drive off" in shown.read_text(), "the lap", PATIENCE_S)
-        pids = children(process.pid)
-        assert set(pids) == {"router", "sim", "bridge", "safety", "odom"}
-        process.send_signal(signal.SIGINT)
-        assert process.wait(PATIENCE_S) == 128 + signal.SIGINT
-        wait_gone(list(pids.values()))
-    assert "Traceback" not in shown.read_text()
-    assert not (tmp_path / "lap.png").exists()
 
 
 # --- failures --------------------------------------------------------------------------

@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import msgspec
 import pytest
@@ -12,53 +10,44 @@ from cli.demo.score import Result, Trace, good, odometry_error, read, results
 from tests.cli.demo.lap_fixture import TICK_NS, hit_lap, odometry, truth
 
 
-def lap(*, finished: bool = True, unplanned: tuple[str, ...] = ()) -> Any:
-    return SimpleNamespace(steps=["step"] * 12, finished=finished, unplanned=unplanned)
-
-
 def back(trace: Trace, x: float = 0.0) -> Trace:
     """Return a trace that ends at the start."""
     return replace(trace, truth=[*trace.truth, truth(91, x=x, distance=4.0)])
 
 
-def named(rows: list[Result]) -> dict[str, tuple[str, bool | None]]:
+def named(rows: list[Result]) -> dict[str, tuple[str, bool]]:
     return {what: (amount, fine) for what, amount, fine in rows}
-
-
-def test_a_good_lap() -> None:
-    rows = results(back(hit_lap()), [], lap(unplanned=("runaway",)))
-    assert named(rows) == {
-        "lap finished": ("12 steps", True),
-        "closest to an obstacle": ("1.00 m", True),
-        "odometry error, at rest": ("0.0 cm at most", True),
-        "distance from the start at the end": ("0.0 cm", True),
-        "contact 1: frame to BRAKE frame": ("20.0 ms", True),
-        "contact 1: stopped within": ("4.0 cm", True),
-        "unplanned latches": ("runaway", None),
-    }
-    assert good(rows)
 
 
 NEAR = [truth(0, clearance=None), truth(1, clearance=0.05)]
 
 
 @pytest.mark.parametrize(
-    ("trace", "finished", "wrong"),
+    ("trace", "wrong"),
     [
-        (back(hit_lap()), False, {"lap finished"}),
-        (back(hit_lap(brakes=False)), True, {"contact 1: frame to BRAKE frame"}),
-        (hit_lap(stands=False), True,
-         {"contact 1: stopped within", "distance from the start at the end"}),
-        (replace(hit_lap(), truth=NEAR), True,
-         {"closest to an obstacle", "contact 1: stopped within"}),
-        (back(hit_lap(), x=0.26), True, {"distance from the start at the end"}),
-        (replace(back(hit_lap()), bumper=[]), True, set()),  # no contact
+        (back(hit_lap()), set()),
+        (back(hit_lap(brakes=False)), {"contact 1: frame to BRAKE frame"}),
+        (
+            hit_lap(stands=False),
+            {"contact 1: stopped within", "distance from the start at the end"},
+        ),
+        (replace(hit_lap(), truth=NEAR), {"closest to an obstacle", "contact 1: stopped within"}),
+        (back(hit_lap(), x=0.26), {"distance from the start at the end"}),
     ],
 )  # fmt: skip
-def test_a_lap_that_is_not_good(trace: Trace, finished: bool, wrong: set[str]) -> None:
-    rows = results(trace, [], lap(finished=finished))
-    assert {what for what, _, fine in rows if fine is False} == wrong
-    assert not good(rows)
+def test_results_of_a_lap(trace: Trace, wrong: set[str]) -> None:
+    rows = results(trace, [])
+    assert {what for what, _, fine in rows if not fine} == wrong
+    assert good(rows) is not bool(wrong)
+    if not wrong:
+        assert {what: amount for what, amount, _ in rows} == {
+            "closest to an obstacle": "1.00 m",
+            "odometry error, at rest": "0.0 cm at most",
+            "distance from the start at the end": "0.0 cm",
+            "contact 1: frame to BRAKE frame": "20.0 ms",
+            "contact 1: stopped within": "4.0 cm",
+        }
+    assert not good(results(replace(trace, bumper=[]), []))  # no contact
 
 
 @pytest.mark.parametrize(
@@ -72,7 +61,7 @@ def test_a_lap_that_is_not_good(trace: Trace, finished: bool, wrong: set[str]) -
 def test_the_error_of_odometry_counts_at_rest(tick: int, x: float, error: float) -> None:
     poses = [odometry(mono_ns=tick * TICK_NS, x=x)]
     assert odometry_error(hit_lap(), poses) == pytest.approx(error)
-    rows = named(results(back(hit_lap()), poses, lap()))
+    rows = named(results(back(hit_lap()), poses))
     assert rows["odometry error, at rest"][1] is (error == 0.0)
 
 

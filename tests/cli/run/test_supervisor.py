@@ -34,7 +34,7 @@ def supervised() -> Iterator[list[Supervisor]]:
 
 
 def one(supervised: list[Supervisor], *command: str) -> tuple[Supervisor, Child]:
-    supervisor = Supervisor([("it", command)])
+    supervisor = Supervisor({"it": command})
     supervised.append(supervisor)
     return supervisor, supervisor.children[0]
 
@@ -67,7 +67,7 @@ def test_restarts_follow_the_backoff(supervised: list[Supervisor]) -> None:
 
 def test_a_hopeless_process_stops_all_with_its_code(supervised: list[Supervisor]) -> None:
     code = EXIT_CONFIG
-    supervisor = Supervisor([("calm", SLEEP), ("hopeless", ["sh", "-c", f"exit {code}"])])
+    supervisor = Supervisor({"calm": SLEEP, "hopeless": ["sh", "-c", f"exit {code}"]})
     supervised.append(supervisor)
     assert supervisor.run() == code
     calm, hopeless = (child.process for child in supervisor.children)
@@ -86,7 +86,7 @@ def test_a_safety_that_hangs_is_killed_and_restarted(
         "import time; from common.systemd import Systemd\n"
         "Systemd().beat(0); time.sleep(1000)"  # none, if it believes to be another process
     )
-    supervisor = Supervisor([("safety", [sys.executable, "-c", notify]), ("odom", SLEEP)])
+    supervisor = Supervisor({"safety": [sys.executable, "-c", notify], "odom": SLEEP})
     supervised.append(supervisor)
     supervisor.look(0.0)
     safety, odom = supervisor.children
@@ -110,15 +110,15 @@ def test_a_safety_that_hangs_is_killed_and_restarted(
 # --- stop ----------------------------------------------------------------------------------
 
 
-def reporter(name: str, file: Path, on_term: str = "exit 0") -> tuple[str, list[str]]:
+def reporter(name: str, file: Path, on_term: str = "exit 0") -> list[str]:
     """Return a process that logs its start and its SIGTERM."""
     script = f'trap "echo -{name} >> {file}; {on_term}" TERM; echo +{name} >> {file}; '
-    return name, ["sh", "-c", script + "while :; do sleep 0.05; done"]
+    return ["sh", "-c", script + "while :; do sleep 0.05; done"]
 
 
 def test_processes_stop_in_reverse_order(tmp_path: Path, supervised: list[Supervisor]) -> None:
     file = tmp_path / "order"
-    supervisor = Supervisor([reporter(name, file) for name in "abc"])
+    supervisor = Supervisor({name: reporter(name, file) for name in "abc"})
     supervised.append(supervisor)
     supervisor.look(0.0)
     wait_until(lambda: file.exists() and len(file.read_text().split()) == 3, "three starts")
@@ -131,7 +131,7 @@ def test_a_process_that_ignores_sigterm_is_killed(
 ) -> None:
     monkeypatch.setattr(module, "PATIENCE_S", 0.2)
     file = tmp_path / "order"
-    supervisor = Supervisor([reporter("deaf", file, on_term=":")])
+    supervisor = Supervisor({"deaf": reporter("deaf", file, on_term=":")})
     supervised.append(supervisor)
     supervisor.look(0.0)
     wait_until(lambda: file.exists() and file.read_text(), "its start")
@@ -159,7 +159,7 @@ def test_a_child_of_a_dead_parent_does_not_run() -> None:
 PARENT = """
 import signal, time
 from cli.run.supervisor import Supervisor
-supervisor = Supervisor([("one", ["sleep", "1000"]), ("two", ["sleep", "1000"])])
+supervisor = Supervisor({"one": ["sleep", "1000"], "two": ["sleep", "1000"]})
 signal.signal(signal.SIGINT, lambda *_: supervisor.stop())
 supervisor.look(time.monotonic())
 print(*(child.process.pid for child in supervisor.children), flush=True)

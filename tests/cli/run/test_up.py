@@ -2,16 +2,17 @@
 
 import os
 import signal
-from argparse import Namespace
+import sys
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 import pytest
 
 from cli.__main__ import main
 from cli.run import up
-from cli.run.up import commands, selected
+from cli.run.up import everything, selected
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.errors import ConfigError
+from common.errors import ConfigError, RobotError
 from tests.cli.processes import PATIENCE_S, children, ran, running, sets, t2, wait_gone
 from tests.cli.stack import STACK, ports, starts
 from verification.harness.waiting import wait_until
@@ -72,46 +73,33 @@ def test_an_invalid_setting_starts_nothing(
 # --- commands ---------------------------------------------------------------------------------
 
 
-def options(**given: object) -> Namespace:
-    return Namespace(**({"no_sim": False, "world": None, "config": None, "sets": []} | given))
+def options(*words: str) -> Namespace:
+    parser = ArgumentParser()
+    up.add_arguments(parser)
+    return parser.parse_args(words)
 
 
 @pytest.mark.parametrize(
-    ("given", "names"),
+    ("words", "names"),
     [
-        ({}, ["router", "sim", "bridge", "safety", "odom"]),
-        ({"no_sim": True, "world": "office"}, ["router", "bridge", "safety", "odom"]),
-        ({"no_router": True}, ["sim", "bridge", "safety", "odom"]),
+        ((), "router sim bridge safety odom recorder"),
+        (("--no-sim",), "router bridge safety odom recorder"),
+        (("--no-router", "--ros2"), "sim bridge safety odom recorder ros2"),
+        (("--only", "bridge"), "bridge"),
     ],
 )
-def test_processes_in_order_of_dependency(given: dict[str, object], names: list[str]) -> None:
-    assert [name for name, _ in commands(options(**given))] == names
+def test_processes_in_order_of_dependency(words: tuple[str, ...], names: str) -> None:
+    given = options(*words, "--world", "x", "--config", "a.toml", "--set", "robot.id=2")
+    found = selected(everything(given), given.only)
+    assert list(found) == names.split()
+    passed = ["--config", "a.toml", *sets("sim.world=x", "robot.id=2")]
+    for command in found.values():
+        assert command[-len(passed) :] == passed
 
 
-def test_settings_sources_are_passed_to_all_processes() -> None:
-    files = [Path("a.toml"), Path("b.toml")]
-    made = dict(commands(options(config=files, sets=["robot.id=2", "log.level=debug"], world="x")))
-    passed = ["--config", "a.toml", "--config", "b.toml"]
-    passed += sets("robot.id=2", "log.level=debug")
-    for name, command in made.items():
-        assert command[-len(passed) :] == passed, name
-    assert " ".join(made["sim"][1:6]) == "-P -m sim --world x"
-    assert " ".join(made["router"][1:5]) == "-P -m cli router"
-
-
-def test_the_gateway_only_if_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert up.ros2(options(ros2=False)) == []
-    ((name, command),) = up.ros2(options(ros2=True, sets=["ros2.domain=3"]))
-    assert name == "ros2"
-    assert " ".join(command[1:]) == "-P -m services.ros2 --set ros2.domain=3"
-    monkeypatch.setattr(up, "find_spec", lambda name: None)
-    with pytest.raises(ConfigError, match="--ros2 needs xxhash: install the extra `ros2`"):
-        up.ros2(options(ros2=True))
-
-
-def test_only_one_process() -> None:
-    everything = commands(options())
-    assert selected(everything, None) == everything
-    assert [name for name, _ in selected(everything, "bridge")] == ["bridge"]
+def test_a_process_that_does_not_exist(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ConfigError, match="--only brigde: no such process; available: router, sim"):
-        selected(everything, "brigde")
+        selected(everything(options()), "brigde")
+    monkeypatch.setitem(sys.modules, "xxhash", None)
+    with pytest.raises(RobotError, match="--ros2 needs xxhash: install the extra `ros2`"):
+        everything(options("--ros2"))
