@@ -14,8 +14,7 @@ from pathlib import Path
 from bench.processes import Command, compiled, module, one_pool, running
 from bench.series import ONE, US, Column, Limits, Series
 from common import realtime
-from common.wire import commands, reports
-from common.wire.framing import Framing
+from common.wire import commands, framing, reports
 from verification.harness.bus import set_options
 from verification.harness.ports import free_port, udp_ports
 
@@ -24,14 +23,13 @@ BLOCKS, HITS, WARM = 2, 250, 20
 _, BUSY = LOADS = ("quiet", "busy")
 BUSY_PROCESSES, SPIN = 4, [sys.executable, "-S", "-c", "while True: pass"]
 PATIENCE_S = 600.0
-FRAMING = Framing("crc-16", "payload")
-HIT, CLEAR = (FRAMING.pack(reports.BumperReport(on)).hex() for on in (True, False))
+HIT, CLEAR = (framing.pack(reports.BumperReport(on)).hex() for on in (True, False))
 BREAK, STOP = (
-    FRAMING.pack(commands.MotionCommand(kind)).hex()
+    framing.pack(commands.MotionCommand(kind)).hex()
     for kind in (commands.MotionKind.BREAK, commands.MotionKind.STOP)
 )
 # Safety accepts a reset only while the vehicle stands.
-STANDS = FRAMING.pack(reports.VelocityReport(0, 0)).hex()
+STANDS = framing.pack(reports.VelocityReport(0, 0)).hex()
 
 Start = Callable[[int, int], AbstractContextManager[object]]  # its port, the board's port
 LOOP, REFLEX = "Python, one process", "T2, reflex"

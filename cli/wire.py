@@ -24,9 +24,10 @@ from common.config import load
 from common.errors import RobotError
 from common.messages import SONAR_NAMES, FaultName
 from common.settings import AngularUnit, Shared, Wire
+from common.wire import framing
 from common.wire.commands import TO_BOARD, MotionCommand
 from common.wire.frame import Frame, Kinds
-from common.wire.framing import Framing, Reason, Received, Rejected
+from common.wire.framing import Reason, Received, Rejected
 from common.wire.reports import FROM_BOARD, SONAR_FAULT_MM
 
 TABLES: dict[str, Kinds] = {"pc": TO_BOARD, "board": FROM_BOARD}
@@ -62,11 +63,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the frames of the datagrams; return 1 if a run of bytes is invalid."""
     wire = load(WireConfig, sources(options)).config.wire
-    framing = Framing(wire.crc, wire.crc_covers)
     bad = 0
     for where, data in datagrams(options.source):
         offset = 0
-        for part in parts(framing, data):
+        for part in parts(data):
             bad += isinstance(part, Rejected)
             print(f"{where} +{offset:<4} {as_text(part, wire)}".strip())
             offset += size_of(part)
@@ -160,7 +160,7 @@ def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
 Good = dict[str, Received]  # the frame by its possible senders
 
 
-def parts(framing: Framing, data: bytes) -> Iterator[Good | Rejected]:
+def parts(data: bytes) -> Iterator[Good | Rejected]:
     """Yield the frames and the invalid runs in order; together they contain all bytes."""
     offset = 0
     while offset < len(data):

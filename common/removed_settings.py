@@ -18,6 +18,8 @@ LENGTHENED = {
     ),
 }  # fmt: skip
 CONSTANT = {
+    "wire.crc": "CRC-16/ARC, which the board uses",
+    "wire.crc_covers": "the payload",
     "bridge.failover": "0.1 s",
     "bridge.answer_timeout": "0.1 s",
     "bridge.bumper_rate": "50 Hz",

@@ -12,9 +12,6 @@ from typing import Annotated, ClassVar, Literal, TypeVar
 import msgspec
 from msgspec import Meta, Struct
 
-from common.errors import WireError
-from common.wire.framing import Covers, crc_function
-
 T = TypeVar("T", bound=Struct)
 Limits = Mapping[str, tuple[float, float]]
 Stall = Annotated[float, Meta(ge=0.0, le=1.0)]
@@ -237,16 +234,8 @@ def _check_ipv4(name: str, value: str) -> None:
 class Wire(Section, frozen=True, kw_only=True):
     """Frame details that the manual does not define; the defaults are the current answers."""
 
-    crc: str = "crc-16"  # a 16-bit name of crcmod.predefined
-    crc_covers: Covers = "payload"
     command_angular_unit: AngularUnit = "decidegree"  # per second, of motion commands
     feedback_angular_unit: AngularUnit = "decidegree"  # per second, of measured velocities
-
-    def __post_init__(self) -> None:
-        try:
-            crc_function(self.crc)
-        except WireError as error:
-            raise ValueError(str(error)) from None
 
 
 class Log(Section, frozen=True, kw_only=True):

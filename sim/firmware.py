@@ -8,9 +8,9 @@ import random
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 
+from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Frame
-from common.wire.framing import Framing
 from sim.faults import Datagram
 from sim.model import Firmware, Where
 
@@ -20,9 +20,8 @@ ECHOES = (r.UltrasonicBrakeReport, r.BumperBrakeReport)
 class Output:
     """Packs frames for the PC; ``firmware`` may change while it runs."""
 
-    def __init__(self, firmware: Firmware, framing: Framing, ports: Sequence[int], seed: int):
+    def __init__(self, firmware: Firmware, ports: Sequence[int], seed: int):
         self.firmware = firmware
-        self._framing = framing
         self._ports = ports
         self._random = random.Random(f"firmware {seed}")
         self._muted: frozenset[type[Frame]] = frozenset()
@@ -62,7 +61,7 @@ class Output:
         for port in ports:
             if self._is_muted(type(frame)):
                 continue
-            payload = self._framing.pack(frame)
+            payload = framing.pack(frame)
             if self.firmware.merge:
                 self._waiting[port] += payload
                 continue

@@ -16,10 +16,11 @@ from msgspec import Struct
 
 from common.freshness import NS_PER_S
 from common.motion import STILL, Command
+from common.wire import framing
 from common.wire import reports as r
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Side
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from sim import requests as q
 from sim import trace as t
 from sim.board import STOP, Board, Switch
@@ -78,8 +79,7 @@ class Simulation:
         self.to_board = Cable(seed + 2, model.cable.to_board, ports)
         self.counters: Counter[str] = Counter()
         self._ports = ports
-        self._framing = Framing(model.wire.crc, model.wire.crc_covers)
-        self._output = Output(model.firmware, self._framing, ports, seed)
+        self._output = Output(model.firmware, ports, seed)
         self._motors = Motors(model.drive, model.vehicle.track)
         self._rebound = model.body.rebound
         self._switch = Switch(model.bumper.bounce, seed)
@@ -274,7 +274,7 @@ class Simulation:
                 self._read(datagram, now_ns)
 
     def _read(self, datagram: Datagram, now_ns: int) -> None:
-        for part in self._framing.read(datagram.payload, TO_BOARD):
+        for part in framing.read(datagram.payload, TO_BOARD):
             if not isinstance(part, Received):
                 self.counters[f"rejected_{part.reason}"] += 1
                 continue
@@ -299,7 +299,7 @@ class Simulation:
         )
 
     def _send_flood(self, flood: q.Flood) -> None:
-        payload = GARBAGE if flood.garbage else self._framing.pack(self.board.velocity())
+        payload = GARBAGE if flood.garbage else framing.pack(self.board.velocity())
         for number in range(flood.rate * STEP_NS // NS_PER_S):
             port = self._ports[number % len(self._ports)]
             self._send([Datagram(payload, port)], self.now_ns)
@@ -312,7 +312,7 @@ class Simulation:
     def _record_bumper(self, datagram: Datagram, now_ns: int) -> None:
         if datagram.foreign:
             return
-        for part in self._framing.read(datagram.payload, r.FROM_BOARD):
+        for part in framing.read(datagram.payload, r.FROM_BOARD):
             if not isinstance(part, Received) or not isinstance(part.frame, r.BumperReport):
                 continue
             if part.frame.on != self._reported_pressed:

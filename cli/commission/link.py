@@ -87,8 +87,8 @@ def _link_problems(
 def _crc_problem(bad: int, frames: int, nonzero: int) -> str:
     if bad and bad >= MOST_BAD * (bad + frames):
         return (
-            f"{bad} bad CRCs against {frames} good frames: this firmware has another CRC. Capture "
-            "its frames, try wire.crc with `t2 wire decode` (docs/checkout.md), and set it."
+            f"{bad} bad CRCs against {frames} good frames: this firmware has another CRC than "
+            "CRC-16/ARC over the payload (common/wire/framing.py)."
         )
     if bad:
         return f"{bad} bad CRCs against {frames} good frames: check the cable and its connectors."

@@ -286,7 +286,7 @@ def link(now: Link, before: Message) -> Iterator[Finding]:
     new = {reason: n - earlier.rejected.get(reason, 0) for reason, n in now.rejected.items()}
     if bad := ", ".join(f"{n} {reason}" for reason, n in new.items() if n > 0):
         text = f"the bridge rejects frames of the board: {bad}"
-        todo = "`t2 wire decode` shows the invalid frames; see wire.crc"
+        todo = "`t2 wire decode` shows the invalid frames"
         yield Finding("link", "note", text, todo)
     if (unsent := now.send_errors - earlier.send_errors) > 0:
         text = f"the system failed to send {unsent} datagrams to the board"

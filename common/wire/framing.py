@@ -10,7 +10,6 @@ fast path; the reason is determined only after a failure.
 import struct
 from collections.abc import Callable
 from enum import StrEnum
-from typing import Literal
 
 import crcmod.predefined
 import msgspec
@@ -21,7 +20,8 @@ from common.wire.frame import HEADER, MAGIC, OPENING, PAYLOAD_OFFSET, Frame, Kin
 # Bound here: the attribute lookup takes as long as the call itself.
 pack_header, unpack_header = HEADER.pack, HEADER.unpack_from
 
-Covers = Literal["payload", "header_and_payload"]
+# CRC-16/ARC; it covers the payload alone, so the header is not protected (``robot/wire.md``).
+checksum: Callable[[bytes], int] = crcmod.predefined.mkCrcFun("crc-16")
 
 
 class Reason(StrEnum):
@@ -50,68 +50,43 @@ class Rejected(msgspec.Struct, frozen=True, gc=False):
     detail: str
 
 
-class Framing:
-    """Packs and reads frames with one CRC variant.
-
-    crc: a name of ``crcmod.predefined``, 16 bits; ``crc-16`` is CRC-16/ARC, the board's.
-    covers: ``payload``, or ``header_and_payload`` with the CRC field counted as zero.
-    """
-
-    # 1 equivalent mutant: crcmod takes the names of its CRCs in any case.
-    def __init__(self, crc: str = "crc-16", covers: Covers = "payload") -> None:
-        self._checksum = crc_function(crc)
-        self._covers_header = covers != "payload"
-
-    def pack(self, frame: Frame) -> bytes:
-        """Return the frame with its header."""
-        payload = frame.to_bytes()
-        checksum, opening = self._checksum, frame.OPENING
-        covered = pack_header(opening, 0) + payload if self._covers_header else payload
-        return pack_header(opening, checksum(covered)) + payload
-
-    def read(self, datagram: bytes, kinds: Kinds) -> list[Received | Rejected]:
-        """Return the parts of a datagram, in order; ``kinds`` are the frames of its sender."""
-        parts: list[Received | Rejected] = []
-        start, end = 0, len(datagram)
-        for _ in datagram:  # bounded: each part has at least one byte
-            part = self.part_at(start, datagram, kinds)
-            parts.append(part)
-            start += len(part.raw)
-            if start == end:
-                break
-        return parts
-
-    def part_at(self, start: int, datagram: bytes, kinds: Kinds) -> Received | Rejected:
-        """Return the frame that begins at ``start``, or the run of invalid bytes."""
-        try:
-            opening, crc = unpack_header(datagram, start)
-            kind = kinds[opening]
-            raw = datagram[start : start + kind.SIZE]
-            payload = raw[PAYLOAD_OFFSET:]
-            numbers = kind.LAYOUT.unpack(payload)
-        except (struct.error, KeyError):  # truncated, or no known frame begins here
-            return _reject(datagram, start, *_fault(datagram, start, kinds))
-        checksum = self._checksum
-        computed = checksum(pack_header(opening, 0) + payload if self._covers_header else payload)
-        if computed != crc:
-            detail = f"header says 0x{crc:04x}, the bytes give 0x{computed:04x}"
-            return _reject(datagram, start, Reason.BAD_CRC, detail)
-        try:
-            return Received(kind.from_wire(numbers), raw)
-        except WireError as error:
-            return _reject(datagram, start, Reason.BAD_VALUE, str(error))
+def pack(frame: Frame) -> bytes:
+    """Return the frame with its header."""
+    payload = frame.to_bytes()
+    return pack_header(frame.OPENING, checksum(payload)) + payload
 
 
-def crc_function(name: str) -> Callable[[bytes], int]:
-    """Return a CRC of ``crcmod.predefined``; raise ``WireError`` for an unknown or wider one."""
+def read(datagram: bytes, kinds: Kinds) -> list[Received | Rejected]:
+    """Return the parts of a datagram, in order; ``kinds`` are the frames of its sender."""
+    parts: list[Received | Rejected] = []
+    start, end = 0, len(datagram)
+    for _ in datagram:  # bounded: each part has at least one byte
+        part = part_at(start, datagram, kinds)
+        parts.append(part)
+        start += len(part.raw)
+        if start == end:
+            break
+    return parts
+
+
+def part_at(start: int, datagram: bytes, kinds: Kinds) -> Received | Rejected:
+    """Return the frame that begins at ``start``, or the run of invalid bytes."""
     try:
-        crc = crcmod.predefined.PredefinedCrc(name)
-    except KeyError:
-        raise WireError(f"no CRC is called {name!r}; the board's is 'crc-16'") from None
-    if crc.digest_size != 2:
-        raise WireError(f"CRC {name!r} has {crc.digest_size * 8} bits, the header has room for 16")
-    function: Callable[[bytes], int] = crcmod.predefined.mkCrcFun(name)
-    return function
+        opening, crc = unpack_header(datagram, start)
+        kind = kinds[opening]
+        raw = datagram[start : start + kind.SIZE]
+        payload = raw[PAYLOAD_OFFSET:]
+        numbers = kind.LAYOUT.unpack(payload)
+    except (struct.error, KeyError):  # truncated, or no known frame begins here
+        return _reject(datagram, start, *_fault(datagram, start, kinds))
+    computed = checksum(payload)
+    if computed != crc:
+        detail = f"header says 0x{crc:04x}, the bytes give 0x{computed:04x}"
+        return _reject(datagram, start, Reason.BAD_CRC, detail)
+    try:
+        return Received(kind.from_wire(numbers), raw)
+    except WireError as error:
+        return _reject(datagram, start, Reason.BAD_VALUE, str(error))
 
 
 def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:

@@ -59,12 +59,3 @@ class BridgeConfig(settings.Shared, frozen=True, kw_only=True):
     wire: settings.Wire = settings.Wire()
     vehicle: settings.Vehicle = settings.Vehicle()
     bridge: Bridge = Bridge()
-
-    def __post_init__(self) -> None:
-        known = settings.Wire()
-        crc = self.wire.crc, self.wire.crc_covers
-        if self.board.relay_port and crc != (known.crc, known.crc_covers):
-            raise ValueError(
-                f"board.relay_port wants wire.crc {known.crc} over the {known.crc_covers}: "
-                "the relay knows no other"
-            )

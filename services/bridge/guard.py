@@ -37,8 +37,8 @@ from common.child_process import Backoff
 from common.cli_args import NO_RESTART
 from common.log import Logger
 from common.systemd import Systemd
+from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
-from common.wire.framing import Framing
 from services.bridge.config import BridgeConfig
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
@@ -86,7 +86,6 @@ class Guard:
         self._sockets = sockets
         self._command = command
         self._missed_ms = round(config.bridge.times.heartbeat * 1000)
-        framing = Framing(config.wire.crc, config.wire.crc_covers)
         self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
         self._port = 0  # index of the port that the bridge uses
         self._stopping = False

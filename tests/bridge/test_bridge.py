@@ -18,9 +18,8 @@ from common.config import Sources, load
 from common.loop import Loop
 from common.motion import Command
 from common.service import Node, serve
-from common.wire import reports
+from common.wire import framing, reports
 from common.wire.commands import MotionKind
-from common.wire.framing import Framing
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from tests.bridge.conftest import BridgeFixture, bridge_command
@@ -50,7 +49,7 @@ def test_reports_reach_the_bus_with_their_raw_frames_and_calls_the_board(
     wait_until(lambda: (s := bridge.newest("tel/bridge/switches")) and s.bumper_brake, "its echo")
     assert bridge.board.motions[0].kind is MotionKind.BREAK
     assert bridge.newest("tel/bridge/mileage").distance == 1.0
-    assert bridge.seen["tel/bridge/bumper"][0].raw == Framing().pack(reports.BumperReport(False))
+    assert bridge.seen["tel/bridge/bumper"][0].raw == framing.pack(reports.BumperReport(False))
     assert bridge.newest("tel/bridge/ultrasonic").ranges == (1.0,) * 8
 
     def switched(on: bool) -> bool:

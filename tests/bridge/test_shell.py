@@ -12,8 +12,8 @@ from common.messages import Link, Motion
 from common.motion import Command
 from common.service import Node
 from common.settings import Board as Settings
+from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
-from common.wire.framing import Framing
 from common.wire.reports import BumperReport
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
@@ -22,7 +22,7 @@ from verification.harness.fake_board import Board, board
 from verification.harness.waiting import wait_until
 
 HIT, STOP, BREAK = (
-    Framing().pack(frame)
+    framing.pack(frame)
     for frame in (
         BumperReport(True),
         MotionCommand(MotionKind.STOP),

@@ -16,16 +16,15 @@ from hypothesis import strategies as st
 from cli import wire as command
 from cli.__main__ import main
 from cli.wire import Datagram, as_text, from_bytes, parts, size_of
-from common.cli_args import EXIT_CONFIG
 from common.errors import RobotError
 from common.settings import Wire
 from common.wire import commands as c
+from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
-from common.wire.framing import Framing, Rejected
+from common.wire.framing import Rejected
 from verification.harness.frame_strategies import COMMANDS, REPORTS
 
-framing = Framing()
 RUN = framing.pack(c.MotionCommand(c.MotionKind.RUN, 500, 300))
 QUERY = framing.pack(c.DistanceQuery())
 VELOCITY = framing.pack(r.VelocityReport(-250, -15))
@@ -169,20 +168,11 @@ def test_decode_prints_one_line_per_frame(
     assert "+12   board DistanceReport distance 1234 mm, heading -90.5 deg" in second
 
 
-def test_wire_settings_apply(capsys: pytest.CaptureFixture[str]) -> None:
-    raw = Framing("modbus", "header_and_payload").pack(COMMANDS[0]).hex()
-    sets = ["--set", "wire.crc=modbus", "--set", "wire.crc_covers=header_and_payload"]
-    assert main(["wire", "decode", raw]) == 1
-    assert main(["wire", "decode", raw, *sets]) == 0
-    assert main(["wire", "decode", raw, "--set", "wire.crc=no-such"]) == EXIT_CONFIG
-    assert "wire" in capsys.readouterr().err
-
-
 # --- frames as text -------------------------------------------------------------------------
 
 
 def lines(raw: bytes, wire: Wire | None = None) -> list[str]:
-    return [as_text(part, wire or Wire()) for part in parts(framing, raw)]
+    return [as_text(part, wire or Wire()) for part in parts(raw)]
 
 
 TEXTS = [
@@ -236,13 +226,13 @@ def test_frames_and_garbage() -> None:
 def test_the_reason_of_the_latest_check() -> None:
     raw = bytearray(framing.pack(r.DistanceReport(5, 5)))
     raw[-1] ^= 1
-    (part,) = parts(framing, bytes(raw))
+    (part,) = parts(bytes(raw))
     assert isinstance(part, Rejected)
     assert part.reason == "bad_crc"  # and not the wrong size of a query
 
 
 @given(st.lists(st.sampled_from([*COMMANDS, *REPORTS]).map(framing.pack) | st.binary(max_size=9)))
 def test_every_byte_is_in_a_part(pieces: list[bytes]) -> None:
-    found = list(parts(framing, b"".join(pieces)))
+    found = list(parts(b"".join(pieces)))
     assert sum(map(size_of, found)) == len(b"".join(pieces))
     assert all(as_text(part, Wire()) for part in found)

@@ -14,7 +14,6 @@ from common.settings import (
     ProtectedSection,
     Robot,
     Vehicle,
-    Wire,
     sonar_mounts,
 )
 
@@ -147,12 +146,6 @@ def test_a_robots_id_is_one_plain_chunk_of_a_key(name: str) -> None:
 def test_a_board_that_cannot_be_reached_is_refused(given: dict[str, object], sentence: str) -> None:
     with pytest.raises(msgspec.ValidationError, match=sentence):
         msgspec.convert(given, Board)
-
-
-@pytest.mark.parametrize("name", ["crc-32", "nonsense", ""])
-def test_a_crc_must_be_one_of_16_bits(name: str) -> None:
-    with pytest.raises(ValueError, match="crc"):
-        Wire(crc=name)
 
 
 def test_sonars_are_on_the_edge_clockwise_from_the_left_and_look_outward() -> None:

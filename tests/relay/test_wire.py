@@ -4,22 +4,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.wire import commands, reports
+from common.wire import commands, framing, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from services.relay import wire
 
-FRAMING = Framing()
-RUN = FRAMING.pack(MotionCommand(MotionKind.RUN, 500, -20))
-STOP = FRAMING.pack(MotionCommand(MotionKind.STOP))
-QUERY = FRAMING.pack(commands.BumperQuery())
-SWITCH = FRAMING.pack(commands.BumperBrakeSet(True))
-HIT, CLEAR = (FRAMING.pack(reports.BumperReport(on)) for on in (True, False))
+RUN = framing.pack(MotionCommand(MotionKind.RUN, 500, -20))
+STOP = framing.pack(MotionCommand(MotionKind.STOP))
+QUERY = framing.pack(commands.BumperQuery())
+SWITCH = framing.pack(commands.BumperBrakeSet(True))
+HIT, CLEAR = (framing.pack(reports.BumperReport(on)) for on in (True, False))
 
 
 def test_the_check_value_and_the_brake_are_those_of_the_wire() -> None:
     assert wire.crc16(b"123456789") == 0xBB3D
-    assert FRAMING.pack(MotionCommand(MotionKind.BREAK)) == wire.BRAKE
+    assert framing.pack(MotionCommand(MotionKind.BREAK)) == wire.BRAKE
 
 
 def test_a_frame_is_that_of_the_bridge() -> None:
@@ -29,7 +28,7 @@ def test_a_frame_is_that_of_the_bridge() -> None:
 
 @given(st.binary(max_size=40))
 def test_the_crc_is_that_of_the_bridge(payload: bytes) -> None:
-    assert wire.crc16(payload) == Framing()._checksum(payload)
+    assert wire.crc16(payload) == framing.checksum(payload)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +69,7 @@ def test_no_command_that_the_bridge_reads_is_overlooked(good: bytes, at: int, by
     motions = wire.motions(damaged)
     if motions is None:
         return
-    parts = FRAMING.read(damaged, TO_BOARD)
+    parts = framing.read(damaged, TO_BOARD)
     read = [p.raw[8:] for p in parts if isinstance(p, Received)]
     assert [raw for raw in read if len(raw) == wire.MOTION_SIZE] == motions
 

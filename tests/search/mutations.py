@@ -16,8 +16,8 @@ from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
 from common.motion import Command
 from common.standstill import Displacement
+from common.wire import framing
 from common.wire.frame import Frame, Side
-from common.wire.framing import Framing
 from common.wire.reports import BumperBrakeReport, BumperReport
 from services.bridge.config import Bridge
 from services.bridge.core import lease as leases
@@ -64,7 +64,7 @@ FRONT = range(2, 3)
 def brakes_go_off_and_on(stack: Stack) -> None:
     """Report to safety too late that the board's brake was off."""
     for on in (False, True):
-        stack.send(Framing().pack(BumperBrakeReport(on)))
+        stack.send(framing.pack(BumperBrakeReport(on)))
         stack.run(60)
 
 
@@ -184,7 +184,7 @@ def driver_blinks(stack: Stack) -> None:
     """Report a driver fault and its end at the same time."""
     stack.driver(1)
     stack.driver(0)
-    stack.send(Framing().pack(stack.board.driver(Side.LEFT)))
+    stack.send(framing.pack(stack.board.driver(Side.LEFT)))
 
 
 def rival_limit(stack: Stack) -> None:
@@ -232,11 +232,11 @@ def received(kind: type[m.Message], change: Callable[[Any], m.Message]) -> Patch
 
 def reported(frame: Frame, instead: Frame) -> Patch:
     """Replace a frame of the board on its way from the oracle to the bridge."""
-    read, replaced = Sockets.read, Framing().pack(frame)
+    read, replaced = Sockets.read, framing.pack(frame)
 
     def misread(sockets: Sockets, *ports: int) -> Iterator[tuple[Any, ...]]:
         for port, datagram, *rest in read(sockets, *ports):
-            yield port, Framing().pack(instead) if datagram == replaced else datagram, *rest
+            yield port, framing.pack(instead) if datagram == replaced else datagram, *rest
 
     return Sockets, "read", misread
 

@@ -7,9 +7,10 @@ from typing import Any
 import msgspec
 
 from common.freshness import NS_PER_S
+from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Frame
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD
 from sim.faults import Datagram
 from sim.model import Model
@@ -48,14 +49,13 @@ class SimFixture:
     ) -> None:
         vehicle = vehicle or model()
         self.simulation = Simulation(vehicle, plan, START_NS, seed, ports)
-        self.framing = Framing(vehicle.wire.crc, vehicle.wire.crc_covers)
         self.now_ns = START_NS
         self.datagrams: list[Datagram] = []
         self.records: list[Line] = []
 
     def say(self, *frames: Frame, port: int | None = 4002) -> list[Frame]:
         """Send frames in one datagram and return what is answered at once."""
-        self.simulation.receive(b"".join(map(self.framing.pack, frames)), port, self.now_ns)
+        self.simulation.receive(b"".join(map(framing.pack, frames)), port, self.now_ns)
         return self._collect()
 
     def run(self, linear: float = 0.0, angular: float = 0.0) -> None:
@@ -90,7 +90,7 @@ class SimFixture:
 
     def frames(self, datagram: Datagram) -> list[Frame]:
         """Return the frames of a datagram that can be read."""
-        parts = self.framing.read(datagram.payload, FROM_BOARD)
+        parts = framing.read(datagram.payload, FROM_BOARD)
         return [part.frame for part in parts if isinstance(part, Received)]
 
     def of(self, kind: type[Line]) -> list[Any]:

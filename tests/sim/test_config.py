@@ -86,10 +86,10 @@ def test_each_profile_changes_the_vehicle_which_still_drives_and_brakes(name: st
 
 
 def test_several_profiles_add_up_over_the_settings() -> None:
-    given = Model(wire=Wire(crc="xmodem"), vehicle=Vehicle(length=2.0))
+    given = Model(wire=Wire(feedback_angular_unit="milliradian"), vehicle=Vehicle(length=2.0))
     vehicle = load_model(["short-sonar", "centimetre-sonar", "unlike-units"], given)
     assert (vehicle.sonar.saturation, vehicle.sonar.quantum) == (3.0, 0.01)
-    assert (vehicle.wire.crc, vehicle.wire.command_angular_unit) == ("xmodem", "milliradian")
+    assert vehicle.wire.command_angular_unit == "milliradian"
     assert vehicle.vehicle == given.vehicle
     assert load_model([], given) == given
 

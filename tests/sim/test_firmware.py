@@ -4,6 +4,7 @@ import pytest
 
 from common.motion import Command
 from common.wire import commands as c
+from common.wire import framing
 from common.wire import reports as r
 from sim import requests as q
 from sim.model import Where
@@ -28,7 +29,7 @@ def test_a_split_frame_comes_in_two_datagrams() -> None:
     sim = sim_with(split=1.0)
     assert sim.say(c.UltrasonicQuery()) == []  # none of the two can be read
     first, second = sim.datagrams
-    assert sim.framing.pack(r.UltrasonicReport((5000,) * 8)) == first.payload + second.payload
+    assert framing.pack(r.UltrasonicReport((5000,) * 8)) == first.payload + second.payload
 
 
 def test_merged_frames_share_a_datagram_of_their_port() -> None:

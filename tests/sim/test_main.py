@@ -14,8 +14,9 @@ import pytest
 from common import realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.errors import LinkError, MessageError
+from common.wire import framing
 from common.wire.commands import BumperQuery, MotionCommand, MotionKind
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
 from sim.__main__ import main
 from sim.requests import Bumper, Place, PowerCycle, Wire
@@ -24,8 +25,6 @@ from sim.trace import read
 from tests.common.rights import needs_right
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
-
-FRAMING = Framing()
 
 
 @dataclass(frozen=True)
@@ -50,14 +49,14 @@ class Bench:
 
     def send(self, frame: Any) -> None:
         """Send a frame to the board from the PC's first port."""
-        self.pc[0].sendto(FRAMING.pack(frame), ("127.0.0.1", self.port))
+        self.pc[0].sendto(framing.pack(frame), ("127.0.0.1", self.port))
 
     def received(self, index: int = 0) -> list[Any]:
         """Return the frames that wait at one of the PC's ports."""
         frames: list[Any] = []
         with suppress(BlockingIOError):
             while True:
-                for part in FRAMING.read(self.pc[index].recv(4096), FROM_BOARD):
+                for part in framing.read(self.pc[index].recv(4096), FROM_BOARD):
                     frames += [part.frame] if isinstance(part, Received) else []
         return frames
 

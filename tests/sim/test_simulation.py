@@ -2,12 +2,13 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.wire import commands as c
+from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Side
 from sim import trace as t
 from sim.requests import Driver, Flood, Freeze, PowerCycle, Wire
 from sim.simulation import CATCH_UP_NS
-from tests.sim.sim_fixture import PORTS, START_NS, WALL_AHEAD, SimFixture, model
+from tests.sim.sim_fixture import PORTS, START_NS, WALL_AHEAD, SimFixture
 
 
 def test_velocity_streams_to_both_ports_from_power_on() -> None:
@@ -24,7 +25,7 @@ def test_an_answer_goes_to_the_port_that_asked() -> None:
 
 def test_bad_bytes_are_counted_and_what_follows_is_heard() -> None:
     sim = SimFixture()
-    good = sim.framing.pack(c.BumperQuery())
+    good = framing.pack(c.BumperQuery())
     sim.simulation.receive(b"noise" + good[:3] + good, 4002, sim.now_ns)
     assert len(sim.simulation.take_sent(sim.now_ns)) == 1
     assert sim.simulation.counters["rejected_no_magic"] == 1
@@ -108,14 +109,6 @@ def test_a_late_tick_is_caught_up_and_a_hole_left_out(
     assert sim.simulation.now_ns == START_NS + gap_ns
     assert sim.simulation.counters["holes"] == holes
     assert driven < sim.truth.x < 1.0
-
-
-def test_the_crc_of_the_wire_is_obeyed() -> None:
-    sim = SimFixture(vehicle=model(wire={"crc": "xmodem", "crc_covers": "header_and_payload"}))
-    assert sim.say(c.BumperQuery()) == [r.BumperReport(False)]
-    plain = SimFixture().framing.pack(c.BumperQuery())
-    sim.simulation.receive(plain, 4002, sim.now_ns)
-    assert sim.simulation.counters["rejected_bad_crc"] == 1
 
 
 @pytest.mark.parametrize("garbage", [False, True])

@@ -15,8 +15,9 @@ import msgpack
 from msgspec import inspect
 
 from common.config import DEFAULT_FILE
+from common.wire import framing
 from common.wire.frame import Frame
-from verification.fuzz.targets import FRAMINGS, KINDS, SEPARATOR
+from verification.fuzz.targets import KINDS, SEPARATOR
 from verification.harness.frame_strategies import COMMANDS, REPORTS
 
 CORPUS = Path(__file__).parent / "corpus"
@@ -36,7 +37,7 @@ SETS = (
     "odom.hold=5e-2\0log.level=debug",
     "odom.hold=nan",
     "robot.id=t2 \0robot=5",
-    "wire.crc=xmodem\0wire.crc_covers=header",
+    "wire.command_angular_unit=milliradian\0wire.feedback_angular_unit=x",
     "board.address=10.7.5.224\0board.port",
     "sim.seed=0x10\0sim.world=1979-05-27T07:32:00Z",
 )
@@ -62,9 +63,9 @@ def _frames() -> Iterator[bytes]:
     captured = json.loads(CAPTURED.read_text(encoding="utf-8"))["pc_to_board"]
     real = [bytes.fromhex(frame["hex"]) for frame in captured]
     yield from (b"\x01" + raw for raw in [*real, b"".join(real)])
-    for number, (framing, _) in enumerate(FRAMINGS):
-        made: tuple[Frame, ...] = COMMANDS if number % 2 else REPORTS
-        yield from (bytes([number]) + framing.pack(frame) for frame in made)
+    made: Sequence[tuple[Frame, ...]] = REPORTS, COMMANDS
+    for number, some in enumerate(made):
+        yield from (bytes([number]) + framing.pack(frame) for frame in some)
 
 
 def _messages() -> Iterator[bytes]:

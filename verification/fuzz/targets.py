@@ -8,7 +8,6 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +18,20 @@ from common import keys
 from common.codec import decode, encode
 from common.config import Sources, flatten, load
 from common.errors import ConfigError, MessageError
+from common.wire import framing
 from common.wire.commands import TO_BOARD
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD
 
-CRCS = Framing("crc-16", "payload"), Framing("crc-16", "header_and_payload")
-FRAMINGS = list(product(CRCS, (FROM_BOARD, TO_BOARD)))
+TABLES = FROM_BOARD, TO_BOARD
 CALLED = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
 KINDS: list[type[Struct]] = [*dict.fromkeys([topic.message for topic in keys.TOPICS] + CALLED)]
 SEPARATOR = b"\0"  # cannot occur in arguments and environment variables
 
 
 def frames(data: bytes) -> None:
-    """Read a datagram; the first byte selects the sender and the range of the CRC."""
-    framing, kinds = FRAMINGS[data[0] % len(FRAMINGS) if data else 0]
+    """Read a datagram; the first byte selects the sender."""
+    kinds = TABLES[data[0] % len(TABLES) if data else 0]
     datagram = data[1:]
     parts = framing.read(datagram, kinds)
     assert b"".join(part.raw for part in parts) == datagram, "bytes were lost or added"

@@ -6,10 +6,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from common.wire import commands, reports
+from common.wire import commands, framing, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
@@ -34,7 +34,6 @@ class Board:
         self.speed_mmps: int | None = 0  # None: no velocity reports
         self.echo = True
         self.led_done: bool | None = True
-        self._framing = Framing()
         self._ended = threading.Event()
 
     def run(self) -> None:
@@ -46,7 +45,7 @@ class Board:
                 datagram, source = self.sock.recvfrom(2048)
             except TimeoutError:
                 continue
-            for part in self._framing.read(datagram, TO_BOARD):
+            for part in framing.read(datagram, TO_BOARD):
                 assert isinstance(part, Received), part
                 self._take(part.frame, source)
 
@@ -56,7 +55,7 @@ class Board:
 
     def say(self, frame: Frame, sock: socket.socket | None = None) -> None:
         """Send a frame to the bridge's ports, as the board or from another socket."""
-        self.say_bytes(self._framing.pack(frame), sock)
+        self.say_bytes(framing.pack(frame), sock)
 
     def say_bytes(self, datagram: bytes, sock: socket.socket | None = None) -> None:
         """Send any bytes to the bridge's ports."""

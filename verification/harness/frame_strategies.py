@@ -5,9 +5,10 @@ from typing import TypeVar
 from hypothesis import strategies as st
 
 from common.wire import commands as c
+from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Frame, Kinds, Side
-from common.wire.framing import Framing, Received, Rejected
+from common.wire.framing import Received, Rejected
 
 Part = Received | Rejected
 FrameT = TypeVar("FrameT", bound=Frame)
@@ -62,7 +63,7 @@ REPORTS: tuple[Frame, ...] = (
 )
 
 
-def read_all(framing: Framing, raw: bytes, kinds: Kinds) -> list[Part]:
+def read_all(raw: bytes, kinds: Kinds) -> list[Part]:
     """Read a datagram; no byte is lost, and each part has one."""
     parts = framing.read(raw, kinds)
     assert b"".join(part.raw for part in parts) == raw

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 from common import messages as m
 from common.freshness import NS_PER_S
+from common.wire import framing
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD
 from sim import requests as q
 from sim import trace as t
@@ -62,7 +63,6 @@ class Oracle:
     _links: dict[tuple[int, int], frozenset[Trip]] = field(default_factory=dict)
     _moved_ns: int | None = None  # when the board last took a RUN that moves
     _deaf_until_ns: int = 0  # the board receives nothing
-    _framing: Framing = field(default_factory=Framing)
 
     # --- deliveries -------------------------------------------------------------------------
 
@@ -135,7 +135,7 @@ class Oracle:
     def on_report(self, process: Process, datagram: bytes, port: int) -> None:
         """Record a datagram of the board, on this port, before the bridge handles it."""
         bridge_book = self.bridge_books[process.boot]
-        for part in self._framing.read(datagram, FROM_BOARD):
+        for part in framing.read(datagram, FROM_BOARD):
             if isinstance(part, Received) and bridge_book.on_report(part.frame, port, self.now_ns):
                 self.trip("contact", process.boot, (process.boot, bridge_book.published + 1))
 
@@ -231,7 +231,7 @@ class Oracle:
     def on_leaving(self, process: Process, datagram: bytes) -> None:
         """Check a datagram that leaves a bridge."""
         bridge_book = self.bridge_books[process.boot]
-        for part in self._framing.read(datagram, TO_BOARD):
+        for part in framing.read(datagram, TO_BOARD):
             assert isinstance(part, Received), part
             if not isinstance(frame := part.frame, MotionCommand):
                 continue

@@ -10,8 +10,8 @@ from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Board
+from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
-from common.wire.framing import Framing
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.odom.config import OdomConfig
@@ -183,7 +183,7 @@ class Stack:
         """Brake while there is no bridge."""
         if not self.processes["bridge"].alive and self._brake_ns <= self.net.now_ns:
             self._brake_ns = self.net.now_ns + BREAK_NS
-            self.vehicle.receive(Framing().pack(MotionCommand(MotionKind.BREAK)), 0)
+            self.vehicle.receive(framing.pack(MotionCommand(MotionKind.BREAK)), 0)
 
     # --- processes --------------------------------------------------------------------------
 

@@ -30,9 +30,9 @@ from common import keys
 from common import messages as m
 from common.errors import WireError
 from common.freshness import NS_PER_S, Latest
-from common.wire import commands, reports
+from common.wire import commands, framing, reports
 from common.wire.frame import Frame, Side
-from common.wire.framing import Framing, Received, Rejected
+from common.wire.framing import Received, Rejected
 from services.bridge.config import BridgeConfig
 from services.bridge.core.calls import Calls
 from services.bridge.core.motion_output import MotionOutput
@@ -67,11 +67,10 @@ class Core:
         self.rejected: Counter[str] = Counter()  # frames and datagrams, by reason
         self._config, settings = config, config.bridge
         self._counters = counters
-        self._framing = Framing(config.wire.crc, config.wire.crc_covers)
         limits = settings.max_linear, settings.max_angular
         self._translator = Translator(config.wire, config.vehicle, *limits)
         self.motions = MotionOutput(
-            settings, self._framing, self._translator, boot=boot, counters=counters, now_ns=now_ns
+            settings, self._translator, boot=boot, counters=counters, now_ns=now_ns
         )
         self.readiness = readiness = Readiness(settings, config.board)
         self.calls = Calls(readiness, settings.times.echo, self._ask)
@@ -107,7 +106,7 @@ class Core:
 
     def datagram(self, datagram: bytes, port: int, now_ns: int) -> Outputs:
         """Process a datagram: BRAKE for a new hit, its report, then the other frames."""
-        parts = self._framing.read(datagram, reports.FROM_BOARD)
+        parts = framing.read(datagram, reports.FROM_BOARD)
         hits = [one for one in parts if isinstance(one, Received) and one.frame == PRESSED]
         hit = hits[0] if hits and not self._bumper.pressed else None
         if hit is not None:
@@ -232,7 +231,7 @@ class Core:
 
     def _ask(self, frame: Frame, now_ns: int) -> Send:
         """Return a query or a setting, from the port that receives answers."""
-        return Send(self._framing.pack(frame), self._ports.to_ask(now_ns))
+        return Send(framing.pack(frame), self._ports.to_ask(now_ns))
 
     def second(self) -> Outputs:
         """Update the rates and counters of the last second; publish the brakes."""

@@ -20,7 +20,7 @@ from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Mileage, Motion, Velocity
 from common.motion import BRAKE, STOP, Command, Twist
 from common.standstill import Displacement, stopping_ns
-from common.wire.framing import Framing
+from common.wire import framing
 from services.bridge.config import Bridge as Settings
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease, Refusal
@@ -36,7 +36,6 @@ class MotionOutput:
     def __init__(
         self,
         settings: Settings,
-        framing: Framing,
         translator: Translator,
         *,
         boot: int,
@@ -47,7 +46,6 @@ class MotionOutput:
         self.lease = Lease(over_since_ns=now_ns)
         self.port = 0
         self._boot = boot
-        self._framing = framing
         self._translator = translator
         self._packed = {order: framing.pack(translator.command(order)) for order in (STOP, BRAKE)}
         self._counters = counters
@@ -166,7 +164,7 @@ class MotionOutput:
         # 2 equivalent mutants: without it they are packed each time.
         datagram = self._packed.get(order)
         if datagram is None:
-            datagram = self._framing.pack(self._translator.command(order, motion))
+            datagram = framing.pack(self._translator.command(order, motion))
         return Send(datagram, self.port, order)
 
     def _is_at_standstill(self, now_ns: int) -> bool:

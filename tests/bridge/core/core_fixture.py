@@ -11,10 +11,10 @@ from common import messages as m
 from common.config import Sources, load
 from common.freshness import NS_PER_S
 from common.motion import RUN, STOP, Command
-from common.wire import reports
+from common.wire import framing, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from common.wire.reports import BumperReport, DistanceReport, VelocityReport
 from services.bridge.config import BridgeConfig
 from services.bridge.core.core import Core
@@ -23,10 +23,8 @@ from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse,
 MS = NS_PER_S // 1000
 NOW = 1_000 * NS_PER_S
 BOOT, SAFETY = 7, 1
-
-FRAMING = Framing()
 HIT, CLEAR, STANDS = map(
-    FRAMING.pack, (BumperReport(True), BumperReport(False), VelocityReport(0, 0))
+    framing.pack, (BumperReport(True), BumperReport(False), VelocityReport(0, 0))
 )
 
 
@@ -64,7 +62,7 @@ class Bench:
 
     def answer(self, *frames: Frame, port: int = 0) -> list[Output]:
         """Receive these frames, one datagram for each."""
-        return self.receive(*map(FRAMING.pack, frames), port=port)
+        return self.receive(*map(framing.pack, frames), port=port)
 
     def tick(self, after_ns: int = 10 * MS) -> list[Output]:
         """Advance the time, and tick."""
@@ -118,7 +116,7 @@ class Caller:
 def frames(outputs: Iterable[Output]) -> list[Frame]:
     """Return what was sent, read as the board reads it."""
     sends = [output for output in outputs if isinstance(output, Send)]
-    parts = [part for send in sends for part in FRAMING.read(send.datagram, TO_BOARD)]
+    parts = [part for send in sends for part in framing.read(send.datagram, TO_BOARD)]
     assert all(isinstance(part, Received) for part in parts)
     return [part.frame for part in parts if isinstance(part, Received)]
 

@@ -9,16 +9,15 @@ import pytest
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.motion import BRAKE, STOP, Command
-from common.wire import commands, reports
+from common.wire import commands, framing, reports
 from common.wire.commands import MotionKind
 from common.wire.frame import HEADER, Frame, Side
-from common.wire.framing import Framing, crc_function
+from common.wire.framing import checksum
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Send
 from tests.bridge.core.core_fixture import (
     BOOT,
     CLEAR,
-    FRAMING,
     HIT,
     MS,
     NOW,
@@ -74,7 +73,7 @@ def test_brake_leaves_before_the_rest_is_read(bench: Bench) -> None:
 
 @pytest.mark.parametrize("form", ["alone", "behind", "before"])
 def test_a_hit_on_the_other_port_counts_at_once(bench: Bench, form: str) -> None:
-    hit = HEADER.pack(BumperReport.OPENING, crc_function("crc-16")(b"\x80")) + b"\x80"
+    hit = HEADER.pack(BumperReport.OPENING, checksum(b"\x80")) + b"\x80"
     datagram = {"alone": hit, "behind": STANDS + hit, "before": hit + CLEAR}[form]
     bench.receive(CLEAR, CLEAR, CLEAR)
     out = bench.receive(datagram, datagram, port=1)
@@ -132,7 +131,7 @@ def test_each_frame_is_published_with_its_raw_bytes(bench: Bench) -> None:
         (BumperReport(True), "bumper"),
     ):
         (made,) = [out for out in bench.answer(frame) if isinstance(out, Publish)]
-        assert (made.stream, made.raw) == (stream, FRAMING.pack(frame))
+        assert (made.stream, made.raw) == (stream, framing.pack(frame))
     assert published(bench.outputs, "velocity") == [m.Velocity(linear=0.1, angular=0.0)]
     assert published(bench.outputs, "mileage") == [m.Mileage(distance=1.0, heading=0.0, epoch=0)]
     (ranges,) = published(bench.outputs, "ultrasonic")
@@ -189,18 +188,12 @@ def test_a_dead_port_is_left_and_reported(bench: Bench) -> None:
 
 def test_what_no_vehicle_can_mean_is_dropped_and_counted(bench: Bench) -> None:
     for count in (1, 2):
-        out = bench.receive(b"nonsense", FRAMING.pack(VelocityReport(30_000, 0)))
+        out = bench.receive(b"nonsense", framing.pack(VelocityReport(30_000, 0)))
         assert out == []
         bench.core.relay_report(b"nonsense", NOW)
         rejected = dict.fromkeys(("no_magic", "implausible", "relay_report"), count)
         assert bench.link().rejected == rejected
     assert bench.core.readiness.link == "never"
-
-
-def test_the_settings_choose_what_the_crc_covers() -> None:
-    bench = Bench("wire.crc_covers=header_and_payload")
-    made = Framing("crc-16", "header_and_payload").pack(VelocityReport(0, 0))
-    assert len(published(bench.receive(made), "velocity")) == 1
 
 
 def test_clear_samples_count_across_ticks(bench: Bench) -> None:

@@ -8,7 +8,6 @@ from common.freshness import NS_PER_S
 from common.messages import Mileage, Motion, Velocity
 from common.motion import BRAKE, STOP, Command
 from common.settings import Vehicle, Wire
-from common.wire.framing import Framing
 from services.bridge.config import Bridge
 from services.bridge.core.lease import Lease
 from services.bridge.core.motion_output import MotionOutput
@@ -26,9 +25,7 @@ class Output:
 
     def __init__(self) -> None:
         translator = Translator(Wire(), Vehicle(), 1.0, 1.0)
-        self.made = MotionOutput(
-            SETTINGS, Framing(), translator, boot=BOOT, counters=Counter(), now_ns=NOW
-        )
+        self.made = MotionOutput(SETTINGS, translator, boot=BOOT, counters=Counter(), now_ns=NOW)
         self.seq = 0
         self.events: list[Event] = []
         self.renew(NOW)

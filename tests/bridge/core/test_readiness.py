@@ -324,8 +324,6 @@ def test_the_relays_own_report_is_valid() -> None:
     [
         (["board.relay_port=4003"], "relay_port is 4003, as port"),
         (["board.relay_port=65536"], "relay_port"),
-        ([CONFIGURED, "wire.crc=xmodem"], r"board\.relay_port wants wire\.crc crc-16"),
-        ([CONFIGURED, "wire.crc_covers=header_and_payload"], "over the payload"),
     ],
 )
 def test_a_setting_that_the_relay_cannot_meet_is_refused(sets: list[str], text: str) -> None:

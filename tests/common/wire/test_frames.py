@@ -10,9 +10,10 @@ import pytest
 
 from common.errors import WireError
 from common.wire import commands as c
+from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import OCTET, VELOCITY, Frame, Side
-from common.wire.framing import Framing, Received
+from common.wire.framing import Received
 from verification.harness.frame_strategies import COMMANDS, REPORTS, made, read_all
 
 # As the public driver of this vehicle sends them.
@@ -42,9 +43,8 @@ def frame_of(each: dict[str, Any]) -> Frame:
 def test_golden_bytes_both_ways(name: str) -> None:
     each = BY_NAME[name]
     frame, raw = frame_of(each), bytes.fromhex(each["hex"])
-    framing = Framing()
     assert framing.pack(frame) == raw
-    assert read_all(framing, raw, c.TO_BOARD) == [Received(frame, raw)]
+    assert read_all(raw, c.TO_BOARD) == [Received(frame, raw)]
 
 
 @pytest.mark.parametrize(

@@ -1,29 +1,26 @@
 """Datagrams to frames and back: round trips, damage, garbage, resynchronisation."""
 
 from collections.abc import Sequence
-from typing import get_args
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.errors import WireError
+from common.wire import framing
 from common.wire.commands import TO_BOARD, DistanceQuery, DriverQuery, MotionCommand, MotionKind
 from common.wire.frame import HEADER, MAGIC, OPENING, Frame, Kinds, Side
-from common.wire.framing import Covers, Framing, Reason, Received, Rejected, crc_function
+from common.wire.framing import Reason, Received, Rejected
 from common.wire.reports import FROM_BOARD, LedReport
 from verification.harness.frame_strategies import COMMANDS, REPORTS, commands, read_all, reports
 
 BOTH: list[tuple[Kinds, tuple[Frame, ...]]] = [(TO_BOARD, COMMANDS), (FROM_BOARD, REPORTS)]
 EACH = [(kinds, frame) for kinds, frames in BOTH for frame in frames]
 NAMES = [type(frame).__name__ for _, frame in EACH]
-
-framing = Framing()
 garbage = st.binary(max_size=12).filter(lambda raw: b"G" not in raw)
 
 
 def read(raw: bytes, kinds: Kinds) -> list[Received | Rejected]:
-    return read_all(framing, raw, kinds)
+    return read_all(raw, kinds)
 
 
 def header(size: int, command: int, crc: int) -> bytes:
@@ -62,14 +59,6 @@ def test_frames_with_garbage_between_are_all_found(
     assert rejected(parts) == [Reason.NO_MAGIC] * runs
 
 
-@pytest.mark.parametrize("crc", ["crc-16", "modbus", "xmodem"])
-@pytest.mark.parametrize("covers", get_args(Covers))
-def test_any_crc_over_any_range(crc: str, covers: Covers) -> None:
-    other = Framing(crc, covers)
-    raw = b"".join(other.pack(frame) for frame in COMMANDS)
-    assert frames(read_all(other, raw, TO_BOARD)) == list(COMMANDS)
-
-
 # --- damage ---------------------------------------------------------------------------------
 
 
@@ -94,16 +83,6 @@ def test_every_flipped_bit_of_a_payload_is_refused(kinds: Kinds, frame: Frame) -
         assert rejected(parts)[0] is Reason.BAD_CRC
 
 
-@pytest.mark.parametrize(("kinds", "frame"), EACH, ids=NAMES)
-def test_a_crc_over_the_header_refuses_every_flipped_bit(kinds: Kinds, frame: Frame) -> None:
-    careful = Framing("crc-16", "header_and_payload")
-    raw = careful.pack(frame)
-    for bit in range(len(raw) * 8):
-        damaged = bytearray(raw)
-        damaged[bit // 8] ^= 1 << bit % 8
-        assert not frames(read_all(careful, bytes(damaged), kinds))
-
-
 headers = st.builds(
     lambda size, command, crc, rest: header(size, command, crc) + rest,
     st.integers(0, 40) | st.integers(0, 0xFFFF),
@@ -123,7 +102,7 @@ def test_almost_frames_never_raise_and_no_byte_is_lost(raw: list[bytes], to_boar
 
 def frame_bytes(command: int, payload: bytes, size: int | None = None) -> bytes:
     """Return a frame with a right CRC and any id, payload and size field."""
-    crc = crc_function("crc-16")(payload)
+    crc = framing.checksum(payload)
     size = HEADER.size + len(payload) if size is None else size
     return header(size, command, crc) + payload
 
@@ -182,22 +161,4 @@ def test_a_frame_of_the_other_direction_is_refused() -> None:
 
 
 def test_the_check_value_of_crc_16_arc() -> None:
-    assert crc_function("crc-16")(b"123456789") == 0xBB3D
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("crc-17", "no CRC is called 'crc-17'"),
-        *((f"crc-{n}", f"has {n} bits, the header has room for 16") for n in (8, 24, 32, 64)),
-    ],
-)
-def test_an_unknown_crc_or_one_of_another_width_is_refused(name: str, text: str) -> None:
-    with pytest.raises(WireError, match=text):
-        Framing(name)
-
-
-def test_the_crc_field_counts_as_zero_when_the_header_is_covered() -> None:
-    raw = Framing("crc-16", "header_and_payload").pack(DistanceQuery())
-    expected = crc_function("crc-16")(bytes.fromhex("4753080000760000"))
-    assert raw[6:8] == expected.to_bytes(2, "little")
+    assert framing.checksum(b"123456789") == 0xBB3D

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from msgspec import Struct, inspect
 
 from common import codec
-from common.wire.framing import Framing
+from common.wire import framing
 from verification.fuzz import targets
 from verification.fuzz.seeds import CORPUS, example, mutated, seeds
 from verification.fuzz.targets import KINDS, TARGETS
@@ -71,7 +71,7 @@ def _crash(*_: object) -> None:
 @pytest.mark.parametrize(
     ("name", "owner", "attribute"),
     [
-        ("frames", Framing, "read"),
+        ("frames", framing, "read"),
         ("messages", targets, "decode"),
         ("toml", targets, "load"),
         ("environ", targets, "load"),
