@@ -128,7 +128,7 @@ def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(
 SUPERVISOR = """
 import sys
 from cli.run.supervisor import Supervisor
-Supervisor([("bridge", sys.argv[1:])]).run()
+Supervisor({"bridge": sys.argv[1:]}).run()
 """
 
 
