@@ -18,12 +18,6 @@ class ClientMessage(Struct, frozen=True, tag_field="k", tag=str.lower, forbid_un
     """A message from a viewer."""
 
 
-class Name(ClientMessage, frozen=True):
-    """Set the viewer's name."""
-
-    name: Annotated[str, Meta(max_length=24)]
-
-
 class Take(ClientMessage, frozen=True):
     """Take the driver lock; with ``force`` also from another viewer."""
 
@@ -78,4 +72,4 @@ class Switch(ClientMessage, frozen=True):
     to: SwitchesRequest
 
 
-AnyMessage = Name | Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch
+AnyMessage = Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch

@@ -4,7 +4,6 @@ A snapshot is encoded once and sent to all viewers.
 """
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from functools import partial
 
 import msgspec
@@ -24,14 +23,6 @@ SLOW_TICKS = 10  # between two slow snapshots
 Send = Callable[[Collection[str], bytes, bool], None]
 
 
-@dataclass
-class Viewer:
-    """One browser."""
-
-    name: str
-    has_path: bool = False  # that odometry has stored
-
-
 def notice(level: Level, text: str, about: str = "") -> bytes:
     """Return a message: a text or its key in ``i18n``, and the key of the result it explains."""
     return msgspec.json.encode({"k": "notice", "level": level, "text": text, "about": about})
@@ -42,7 +33,8 @@ class RobotPage:
 
     def __init__(self, bus: Bus, config: DashboardConfig, send: Send) -> None:
         self.robot = Robot(bus, config.dashboard, self._broadcast)
-        self.viewers: dict[str, Viewer] = {}
+        self.viewers: set[str] = set()
+        self._without_path: set[str] = set()  # viewers that need the path that odometry has stored
         self.used_ns = 0  # the last time that it had a viewer, or was stopped
         self._config = config
         self._send_text = send
@@ -51,7 +43,8 @@ class RobotPage:
     def join(self, viewer: str) -> None:
         """Add a browser; it gets all events, and later new ones."""
         self._send_events()
-        self.viewers[viewer] = Viewer(viewer)
+        self.viewers.add(viewer)
+        self._without_path.add(viewer)
         hello = {
             "k": "hello",
             "id": viewer,
@@ -64,15 +57,14 @@ class RobotPage:
 
     def leave(self, viewer: str) -> None:
         """Remove a browser and free its driver lock."""
-        self.viewers.pop(viewer, None)
+        self.viewers.discard(viewer)
+        self._without_path.discard(viewer)
         self.robot.driver_lock.leave(viewer)
         self.robot.keepalive.left(viewer)
 
     def handle(self, viewer: str, message: client.AnyMessage) -> None:
         """Handle a viewer's message."""
         match message:
-            case client.Name(name):
-                self.viewers[viewer].name = name.strip() or viewer
             case client.Alive(echo):
                 self.robot.keep_alive(viewer, echo, clock.now_ns())
             case client.Take(force):
@@ -98,8 +90,7 @@ class RobotPage:
         )
         self._send(self.viewers, fast, replaces=True)
         if self._ticks % SLOW_TICKS == 0:
-            names = {key: viewer.name for key, viewer in self.viewers.items()}
-            slow = slow_snapshot(robot.telemetry, robots, names, now_ns)
+            slow = slow_snapshot(robot.telemetry, robots, len(self.viewers), now_ns)
             self._send(self.viewers, slow, replaces=True)
         if self._ticks % SLOW_TICKS == 1:
             self._send_events()
@@ -147,16 +138,15 @@ class RobotPage:
 
     def _send_paths(self, now_ns: int) -> None:
         """Query the path that odometry has stored, for viewers without it."""
-        late = [key for key, viewer in self.viewers.items() if not viewer.has_path]
-        if not late or not self.robot.telemetry.newest(keys.ODOMETRY, now_ns):
+        if not self._without_path or not self.robot.telemetry.newest(keys.ODOMETRY, now_ns):
             return
-        for key in late:
-            self.viewers[key].has_path = True
-        path = partial(self._send_path, late)
-        self.robot.bus.look_up("odom", "path", path, lambda _: None)
-
-    def _send_path(self, viewers: Collection[str], answer: bytes) -> None:
-        self._send(viewers, {"k": "path", **msgspec.json.decode(answer)})
+        late, self._without_path = self._without_path, set()
+        self.robot.bus.look_up(
+            "odom",
+            "path",
+            lambda answer: self._send(late, {"k": "path", **msgspec.json.decode(answer)}),
+            lambda _: None,
+        )
 
     def _send(self, viewers: Collection[str], message: object, replaces: bool = False) -> None:
         self._send_text(list(viewers), msgspec.json.encode(message), replaces)

@@ -64,7 +64,7 @@ class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
     """The values that change rarely."""
 
     robots: dict[str, bool]  # whether any of its services is alive
-    viewers: dict[str, str]  # names by id
+    viewers: int
     instances: dict[str, int]  # liveliness tokens of each service
     health: dict[str, Health]  # of the services that publish it
     left: Driver | None
@@ -111,17 +111,14 @@ def fast_snapshot(
 
 
 def slow_snapshot(
-    telemetry: TelemetryCache,
-    robots: Mapping[str, bool],
-    names: Mapping[str, str],
-    now_ns: int,
+    telemetry: TelemetryCache, robots: Mapping[str, bool], viewers: int, now_ns: int
 ) -> SlowSnapshot:
     """Return the slow snapshot at this time."""
     services = telemetry.services()
     health = {name: telemetry.newest(keys.HEALTH, now_ns, service=name) for name in services}
     return SlowSnapshot(
         robots=dict(robots),
-        viewers=dict(names),
+        viewers=viewers,
         instances={name: len(telemetry.alive.get(name, ())) for name in services},
         health={name: one for name, one in health.items() if one},
         left=telemetry.newest(keys.DRIVER, now_ns, side="left"),

@@ -12,7 +12,6 @@ READ = msgspec.json.Decoder(client.AnyMessage)
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"k":"name","name":"Ada"}', client.Name("Ada")),
         ('{"k":"take"}', client.Take()),
         ('{"k":"take","force":true}', client.Take(force=True)),
         ('{"k":"leave"}', client.Leave()),
@@ -45,7 +44,6 @@ def test_valid_messages_are_decoded(text: str, message: client.ClientMessage) ->
         '{"k":"reset"}',
         '{"k":"gear","gear":6}',
         '{"k":"gear","gear":0}',
-        '{"k":"name","name":"' + "x" * 25 + '"}',
     ],
 )
 def test_invalid_messages_are_refused(text: str) -> None:

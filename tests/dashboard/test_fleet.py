@@ -184,7 +184,6 @@ def test_one_viewer_drives_and_a_takeover_asks(
     for viewer in ("1", "2"):
         fleet.join("001", viewer)
     lock = fleet._pages["001"].robot.driver_lock
-    fleet.handle("001", "1", client.Name(" Ada "))
     fleet.handle("001", "1", client.Take())
     for message in (client.Reset(1), client.Hold(1), client.Leave()):
         fleet.handle("001", "2", message)

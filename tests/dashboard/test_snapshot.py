@@ -115,7 +115,7 @@ def test_non_finite_values_are_not_shown() -> None:
 
 
 def test_the_slow_snapshot() -> None:
-    seen = snapshot.slow_snapshot(full(), {"001": True}, {"1": "Ada"}, AT)
+    seen = snapshot.slow_snapshot(full(), {"001": True}, 1, AT)
     assert seen.instances == {"odom": 1, "safety": 0}
     assert seen.health == {"safety": full().newest(keys.HEALTH, AT, service="safety")}
     assert seen.left is not None

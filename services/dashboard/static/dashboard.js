@@ -1,5 +1,4 @@
 // The page: WebSocket, messages from the server, commands, and language.
-import * as camera from "./camera.js";
 import * as charts from "./charts.js";
 import * as driving from "./driving.js";
 import * as estop from "./estop.js";
@@ -15,7 +14,6 @@ const { toast, confirm } = notices;
 const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
 const CONGESTED = 2048; // bytes that wait in the browser
-const INVALID_MESSAGE = 1003; // close code: the server refused a message of this page
 const $ = (id) => document.getElementById(id);
 const stored = (key, otherwise) => localStorage.getItem(`t2.${key}`) ?? otherwise;
 
@@ -48,10 +46,8 @@ const send = (message) => {
 function connect() {
   const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live?robot=${robot}`;
   const opened = (socket = new WebSocket(address));
-  opened.onopen = sendName;
   opened.onmessage = (event) => handle(JSON.parse(event.data));
-  opened.onclose = (event) => {
-    if (event.code === INVALID_MESSAGE) localStorage.removeItem("t2.name");
+  opened.onclose = () => {
     if (opened !== socket) return;
     driving.letGo();
     fastAt = -Infinity;
@@ -66,8 +62,6 @@ async function reconnect() {
   if (response?.status === 401) location.reload();
   else connect();
 }
-
-const sendName = () => send({ k: "name", name: stored("name", "") });
 
 const HANDLERS = {
   hello(message) {
@@ -101,7 +95,7 @@ const HANDLERS = {
   },
   path: trail.prepend,
   notice: (message) => toast(message.text, message.level, message.about),
-  taken: () => confirm("take_over", `${stateBar.driverName(view())} ${t("take_over_from")}`,
+  taken: () => confirm("take_over", `${stateBar.driverName(fast, t)} ${t("take_over_from")}`,
     () => send({ k: "take", force: true })),
 };
 const handle = (message) => HANDLERS[message.k]?.(message);
@@ -113,7 +107,7 @@ const newest = () => (lost() ? null : fast);
 /** What the state bar and the header show; `fast` is null without a connection. */
 const view = () => ({
   fast: newest(), t, language, robot, isDriver: isDriver(), viewer: hello?.id,
-  keepsAlive: !!hello?.keepalive, names: slow?.viewers ?? {},
+  keepsAlive: !!hello?.keepalive, viewers: slow?.viewers ?? 0,
 });
 
 function draw() {
@@ -150,7 +144,6 @@ function showRobots() {
 function showTexts() {
   document.documentElement.lang = language;
   for (const it of document.querySelectorAll("[data-t]")) it.textContent = t(it.dataset.t);
-  for (const it of document.querySelectorAll("[data-t-placeholder]")) it.placeholder = t(it.dataset.tPlaceholder);
   if (slow) panels.showSlow(slow, t);
   panels.showEvents(events, t, language);
   drawn = undefined;
@@ -174,6 +167,14 @@ function toggle(name) {
   else apply();
 }
 
+function showCamera(url) {
+  if (!url) return;
+  const [image, note] = $("camera").querySelectorAll("img, p");
+  $("camera").hidden = false;
+  image.onerror = () => { image.hidden = true; note.hidden = false; };
+  image.src = url;
+}
+
 function begin() {
   texts = JSON.parse($("texts").textContent);
   phrases.begin(JSON.parse($("phrases").textContent));
@@ -187,13 +188,11 @@ function begin() {
     localStorage.setItem("t2.language", language);
     showTexts();
   };
-  $("name").value = stored("name", "");
-  $("name").onchange = () => { localStorage.setItem("t2.name", $("name").value); sendName(); };
   for (const name of ["ultrasonic_brake", "bumper_brake"]) $(name).onclick = () => toggle(name);
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
   estop.begin({ send, lost, toast, robot, mayDrive: () => fast?.driver.may !== false });
-  camera.begin({ t, robot });
+  showCamera($("page").dataset.camera.replaceAll("{robot}", robot));
   trail.begin();
   showTexts();
   connect();

@@ -79,21 +79,17 @@ function sentence({ fast, t, language }, worst) {
 
 function showHead(view) {
   const { fast, t, isDriver, viewer, keepsAlive } = view;
-  const watching = Object.keys(view.names).length;
   const off = !fast?.connected; // without a router all values are old
   chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
   chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
   chip("driver", off ? "" : driver(view), isDriver && !fast.driver.other ? "clear" : "slow");
   const keeper = off || !keepsAlive ? "" : fast.keeper === viewer ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
-  chip("watching", off || !watching ? "" : `${watching} ${t("watching")}`);
+  chip("watching", off || !view.viewers ? "" : `${view.viewers} ${t("watching")}`);
 }
 
-/** The viewer that has control; one without a name has a number. */
-export function driverName({ fast, t, names }) {
-  const name = names[fast?.driver.id] ?? "";
-  return /^\d*$/.test(name) ? `${t("viewer")} ${name}`.trim() : name;
-}
+/** The viewer that has control, by its number. */
+export const driverName = (fast, t) => `${t("viewer")} ${fast?.driver.id ?? ""}`.trim();
 
 function driver(view) {
   const { fast, t, isDriver } = view;
@@ -101,7 +97,7 @@ function driver(view) {
   if (!may) return t("view_only");
   if (isDriver && overruled) return `${t("overruled_by")} ${other}`;
   if (isDriver) return other ? `${other} ${t("drives")}` : t("you_drive");
-  if (id) return `${driverName(view)} ${t("drives")}`;
+  if (id) return `${driverName(fast, t)} ${t("drives")}`;
   const source = fast.safety?.source;
   return source ? `${source} ${t("drives")}` : t("nobody_drives");
 }
