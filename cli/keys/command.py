@@ -8,7 +8,7 @@ import argparse
 from pathlib import Path
 
 from cli.keys.member_list import DAYS
-from common.errors import RobotError
+from common.cli_args import needs_extra
 from common.members import OPERATORS_SOURCES, ROLES
 
 FOLDER = Path("keys")
@@ -41,12 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the operation; raise ``RobotError`` if the library is missing."""
-    try:
+    with needs_extra("keys", "it"):
         from cli.keys.operations import OPERATIONS
-    except ModuleNotFoundError as error:
-        raise RobotError(
-            f"it needs {error.name}: install the extra `keys` (pip install -e '.[keys]')"
-        ) from None
     return OPERATIONS[options.verb](options)
 
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import EVERYTHING, expression
 from cli.inspect.session import add_end, add_options, open_session, until_interrupt
-from common.cli_args import sources
+from common.cli_args import needs_extra, sources
 from common.config import load
-from common.errors import LinkError, RobotError
+from common.errors import LinkError
 from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Channel, Encoder
 
@@ -31,12 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve until the end; raise ``LinkError`` if the port is not available."""
-    try:
+    with needs_extra("foxglove", "the server"):
         import foxglove
-    except ModuleNotFoundError:
-        raise RobotError(
-            "it needs foxglove-sdk: install the extra `foxglove` (pip install -e '.[foxglove]')"
-        ) from None
     encoder = Encoder(load(RecorderConfig, sources(options)).config.vehicle)
     context = foxglove.Context()
     with open_session(options) as session:

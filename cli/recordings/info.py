@@ -3,12 +3,11 @@
 import argparse
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cli.inspect import output
-from cli.inspect.session import add_output
 from cli.recordings.timeline import Timeline
-from common.errors import RobotError
+from common.cli_args import needs_extra
 from common.freshness import NS_PER_S
 from common.keys import ROOT
 from common.text import printable
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("files", metavar="FILE", type=Path, nargs="+")
-    add_output(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -30,21 +28,14 @@ def run(options: argparse.Namespace) -> int:
         with open_recording(file) as reader:
             timeline = timeline_of(reader)
         complete = complete and not (reader.cut or reader.damaged)
-        if options.json:
-            output.line(as_json(reader, timeline))
-        else:
-            print(*([""] if number else []), printable(as_text(reader, timeline), "\n"), sep="\n")
+        print(*([""] if number else []), printable(as_text(reader, timeline), "\n"), sep="\n")
     return 0 if complete else 1
 
 
 def open_recording(path: Path) -> "Reader":
     """Open a recording; raise ``RobotError`` if it cannot be read or the library is missing."""
-    try:
+    with needs_extra("record", "a recording"):
         from services.recorder.reader import Reader
-    except ModuleNotFoundError as error:
-        raise RobotError(
-            f"recordings need {error.name}: install the extra `record` (pip install -e '.[record]')"
-        ) from None
     return Reader(path)
 
 
@@ -54,37 +45,6 @@ def timeline_of(reader: "Reader") -> Timeline:
     for each in reader:
         timeline.add(each.key, each.kind, each.message, each.log_ns)
     return timeline
-
-
-def as_json(reader: "Reader", timeline: Timeline) -> dict[str, Any]:
-    """Return the summary as JSON fields."""
-    return {
-        "file": str(reader.path),
-        "bytes": reader.size,
-        "readable": reader.readable,
-        "cut": reader.cut,
-        "damaged_chunks": reader.damaged,
-        "about": reader.about,
-        "begin_ns": timeline.began_ns,
-        "duration": round(timeline.lasted_s, 3),
-        "messages": timeline.messages,
-        "versions": timeline.versions,
-        "keys": {
-            key: {"type": one.kind, "count": len(one.times), "hz": one.hz, "lost": one.lost,
-                  "faulty": one.undecoded}
-            for key, one in sorted(timeline.streams.items())
-        },
-        "stops": [
-            {"at": round(stop.begins_s, 3), "seconds": round(stop.lasts_s, 3),
-             "verdict": stop.verdict, "reasons": stop.reasons, "latched": list(stop.latched)}
-            for stop in timeline.stops
-        ],
-        "events": [
-            {"at": round(each.at_s, 3), "who": each.service, "level": each.event.level,
-             "text": f"{each.event.name}: {each.event.text}"}
-            for each in timeline.events
-        ],
-    }  # fmt: skip
 
 
 def as_text(reader: "Reader", timeline: Timeline) -> str:

@@ -96,9 +96,11 @@ class BusTarget:
         """Return the running services; raise ``RobotError`` if bridge or safety is among them."""
         tokens = self._probe.alive(keys.live_key(self._robot, "*", "*"))
         alive = {token.split("/")[-2] for token in tokens}
-        why = refusal(self._robot, alive)
-        if why:
-            raise RobotError(why)
+        if running := " and ".join(name for name in DECIDING if name in alive):
+            raise RobotError(
+                f"robot {self._robot} has a running {running}: others would take replayed messages "
+                "for the real ones. Stop it, or replay as another robot: --robot replay"
+            )
         return alive
 
     def takes(self, path: str) -> bool:
@@ -185,25 +187,10 @@ class Pacer:
 
 def is_played(path: str, alive: Collection[str]) -> bool:
     """Return whether to play a key below the robot, besides these running services."""
-    moves = path == keys.ESTOP_PATH or any(part.startswith("@") for part in path.split("/"))
-    return not moves and publisher(path) not in alive
-
-
-def publisher(path: str) -> str:
-    """Return the service that publishes a stream or an event; empty for other keys."""
-    kind, _, rest = path.partition("/")
-    return rest.partition("/")[0] if kind in ("tel", "evt") else ""
-
-
-def refusal(robot: str, alive: Collection[str]) -> str:
-    """Return why a replay is refused while these services run; empty if it is allowed."""
-    running = " and ".join(name for name in DECIDING if name in alive)
-    if not running:
-        return ""
-    return (
-        f"robot {robot} has a running {running}: others would take replayed messages for the real "
-        "ones. Stop it, or replay as another robot: --robot replay"
-    )
+    kind, *others = path.split("/")
+    moves = path == keys.ESTOP_PATH or any(part.startswith("@") for part in (kind, *others))
+    published = kind in ("tel", "evt") and others[:1] and others[0] in alive
+    return not moves and not published
 
 
 def key_expression(word: str) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from cli.inspect.addressing import chunks
 from cli.recordings.info import open_recording, timeline_of
 from cli.recordings.timeline import Timeline
+from common.cli_args import needs_extra
 from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.text import printable
@@ -62,12 +63,10 @@ def write_report(file: Path, out: Path) -> None:
 
 def page(timeline: Timeline, reader: "Reader") -> str:
     """Return the page of a recording that has been read to its end."""
-    try:
+    with needs_extra("report", "a report"):
         from jinja2 import Environment, StrictUndefined
 
         from cli.recordings import figures
-    except ImportError as error:
-        raise RobotError(f"a report needs {error.name}: pip install -e '.[report]'") from None
     # The fastest streams first, event-driven keys last.
     streams = sorted(timeline.streams.values(), key=lambda each: (-each.expected_hz, each.key))
     names = [chunks(stream.key)[1] or stream.key for stream in streams]

@@ -9,7 +9,7 @@ import pytest
 import zenoh
 
 from cli.recordings import replay
-from cli.recordings.replay import is_played, refusal
+from cli.recordings.replay import is_played
 from common import keys
 from common import messages as m
 from common.motion import Command
@@ -175,17 +175,3 @@ def test_other_keys_are_played() -> None:
 def test_streams_of_running_services_are_not_played() -> None:
     paths = ["tel/odom/odometry", "evt/odom", "tel/bridge/velocity", "tel/odometer/x", "srv/odom"]
     assert [is_played(path, ["odom"]) for path in paths] == [False, False, True, True, True]
-
-
-@pytest.mark.parametrize(
-    ("alive", "named"),
-    [
-        ({"odom", "safety"}, "robot 007 has a running safety: "),
-        ({"bridge", "safety"}, "robot 007 has a running bridge and safety: "),
-        ({"odom", "dashboard", "recorder"}, ""),
-    ],
-)
-def test_replay_is_refused_while_bridge_or_safety_run(alive: set[str], named: str) -> None:
-    why = refusal("007", alive)
-    assert why.startswith(named)
-    assert bool(why) is bool(named)

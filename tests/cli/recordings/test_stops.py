@@ -2,7 +2,7 @@
 
 import pytest
 
-from cli.recordings.stops import Phase, add_state, stops
+from cli.recordings.timeline import Phase, add_state, stops
 from common.messages import Cause, SafetyState, Verdict
 from tests.cli.recordings.drive_fixture import CONTACT, IDLE, state
 
