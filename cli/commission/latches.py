@@ -1,8 +1,8 @@
 """Verdicts on bumper and emergency stop: whether each latches, brakes, and can be reset. Pure."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import dropwhile
+from typing import NamedTuple
 
 from cli.commission.report import Verdict, judged, seconds
 from common.freshness import NS_PER_S, Latest
@@ -12,8 +12,7 @@ from common.motion import Command
 LIMIT_S = 0.5  # from the cause to the latch and to BRAKE, including a slow bus
 
 
-@dataclass(frozen=True, slots=True)
-class Reset:
+class Reset(NamedTuple):
     """A requested reset with its answer, and what stays latched after it."""
 
     requested_ns: int
@@ -22,8 +21,7 @@ class Reset:
     latched: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class LatchTest:
+class LatchTest(NamedTuple):
     """Messages of one latch test, with local receive times."""
 
     cause: str  # as safety names it
@@ -38,27 +36,21 @@ def judge_latch(test: LatchTest, problem: str = "") -> Verdict:
     latches = [s.received_ns for s in test.states if test.cause in s.value.latched]
     # The bridge may have braked earlier.
     brakes = [m.received_ns for m in test.motions if m.value.command is Command.BRAKE]
-    took = {f"latch {test.cause}": _first_s(test, latches), "command BRAKE": _first_s(test, brakes)}
-    data = [
-        *((f"{action} after", seconds(took_s, 3)) for action, took_s in took.items()),
-        ("BRAKE commands received", str(len(brakes))),
-        ("reset", test.reset.text),
-    ]
-    problems = [problem]
-    for action, took_s in took.items():
+    problems, data = [problem], []
+    for action, times_ns in ((f"latch {test.cause}", latches), ("command BRAKE", brakes)):
+        # A state may overtake the sample that caused it on the bus: that counts as zero.
+        took_s = max(0, times_ns[0] - test.at_ns) / NS_PER_S if times_ns else None
+        data.append((f"{action} after", seconds(took_s, 3)))
         if took_s is None:
             problems.append(f"Safety did not {action}.")
         elif took_s > LIMIT_S:
             problems.append(f"Safety took {took_s:.2f} s to {action}, the limit is {LIMIT_S:g} s.")
-    return judged([*problems, *_problems(test)], "Latched, braked, reset.", data)
+    data += [("BRAKE commands received", str(len(brakes))), ("reset", test.reset.text)]
+    return judged([*problems, *_until_reset(test)], "Latched, braked, reset.", data)
 
 
-def _first_s(test: LatchTest, times_ns: Sequence[int]) -> float | None:
-    # A state may overtake the sample that caused it on the bus: that counts as zero.
-    return max(0, times_ns[0] - test.at_ns) / NS_PER_S if times_ns else None
-
-
-def _problems(test: LatchTest) -> Iterator[str]:
+def _until_reset(test: LatchTest) -> Iterator[str]:
+    """Yield the problems from the first BRAKE to the reset."""
     before_reset = (
         m.value.command for m in test.motions if m.received_ns <= test.reset.requested_ns
     )

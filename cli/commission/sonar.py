@@ -6,10 +6,10 @@ the same sonars have detected it for half a second, because a moving hand passes
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from statistics import median
 
-from cli.commission.report import Row, Verdict, judged
+from cli.commission.report import Verdict, judged
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Ultrasonic
 
@@ -22,30 +22,23 @@ OTHER = {"too_near": 0.0, "no_echo": math.inf}  # range by status; a faulty sona
 Rest = tuple[float | None, ...]  # range at rest in m, None for a faulty sonar
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class HandDetector:
     """Sonars that detect a hand, and since when."""
 
     rest: Rest
+    since_ns: int
     seen: frozenset[str] = frozenset()
-    since_ns: int = 0
 
-    def take(self, sample: Ultrasonic, now_ns: int) -> "HandDetector":
-        """Return the detector after one sample."""
-        seen = near(sample, self.rest)
-        return self if seen == self.seen else replace(self, seen=seen, since_ns=now_ns)
+    def take(self, sample: Ultrasonic, now_ns: int) -> None:
+        """Take the next sample."""
+        before, self.seen = self.seen, near(sample, self.rest)
+        if self.seen != before:
+            self.since_ns = now_ns
 
     def settled(self, now_ns: int) -> bool:
         """Return whether the same sonars have detected a hand for long enough."""
         return now_ns - self.since_ns >= HOLD_NS
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Sonars that detected the hand in front of sonar ``name``."""
-
-    name: str
-    detected_by: tuple[str, ...]
 
 
 def resting_ranges(samples: Sequence[Ultrasonic]) -> Rest:
@@ -82,32 +75,26 @@ def obstructions(rest: Rest) -> str:
     return f"Clear {ROOM_M:g} m all around: {', '.join(tight)}." if tight else ""
 
 
-def judge_sonars(rest: Rest, findings: Sequence[Finding]) -> Verdict:
-    """Return the verdict on the findings of all sonars."""
-    resting = dict(zip(SONAR_NAMES, rest, strict=True))
-    problems = [_problem(each, resting[each.name]) for each in findings]
-    data = [_row(each, resting[each.name]) for each in findings]
+def judge_sonars(rest: Rest, found: Sequence[Sequence[str]]) -> Verdict:
+    """Return the verdict; ``found`` are the sonars that detected the hand before each sonar."""
+    problems, data = [], []
+    for name, resting, detected_by in zip(SONAR_NAMES, rest, found, strict=True):
+        problems.append(_problem(name, resting, detected_by))
+        at_rest = "no reading" if resting is None else f"{resting:.2f} m"
+        shown = at_rest.replace("inf m", "no echo")
+        names = ", ".join(map(words, detected_by)) or "none"
+        data.append((f"hand in front of {words(name)}", f"detected by {names}; at rest {shown}"))
     return judged(problems, "Each sonar is in its place.", data)
 
 
-def _problem(finding: Finding, resting: float | None) -> str:
-    name = words(finding.name)
+def _problem(name: str, resting: float | None, detected_by: Sequence[str]) -> str:
     if resting is None:
-        return f"{name} is faulty: the board reports 0xFFFF."
-    if not finding.detected_by:
-        return f"{name}: no sonar detected the hand."
-    if finding.detected_by == (finding.name,):
+        return f"{words(name)} is faulty: the board reports 0xFFFF."
+    if not detected_by:
+        return f"{words(name)}: no sonar detected the hand."
+    if list(detected_by) == [name]:
         return ""
-    return f"{name}: the hand was detected by {' and '.join(map(words, finding.detected_by))}."
-
-
-def _row(finding: Finding, resting: float | None) -> Row:
-    names = ", ".join(map(words, finding.detected_by)) or "none"
-    if resting is None:
-        at_rest = "no reading"
-    else:
-        at_rest = "no echo" if math.isinf(resting) else f"{resting:.2f} m"
-    return f"hand in front of {words(finding.name)}", f"detected by {names}; at rest {at_rest}"
+    return f"{words(name)}: the hand was detected by {' and '.join(map(words, detected_by))}."
 
 
 def _distances(sample: Ultrasonic) -> list[float | None]:

@@ -1,5 +1,6 @@
 """Steps of the checkout on the bus, in their order, with the instructions to the operator."""
 
+from collections.abc import Sequence
 from functools import partial
 
 from cli.commission.latches import LatchTest, judge_latch
@@ -9,7 +10,6 @@ from cli.commission.operator import Step, confirm, show
 from cli.commission.report import Verdict, failed
 from cli.commission.session import CheckoutSession
 from cli.commission.sonar import (
-    Finding,
     HandDetector,
     Rest,
     judge_sonars,
@@ -60,10 +60,11 @@ def sonars(session: CheckoutSession) -> Verdict:
     return judge_sonars(rest, [_find(session, rest, name) for name in SONAR_NAMES])
 
 
-def _find(session: CheckoutSession, rest: Rest, name: str) -> Finding:
+def _find(session: CheckoutSession, rest: Rest, name: str) -> Sequence[str]:
+    """Return the sonars that detect a hand in front of one of them."""
     if rest[SONAR_NAMES.index(name)] is None:
         show(f"The {words(name)} sonar is faulty.")
-        return Finding(name, ())
+        return ()
     show(f"NOW the {words(name)} sonar: hold a hand in front of it, within {HAND_S:g} s.")
     seen = _wait(session, rest, True, HAND_S)
     if seen:
@@ -71,23 +72,22 @@ def _find(session: CheckoutSession, rest: Rest, name: str) -> Finding:
         _wait(session, rest, False, AWAY_S)
     else:
         show("  no sonar has detected it.")
-    return Finding(name, seen)
+    return seen
 
 
-def _wait(session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float) -> tuple[str, ...]:
+def _wait(session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float) -> Sequence[str]:
     """Wait for a hand, or for none; return the detecting sonars."""
-    detector = HandDetector(rest, since_ns=session.mark())
+    detector = HandDetector(rest, session.mark())
 
     def is_so() -> bool:
-        nonlocal detector
         samples = session.of(keys.ULTRASONIC)
         for one in samples:
-            detector = detector.take(one.value, one.received_ns)
+            detector.take(one.value, one.received_ns)
         samples.clear()
         return bool(detector.seen) == hand and detector.settled(clock.now_ns())
 
     found = session.until(is_so, timeout_s)
-    return tuple(sorted(detector.seen, key=SONAR_NAMES.index)) if found else ()
+    return sorted(detector.seen, key=SONAR_NAMES.index) if found else ()
 
 
 def bumper(session: CheckoutSession) -> Verdict:

@@ -1,7 +1,5 @@
 """Latch tests of bumper and emergency stop: complete ones, and each missing part."""
 
-from dataclasses import replace
-
 import pytest
 
 from cli.commission.latches import LIMIT_S, LatchTest, Reset, judge_latch
@@ -48,7 +46,7 @@ def test_a_complete_test_passes_with_its_times() -> None:
 
 
 def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
-    verdict = judge_latch(replace(latch_test(), states=[state(-0.01, "estop")]))
+    verdict = judge_latch(latch_test()._replace(states=[state(-0.01, "estop")]))
     assert dict(verdict.data)["latch estop after"] == "0.000 s"
 
 
@@ -71,22 +69,22 @@ def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
             },
             "safety sent RUN, STOP instead of BRAKE",
         ),
-        ({"reset": replace(RESET, granted=False, text="It moves.")}, "was refused: It moves."),
-        ({"reset": replace(RESET, latched=("estop",))}, "Still latched after the reset: estop."),
+        ({"reset": RESET._replace(granted=False, text="It moves.")}, "was refused: It moves."),
+        ({"reset": RESET._replace(latched=("estop",))}, "Still latched after the reset: estop."),
     ],
 )
 def test_missing_parts_are_named(change: dict[str, object], phrase: str) -> None:
-    verdict = judge_latch(replace(latch_test(), **change))  # type: ignore[arg-type]
+    verdict = judge_latch(latch_test()._replace(**change))  # type: ignore[arg-type]
     assert verdict.outcome == "failed"
     assert phrase in verdict.text
 
 
 def test_commands_after_the_reset_are_ignored() -> None:
     more = [*latch_test().motions, motion(2.01, Command.STOP)]
-    assert judge_latch(replace(latch_test(), motions=more)).outcome == "passed"
+    assert judge_latch(latch_test()._replace(motions=more)).outcome == "passed"
 
 
 def test_a_problem_that_was_found_before_comes_first() -> None:
-    verdict = judge_latch(replace(latch_test("contact"), states=[]), "It stays pressed.")
+    verdict = judge_latch(latch_test("contact")._replace(states=[]), "It stays pressed.")
     assert verdict.outcome == "failed"
     assert verdict.text == "It stays pressed. Safety did not latch contact."

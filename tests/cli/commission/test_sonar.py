@@ -6,7 +6,6 @@ import pytest
 
 from cli.commission.sonar import (
     HOLD_NS,
-    Finding,
     HandDetector,
     Rest,
     judge_sonars,
@@ -72,9 +71,10 @@ def test_obstructions() -> None:
 
 
 def test_a_hand_is_detected_after_a_time() -> None:
-    detector = HandDetector(FREE, since_ns=0).take(sample(left=0.3), 10)  # passing by
-    detector = detector.take(sample(front=0.3), 20)
-    detector = detector.take(sample(front=0.31), HOLD_NS)
+    detector = HandDetector(FREE, since_ns=0)
+    detector.take(sample(left=0.3), 10)  # passing by
+    detector.take(sample(front=0.3), 20)
+    detector.take(sample(front=0.31), HOLD_NS)
     assert not detector.settled(19 + HOLD_NS)
     assert detector.settled(20 + HOLD_NS)
     assert detector.seen == {"front"}
@@ -84,16 +84,16 @@ def test_a_hand_is_detected_after_a_time() -> None:
 
 
 def test_each_in_its_place_passes() -> None:
-    verdict = judge_sonars(FREE, [Finding(name, (name,)) for name in SONAR_NAMES])
+    verdict = judge_sonars(FREE, [(name,) for name in SONAR_NAMES])
     assert (verdict.outcome, verdict.text) == ("passed", "Each sonar is in its place.")
     assert verdict.data[0] == ("hand in front of left", "detected by left; at rest no echo")
 
 
 def test_faulty_blind_wrong_and_double_detection() -> None:
     rest = (None, 1.5, *FREE[2:])
-    seen = [Finding("left", ()), Finding("front_left", ("front_right",)), Finding("front", ()),
-            Finding("rear", ("rear", "rear_left"))]  # fmt: skip
-    verdict = judge_sonars(rest, seen)
+    seen = {name: [name] for name in SONAR_NAMES}
+    seen |= {"left": [], "front_left": ["front_right"], "front": [], "rear": ["rear", "rear_left"]}
+    verdict = judge_sonars(rest, list(seen.values()))
     assert verdict.outcome == "failed"
     assert verdict.text == (
         "left is faulty: the board reports 0xFFFF. "
