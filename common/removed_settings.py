@@ -63,6 +63,8 @@ REMOVED = {
         for name in names
     },
     "dashboard.embed": "was removed: open the other page in a window of its own",
+    "odom.path_spacing": "was removed: t2 record and t2 report have the path",
+    "odom.path_points": "was removed: t2 record and t2 report have the path",
     "dashboard.recordings": "was removed: use t2 info and t2 report",
     **{path: f"is no setting any more, always {value}" for path, value in CONSTANT.items()},
     **{

@@ -17,7 +17,7 @@ from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
 from common.bus.session import Session, client
 from common.codec import Sample
 from common.errors import MessageError
-from common.keys import ESTOP_CLASS, Call, Topic, estop_key, info_key
+from common.keys import ESTOP_CLASS, Call, Topic, estop_key
 from common.loop import Post
 from common.messages import Message
 
@@ -272,33 +272,27 @@ class Bus:
         timeout_s: float = 2.0,
     ) -> None:
         """Make a call; exactly one of both handlers is called."""
+        if self._session.zenoh is None:
+            self._hand_over(lambda: on_refusal("not connected to a router"))
+            return
+        ended = False
 
-        def read(payload: bytes) -> None:
-            try:
-                reply = codec.decode(payload, call.reply)
-            except MessageError as error:
-                on_refusal(str(error))
-            else:
-                on_reply(reply)
+        def end(reply: zenoh.Reply | None) -> None:
+            nonlocal ended
+            if not ended:
+                ended = True
+                _deliver(call, reply, on_reply, on_refusal)
 
-        payload = codec.encode(request)
-        self._query(
-            call.on(self.robot), payload, timeout_s,
-            server=call.server, on_answer=read, on_refusal=on_refusal,
-        )  # fmt: skip
+        def queue(reply: zenoh.Reply) -> None:
+            if not is_timeout(reply):
+                self._hand_over(lambda: end(reply))
 
-    def look_up(
-        self,
-        service: str,
-        part: str,
-        on_answer: Callable[[bytes], None],
-        on_refusal: Callable[[str], None],
-        timeout_s: float = 2.0,
-    ) -> None:
-        """Query a service's ``schema``, ``config`` or ``last`` as JSON; calls one handler."""
-        key = info_key(self.robot, service, part)
-        self._query(
-            key, None, timeout_s, server=service, on_answer=on_answer, on_refusal=on_refusal
+        self._session.zenoh.get(
+            call.on(self.robot),
+            zenoh.handlers.Callback(queue, lambda: self._hand_over(lambda: end(None))),
+            payload=codec.encode(request),
+            timeout=timeout_s,
+            congestion_control=QUERY_CONGESTION,
         )
 
     # --- on Zenoh's threads -------------------------------------------------------------------
@@ -333,44 +327,25 @@ class Bus:
 
         self._session.declare(declare)
 
-    def _query(
-        self,
-        key: str,
-        payload: bytes | None,
-        timeout_s: float,
-        *,
-        server: str,
-        on_answer: Callable[[bytes], None],
-        on_refusal: Callable[[str], None],
-    ) -> None:
-        if self._session.zenoh is None:
-            self._hand_over(lambda: on_refusal("not connected to a router"))
-            return
-        ended = False
 
-        def end(reply: zenoh.Reply | None) -> None:
-            nonlocal ended
-            if ended:
-                return
-            ended = True
-            if reply is None:
-                on_refusal(no_answer(server))
-            elif reply.ok is None:
-                on_refusal(refusal_of(reply))
-            else:
-                on_answer(reply.ok.payload.to_bytes())
-
-        def queue(reply: zenoh.Reply) -> None:
-            if not is_timeout(reply):
-                self._hand_over(lambda: end(reply))
-
-        self._session.zenoh.get(
-            key,
-            zenoh.handlers.Callback(queue, lambda: self._hand_over(lambda: end(None))),
-            payload=payload,
-            timeout=timeout_s,
-            congestion_control=QUERY_CONGESTION,
-        )
+def _deliver(
+    call: Call[Q, R],
+    reply: zenoh.Reply | None,
+    on_reply: Callable[[R], None],
+    on_refusal: Callable[[str], None],
+) -> None:
+    """Call the handler that fits the reply to a call; None: there was none."""
+    if reply is None:
+        on_refusal(no_answer(call.server))
+    elif reply.ok is None:
+        on_refusal(refusal_of(reply))
+    else:
+        try:
+            answer = codec.decode(reply.ok.payload.to_bytes(), call.reply)
+        except MessageError as error:
+            on_refusal(str(error))
+        else:
+            on_reply(answer)
 
 
 def copied(sample: zenoh.Sample, received_ns: int, wall_ns: int) -> Sample:

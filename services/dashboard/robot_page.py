@@ -34,7 +34,6 @@ class RobotPage:
     def __init__(self, bus: Bus, config: DashboardConfig, send: Send) -> None:
         self.robot = Robot(bus, config.dashboard, self._broadcast)
         self.viewers: set[str] = set()
-        self._without_path: set[str] = set()  # viewers that need the path that odometry has stored
         self.used_ns = 0  # the last time that it had a viewer, or was stopped
         self._config = config
         self._send_text = send
@@ -44,7 +43,6 @@ class RobotPage:
         """Add a browser; it gets all events, and later new ones."""
         self._send_events()
         self.viewers.add(viewer)
-        self._without_path.add(viewer)
         hello = {
             "k": "hello",
             "id": viewer,
@@ -58,7 +56,6 @@ class RobotPage:
     def leave(self, viewer: str) -> None:
         """Remove a browser and free its driver lock."""
         self.viewers.discard(viewer)
-        self._without_path.discard(viewer)
         self.robot.driver_lock.leave(viewer)
         self.robot.keepalive.left(viewer)
 
@@ -94,7 +91,6 @@ class RobotPage:
             self._send(self.viewers, slow, replaces=True)
         if self._ticks % SLOW_TICKS == 1:
             self._send_events()
-            self._send_paths(now_ns)
 
     def _take(self, viewer: str, force: bool) -> None:
         lock = self.robot.driver_lock
@@ -135,18 +131,6 @@ class RobotPage:
         if new:
             self._send(self.viewers, {"k": "events", "lines": list(new)})
             new.clear()
-
-    def _send_paths(self, now_ns: int) -> None:
-        """Query the path that odometry has stored, for viewers without it."""
-        if not self._without_path or not self.robot.telemetry.newest(keys.ODOMETRY, now_ns):
-            return
-        late, self._without_path = self._without_path, set()
-        self.robot.bus.look_up(
-            "odom",
-            "path",
-            lambda answer: self._send(late, {"k": "path", **msgspec.json.decode(answer)}),
-            lambda _: None,
-        )
 
     def _send(self, viewers: Collection[str], message: object, replaces: bool = False) -> None:
         self._send_text(list(viewers), msgspec.json.encode(message), replaces)

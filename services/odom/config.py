@@ -30,9 +30,6 @@ class Odom(settings.Section, frozen=True, kw_only=True):
     slip_distance: Annotated[float, Meta(ge=0.02, le=2.0)] = 0.1  # m in a second
     slip_turn: Annotated[float, Meta(ge=0.02, le=2.0)] = 0.2  # rad in a second
 
-    path_spacing: Annotated[float, Meta(ge=0.01, le=10.0)] = 0.05  # m between two points
-    path_points: Annotated[int, Meta(ge=2, le=100_000)] = 4000  # the oldest are dropped first
-
 
 class OdomConfig(settings.Shared, frozen=True, kw_only=True):
     """The sections that odometry reads."""

@@ -4,8 +4,6 @@ An estimate follows each counter sample, or each velocity while counters are mis
 Zenoh sends nothing to the router without a subscriber.
 """
 
-import msgspec
-
 from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Caller
@@ -15,7 +13,7 @@ from common.heartbeat import Echoes
 from common.service import Node
 from services.odom.config import OdomConfig
 from services.odom.core.estimator import Estimator
-from services.odom.core.pose import Pose, Trajectory
+from services.odom.core.pose import Pose
 
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
 CHECK_S = 0.25  # between two checks for that
@@ -24,13 +22,11 @@ ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 
 class Odometer:
-    """Connects estimator and trajectory to the bus."""
+    """Connects the estimator to the bus."""
 
     def __init__(self, node: Node[OdomConfig]) -> None:
-        settings = node.config.odom
         self._node = node
-        self._estimator = Estimator(settings)
-        self._trajectory = Trajectory(settings.path_spacing, settings.path_points)
+        self._estimator = Estimator(node.config.odom)
         self._counted_ns = 0  # the newest counter sample
         self._estimated_ns = 0
         self._silent = True  # no input yet
@@ -42,8 +38,6 @@ class Odometer:
         bus.subscribe(keys.MILEAGE, self._on_mileage)
         bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
         bus.serve(keys.SET_POSE, self._on_set_pose)
-        path_key = keys.info_key(bus.robot, node.name, "path")
-        bus.answer(path_key, self._trajectory_json, "application/json")
         node.loop.every(CHECK_S, self._check_silence)
 
     def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
@@ -80,7 +74,6 @@ class Odometer:
             return
         pose = Pose(request.x, request.y, request.heading)
         self._estimator.place(pose, clock.now_ns())
-        self._trajectory.clear()
         text = f"pose set to x {request.x:.3f} m, y {request.y:.3f} m, {request.heading:.3f} rad"
         self._node.event("pose_set", "info", text, epoch=self._estimator.epoch)
         caller.reply(m.Done(text=text, boot=self._node.bus.boot))
@@ -92,7 +85,6 @@ class Odometer:
             return
         self._estimated_ns = now_ns
         self._to_odometry.put(odometry)
-        self._trajectory.add(Pose(odometry.x, odometry.y, odometry.heading))
         if self._silent:
             self._silent = False
             self._node.event("velocity_back", "info", "velocities are received")
@@ -111,13 +103,3 @@ class Odometer:
         elif self._slip and not odometry.slip:
             self._node.event("slip_over", "info", "counters and velocities agree again")
         self._slip = odometry.slip
-
-    def _trajectory_json(self) -> bytes:
-        return msgspec.json.encode(
-            {
-                "frame_id": "odom",
-                "epoch": self._estimator.epoch,
-                "spacing": self._trajectory.spacing,
-                "points": self._trajectory.points(),
-            }
-        )

@@ -16,7 +16,7 @@ from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
 from services.dashboard.fleet import IDLE_S, KNOWN_MAX, PAGES_MAX, Fleet
 from services.dashboard.robot_page import SLOW_TICKS
-from tests.factories import odometry, safety_state
+from tests.factories import safety_state
 from verification.harness.waiting import wait_until
 
 Sent = tuple[list[str], dict[str, Any]]
@@ -128,25 +128,6 @@ def test_fifty_robots_are_listed_some_shown_and_any_stopped(
         fleet.tick(clock.now_ns() + tick)
     listed = next(message["robots"] for _, message in sent if message["k"] == "slow")
     assert listed == {"001": False} | dict.fromkeys(names, True) | {names[-1]: False}
-
-
-def test_each_viewer_gets_the_path_of_odometry_once(
-    fleet: Fleet, buses: dict[str, Mock], sent: list[Sent]
-) -> None:
-    fleet.join("001", "1")
-    bus = buses["001"]
-    for number in range(4):
-        receive(bus, keys.ODOMETRY, odometry())
-        for _ in range(SLOW_TICKS):
-            fleet.tick(clock.now_ns())
-        if number == 1:
-            fleet.join("001", "2")
-    for call in bus.look_up.call_args_list:
-        service, part, answer, _ = call.args
-        if (service, part) == ("odom", "path"):
-            answer(b'{"epoch":3,"points":[[1.0,2.0,0.0]]}')
-    paths = [(to, message["points"]) for to, message in sent if message["k"] == "path"]
-    assert paths == [(["1"], [[1.0, 2.0, 0.0]]), (["2"], [[1.0, 2.0, 0.0]])]
 
 
 def receive(bus: Mock, topic: keys.Topic[Any], message: Any, **names: str) -> None:

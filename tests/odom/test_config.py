@@ -13,7 +13,7 @@ def loaded(*sets: str) -> OdomConfig:
 
 @pytest.mark.parametrize(
     "bad",
-    ["hold=0.0", "hold=1.0", "drift_noise=0", "gap_noise=nan", "slip_turn=9", "path_points=1"],
+    ["hold=0.0", "hold=1.0", "drift_noise=0", "gap_noise=nan", "slip_turn=9"],
 )
 def test_nonsense_is_refused_by_name(bad: str) -> None:
     with pytest.raises(ConfigError, match=f"odom.{bad.split('=')[0]}"):

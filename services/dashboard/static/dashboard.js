@@ -93,7 +93,6 @@ const HANDLERS = {
     events = [...events, ...message.lines].sort((a, b) => a.t - b.t).slice(-EVENTS_MAX);
     panels.showEvents(events, t, language);
   },
-  path: trail.prepend,
   notice: (message) => toast(message.text, message.level, message.about),
   taken: () => confirm("take_over", `${stateBar.driverName(fast, t)} ${t("take_over_from")}`,
     () => send({ k: "take", force: true })),

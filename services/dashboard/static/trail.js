@@ -13,13 +13,6 @@ let pose = null;
 
 export const size = (given) => { vehicle = given; };
 
-// Points [x, y, heading] that odometry has stored, before those that this page has seen.
-export function prepend(stored) {
-  const same = epoch === null || epoch === stored.epoch;
-  points = [...stored.points.map(([x, y]) => [x, y]), ...(same ? points : [])];
-  epoch = stored.epoch;
-}
-
 export function add(snapshot) {
   if (!snapshot.pose) return;
   if (epoch !== null && snapshot.epoch !== epoch) points = [];

@@ -1,4 +1,4 @@
-"""Pose, its covariance, their motion along arcs, and the recorded trajectory.
+"""Pose, its covariance, and their motion along arcs.
 
 Between two samples the motion is an arc of length ``distance`` and heading change ``turn``. Its
 chord has the length ``distance * k(turn)`` and is rotated by half the turn from the old heading:
@@ -16,7 +16,6 @@ velocities give its shape. ``fitted`` combines both.
 """
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from typing import Self
 
@@ -165,25 +164,3 @@ def _adjusted(segment: ArcSegment, linear: float, angular: float) -> ArcSegment:
     distance = segment.distance + linear * segment.time_s
     turn = segment.turn + angular * segment.time_s
     return ArcSegment(distance, turn, segment.time_s, segment.seen)
-
-
-class Trajectory:
-    """Poses ``spacing`` metres apart, at most ``points`` of them; the oldest are dropped."""
-
-    def __init__(self, spacing: float, points: int) -> None:
-        self.spacing = spacing
-        self._points: deque[Pose] = deque(maxlen=points)
-
-    def add(self, pose: Pose) -> None:
-        """Add the pose if it is at least ``spacing`` from the last one kept."""
-        last = self._points[-1] if self._points else None
-        if last is None or math.hypot(pose.x - last.x, pose.y - last.y) >= self.spacing:
-            self._points.append(pose)
-
-    def clear(self) -> None:
-        """Remove all points."""
-        self._points.clear()
-
-    def points(self) -> list[tuple[float, float, float]]:
-        """Return x, y (m) and heading (rad) of each point in ``odom``, the oldest first."""
-        return [(point.x, point.y, point.heading) for point in self._points]

@@ -1,4 +1,4 @@
-"""Arcs against closed form, covariance against numeric derivatives, fitted segments, trajectory."""
+"""Arcs against closed form, covariance against numeric derivatives, fitted segments."""
 
 import math
 
@@ -13,7 +13,6 @@ from services.odom.core.pose import (
     Pose,
     PoseEstimate,
     ProcessNoise,
-    Trajectory,
     fitted,
     halved,
     total,
@@ -126,18 +125,3 @@ def test_halved_segments_are_the_same_trajectory(way: list[ArcSegment]) -> None:
     assert len(halved(way)) == (len(way) + 1) // 2
     assert (half.distance, half.turn) == pytest.approx((whole.distance, whole.turn), abs=1e-9)
     assert half.seen == whole.seen
-
-
-# --- trajectory -----------------------------------------------------------------------------
-
-
-def test_near_points_are_left_out_and_the_oldest_are_dropped() -> None:
-    trajectory = Trajectory(spacing=0.1, points=3)
-    for x in (0.0, 0.05, 0.099, 0.1, 0.15, 0.25):
-        trajectory.add(Pose(x, 0.0, 0.5))
-    assert trajectory.points() == [(0.0, 0.0, 0.5), (0.1, 0.0, 0.5), (0.25, 0.0, 0.5)]
-    for y in (1.0, 1.05):
-        trajectory.add(Pose(0.25, y, 0.5))
-    assert [y for _, y, _ in trajectory.points()] == [0.0, 0.0, 1.0]
-    trajectory.clear()
-    assert trajectory.points() == []
