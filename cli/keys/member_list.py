@@ -105,9 +105,9 @@ def _check(text: str, kind: object, problem: str) -> None:
 def _check_rights(role: Role, robots: Sequence[str], sources: Sequence[str]) -> None:
     """Reject robots and sources for other roles, and a member without robots that needs one."""
     if role in BOUND and not robots:
-        raise ConfigError(f"a {role} needs --robot ID for each of its robots, or --every")
+        raise ConfigError(f"a {role} needs --robot ID for each of its robots, or --robot '*'")
     if role not in BOUND and robots:
-        raise ConfigError(f"--robot and --every are for drivers, devices and ros, not for a {role}")
+        raise ConfigError(f"--robot is for drivers, devices and ros, not for a {role}")
     if role not in SOURCED and sources:
         raise ConfigError(f"--source is for drivers and devices; a {role} uses no source")
 

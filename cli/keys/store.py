@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 
 from cli.keys import member_list
-from cli.keys.ca import CertificateAuthority, Issued, certificate_pem, key_pem
+from cli.keys.ca import CertificateAuthority, Issued, certificate_from, certificate_pem, key_pem
 from cli.keys.machine_settings import CA, CERTIFICATE, MEMBERS, PRIVATE_KEY, SETTINGS, bus_toml
 from common import members as member_files
 from common.errors import RobotError
@@ -63,6 +63,10 @@ class Folder:
         if not self.ca.exists():
             raise RobotError(f"{self.path} has no CA; `t2 keys init` creates one")
         return _read(self.ca)
+
+    def ends_s(self) -> float:
+        """Return the end of the authority's certificate, in seconds since 1970."""
+        return certificate_from(self.certificate()).not_valid_after_utc.timestamp()
 
     def read(self) -> Members:
         """Return the member list."""

@@ -91,7 +91,7 @@ def test_an_early_ctrl_c_exits_silently(
 # The robot's requirements have no extras: only commands that need one may fail, with a message.
 ROBOT_SET = """
 import sys
-ABSENT = {"matplotlib", "textual", "pygame", "dpkt"}
+ABSENT = {"matplotlib", "textual", "pygame", "dpkt", "cryptography"}
 class Absent:
     def find_spec(self, name, path=None, target=None):
         if name.split(".")[0] in ABSENT:
@@ -106,7 +106,7 @@ for name in COMMANDS:
     except SystemExit as end:
         assert end.code == 0, name
 capture = sys.argv[1]
-for words in (["demo"], ["drive"], ["wire", "decode", capture]):
+for words in (["demo"], ["drive"], ["wire", "decode", capture], ["keys", "list"]):
     print(words[0], "gives", main(words), file=sys.stderr)
 ABSENT.clear()
 ABSENT.add("t2")
@@ -122,10 +122,12 @@ def test_without_the_extras(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
-    demo, demo_code, drive, drive_code, wire, wire_code, client = result.stderr.splitlines()
+    *lines, client = result.stderr.splitlines()
+    demo, drive, wire, keys = lines[::2]
     assert demo.startswith("t2 demo: the demo needs matplotlib; ")
     assert demo.endswith("pip install -e '.[demo]' -e sdk")
     assert client.startswith("t2 demo: the demo needs t2; ")
     assert drive.startswith("t2 drive: the screen needs ")
     assert wire.endswith("pip install -e '.[inspect]'")
-    assert [demo_code, drive_code, wire_code] == ["demo gives 1", "drive gives 1", "wire gives 1"]
+    assert keys.startswith("t2 keys: it needs cryptography: install the extra `keys`")
+    assert lines[1::2] == [f"{name} gives 1" for name in ("demo", "drive", "wire", "keys")]

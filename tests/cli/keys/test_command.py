@@ -1,8 +1,6 @@
 """``t2 keys`` from the command line: life cycle of a certificate, and errors."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,7 +9,6 @@ import pytest
 from cli.__main__ import main
 from common.cli_args import EXIT_CONFIG
 from common.members import read
-from tests.cli.processes import PATIENCE_S
 
 
 class Keys:
@@ -144,7 +141,7 @@ def test_a_new_passphrase_is_typed_twice(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     answers = iter(typed)
-    monkeypatch.setattr("cli.keys.operations.getpass", lambda _: next(answers))
+    monkeypatch.setattr("cli.keys.command.getpass", lambda _: next(answers))
     monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: bool(typed)))
     assert message in empty.run("init", "--passphrase", code=code)
     assert empty.folder.exists() is (code == 0)
@@ -153,28 +150,3 @@ def test_a_new_passphrase_is_typed_twice(
         answers = iter(("house", "horse"))
         assert "wrong passphrase" in empty.run("issue", "viewer", "v", code=1)
         assert "viewer.v." in empty.run("issue", "viewer", "v")
-
-
-# --- without the library ------------------------------------------------------------------------
-
-ABSENT = """
-import sys
-class Absent:
-    def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] == "cryptography":
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name.split(".")[0])
-sys.meta_path.insert(0, Absent())
-from cli.__main__ import main
-sys.exit(main(["keys", "list"]))
-"""
-
-
-def test_without_the_extra(tmp_path: Path) -> None:
-    result = subprocess.run(
-        [sys.executable, "-c", ABSENT],
-        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
-    )  # fmt: skip
-    assert result.returncode == 1
-    assert result.stderr == (
-        "t2 keys: it needs cryptography: install the extra `keys` (pip install -e '.[keys]')\n"
-    )

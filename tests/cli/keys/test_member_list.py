@@ -57,7 +57,7 @@ def test_invalid_sources(source: str) -> None:
     ("given", "message"),
     [
         (("driver", "anna"), "a driver needs --robot ID"),
-        (("viewer", "guest", ("001",)), "are for drivers, devices and ros, not for a viewer"),
+        (("viewer", "guest", ("001",)), "is for drivers, devices and ros, not for a viewer"),
         (("fleet", "control", (), ("10.0.0.1",)), "a fleet only connects"),
         (("site", "berlin"), "a site's router needs --address"),
         (("driver", "../anna", ("001",)), "'../anna' is not a name"),
