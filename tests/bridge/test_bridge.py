@@ -82,15 +82,15 @@ def test_a_motion_from_the_router_is_not_even_read(bridge: BridgeFixture) -> Non
 # --- its ends: the board is not left with a RUN, for it stops nothing by itself -----------------
 
 
-def bridge_pid(guard: int) -> int:
-    """Return the process that the guard watches, once there is one."""
-    children = Path(f"/proc/{guard}/task/{guard}/children")
-    return int(wait_until(lambda: children.read_text().split(), "a bridge under the guard")[0])
+def child_of(pid: int) -> int:
+    """Return the child of a supervisor or guard, once there is one."""
+    children = Path(f"/proc/{pid}/task/{pid}/children")
+    return int(wait_until(lambda: children.read_text().split(), "a child")[0])
 
 
-def ended(made: Board, pid: int) -> None:
-    """Wait for the end of a process, after which no frame is sent."""
-    wait_until(lambda: not Path(f"/proc/{pid}").exists(), "the end of the bridge")
+def ended(made: Board, last: int) -> None:
+    """Wait for the end of the last process that sends, after which no frame comes."""
+    wait_until(lambda: not Path(f"/proc/{last}").exists(), "its end")
     count = len(made.motions)
     time.sleep(0.3)
     assert len(made.motions) == count
@@ -103,14 +103,14 @@ def breaks_since(made: Board, count: int) -> int:
 
 def test_a_bridge_whose_guard_is_killed_stops_the_vehicle_and_ends(bridge: BridgeFixture) -> None:
     bridge.drive()
-    pid = bridge_pid(bridge.process.pid)
+    pid = child_of(bridge.process.pid)
     assert os.getsid(pid) == pid  # a kill of the guard's session spares the bridge
     for each in (pid, bridge.process.pid):  # as systemd does when the guard hangs
         os.kill(each, signal.SIGQUIT)
     assert bridge.process.wait(20) == -signal.SIGQUIT
     bridge.board.wait_for(MotionKind.STOP)
     ended(bridge.board, pid)
-    assert "guard_gone" in bridge.events()
+    wait_until(lambda: "guard_gone" in bridge.events(), "the event")
 
 
 def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(
@@ -118,7 +118,7 @@ def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(
 ) -> None:
     bridge.drive()
     count = len(bridge.board.motions)
-    os.kill(bridge_pid(bridge.process.pid), signal.SIGHUP)
+    os.kill(child_of(bridge.process.pid), signal.SIGHUP)
     bridge.process.send_signal(signal.SIGHUP)
     assert bridge.process.wait(20) == 0
     assert breaks_since(bridge.board, count) == 0
@@ -139,13 +139,12 @@ def test_a_killed_supervisor_leaves_a_vehicle_that_was_braked() -> None:
         command = [sys.executable, "-c", SUPERVISOR, *bridge_command(made, "tcp/127.0.0.1:1")]
         supervisor = subprocess.Popen(command)
         made.wait_for(MotionKind.STOP)
-        guard = int(Path(f"/proc/{supervisor.pid}/task/{supervisor.pid}/children").read_text())
-        pid = bridge_pid(guard)
+        guard = child_of(supervisor.pid)
         count, killed_s = len(made.motions), time.monotonic()
         supervisor.kill()
         supervisor.wait()
         wait_until(lambda: breaks_since(made, count), "BRAKE, not the STOP of a normal end")
-        ended(made, pid)
+        ended(made, guard)
         made.wait_for(MotionKind.BREAK)
         assert made.times[-1] - killed_s < 5.0
 

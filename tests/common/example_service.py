@@ -1,12 +1,9 @@
 """A small service, run as ``python -m tests.common.example_service KIND [options]``.
 
-KINDs are plain, restless (never at rest), failing (once it is connected), refused (a port) and
-hanging (its loop, from a SIGUSR1 to the next).
+KINDs are plain, restless (never at rest), failing (once it is connected) and refused (a port).
 """
 
-import signal
 import sys
-from collections.abc import Callable
 
 from common import keys
 from common.errors import LinkError
@@ -28,25 +25,9 @@ def build(node: Node[Shared]) -> None:
             raise RuntimeError("a bug of ours")
 
     node.loop.every(0.05, tick)
-    if kind == "hanging":
-        node.loop.every(0.01, hang(node))
     node.is_stopped = lambda: kind != "restless"
     node.counters["resets"] += 1
     node.event("built", "info", "all is built", count=3)
-
-
-def hang(node: Node[Shared]) -> Callable[[int], None]:
-    """Return a timer callback that blocks between two SIGUSR1."""
-    signals: list[int] = []
-    signal.signal(signal.SIGUSR1, lambda number, _: signals.append(number))
-
-    def tick(_: int) -> None:
-        if len(signals) % 2:
-            node.log.info("hangs")
-        while len(signals) % 2:
-            signal.pause()
-
-    return tick
 
 
 if __name__ == "__main__":

@@ -63,26 +63,23 @@ def test_the_lines_of_the_shipped_file_are_the_defaults(tmp_path: Path) -> None:
 # --- what wins ----------------------------------------------------------------------------------
 
 
-def test_the_later_source_wins(settings_dir: SettingsFixture) -> None:
-    file = "[board]\nport = 1\n[bridge]\nmax_linear = 0.1\n[odom]\nhold = 0.2"
-    env = {"T2__BOARD__PORT": "2", "T2__BRIDGE__MAX_LINEAR": "0.15", "PATH": "/bin"}
-    loaded = settings_dir.load(file, environ=env, sets=["board.port=3"])
+def test_the_later_source_wins_and_every_setting_knows_its_own(
+    settings_dir: SettingsFixture,
+) -> None:
+    loaded = settings_dir.load(
+        "[board]\nport = 1\n[bridge]\nmax_linear = 0.1\n[odom]\nhold = 0.2",
+        environ={"T2__BOARD__PORT": "2", "T2__Bridge__max_linear": "0.15", "PATH": "/bin"},
+        sets=["board.port=3"],
+    )
+    given = ("board.port", "bridge.max_linear", "odom.hold", "robot.id")
+    assert [(loaded.settings[path].value, loaded.settings[path].origin) for path in given] == [
+        (3, "--set board.port=3"),
+        (0.15, "environment T2__Bridge__max_linear"),
+        (0.2, "over0.toml"),
+        ("001", DEFAULT),
+    ]
     assert loaded.config.board.port == 3
-    assert loaded.config.bridge.max_linear == 0.15
-    assert loaded.config.odom.hold == 0.2
-
-
-def test_every_setting_knows_where_it_came_from(settings_dir: SettingsFixture) -> None:
-    settings = settings_dir.load(
-        "[board]\nport = 9",
-        environ={"T2__ODOM__HOLD": "0.2"},
-        sets=["log.level=debug"],
-    ).settings
-    assert settings["board.port"].origin == "over0.toml"
-    assert settings["odom.hold"].origin == "environment T2__ODOM__HOLD"
-    assert settings["log.level"].origin == "--set log.level=debug"
-    assert settings["robot.id"].origin == DEFAULT
-    assert set(settings) == {path for path, _ in flatten(Everything())}
+    assert set(loaded.settings) == {path for path, _ in flatten(Everything())}
 
 
 def test_the_files_of_a_certificate_lie_beside_the_file_that_names_them(
@@ -97,10 +94,6 @@ def test_the_files_of_a_certificate_lie_beside_the_file_that_names_them(
     assert loaded.config.bus.private_key == "private.key"  # nobody put that beside anything
     assert loaded.config.bus.certificate == ""
     assert loaded.settings["bus.ca"].origin == "keys/bus.toml"
-
-
-def test_the_environment_is_read_in_any_case(settings_dir: SettingsFixture) -> None:
-    assert settings_dir.load(environ={"T2__Board__port": "77"}).config.board.port == 77
 
 
 def test_a_service_leaves_the_sections_of_others_alone(settings_dir: SettingsFixture) -> None:
@@ -189,6 +182,7 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
         ("[safety.sources.new]\nlease = 0.1", "over0.toml: safety.sources.new: needs 'priority'"),
         ("[safety.sources.web]\npriority = 'a'", "sources.web.priority = 'a': Expected `int`"),
         ("[safety]\nmargin = 0.0", "over0.toml: safety: margin = 0.0 takes a protection away"),
+        ("[board]\nport = 4001", "over0.toml: board: port 4001 of 127.0.0.1 is both the board's"),
         (
             "[safety]\nunsafe_overrides = ['x']",
             "unsafe_overrides names 'x', which takes no protection away",
@@ -203,6 +197,10 @@ def test_a_wrong_file_is_refused_by_name_value_and_range(
     assert "over0.toml" in said
 
 
+DEEP = ".".join("a" * 3000)
+MANY_DIGITS = "1" * 5000  # more than Python reads
+
+
 @pytest.mark.parametrize(
     ("sets", "sentence"),
     [
@@ -211,7 +209,11 @@ def test_a_wrong_file_is_refused_by_name_value_and_range(
         ("board.port=", "--set board.port=: board.port = '': Expected `int`, got `str`"),
         ("board..port=3", "--set board..port=3: board.: unknown"),
         ("safety.sources.web.lease=99", "safety.sources.web.lease = 99: Expected `float` <= 10.0"),
+        (f"board.port={MANY_DIGITS}", f"board.port = '{MANY_DIGITS}': Expected `int`, got `str`"),
+        ("robot.id=\udcff", r"\udcff: is no UTF-8"),
+        (f"board={{{DEEP} = 1}}", ": tables are nested too deep"),
     ],
+    ids=range(8),
 )
 def test_a_wrong_set_is_refused(settings_dir: SettingsFixture, sets: str, sentence: str) -> None:
     assert sentence in settings_dir.refused(sets=[sets])
@@ -229,15 +231,6 @@ def test_a_wrong_environment_is_refused(
     settings_dir: SettingsFixture, name: str, value: str, sentence: str
 ) -> None:
     assert sentence in settings_dir.refused(environ={name: value})
-
-
-def test_what_two_settings_break_together_names_the_table(settings_dir: SettingsFixture) -> None:
-    said = settings_dir.refused("[board]\nport = 4001")
-    assert "over0.toml: board: port 4001 of 127.0.0.1 is both the board's" in said
-
-
-DEEP = ".".join("a" * 3000)
-MANY_DIGITS = "1" * 5000  # more than Python reads
 
 
 @pytest.mark.parametrize(
@@ -258,18 +251,3 @@ def test_an_unreadable_file_is_refused(
         (settings_dir.folder / "over.toml").write_bytes(text)
     with pytest.raises(ConfigError, match=f"^{re.escape(sentence)}"):
         load(Shared, Sources((Path("over.toml"),), {}))
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "sentence"),
-    [
-        ("board.port", MANY_DIGITS, f"board.port = '{MANY_DIGITS}': Expected `int`, got `str`"),
-        ("robot.id", "\udcff", r"\udcff: is no UTF-8"),
-        ("board", f"{{{DEEP} = 1}}", ": tables are nested too deep"),
-    ],
-    ids=["digits", "no UTF-8", "deep"],
-)
-def test_an_unreadable_value_is_refused(
-    settings_dir: SettingsFixture, path: str, value: str, sentence: str
-) -> None:
-    assert sentence in settings_dir.refused(sets=[f"{path}={value}"])

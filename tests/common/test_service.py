@@ -1,5 +1,6 @@
 """A service's life, from its settings to its exit code, as a real process."""
 
+import contextlib
 import json
 import os
 import signal
@@ -17,11 +18,11 @@ from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.config import Sources, load
 from common.messages import MAX_TEXT, Event, Health
-from common.service import Node, run
+from common.service import Node, run, serve
 from common.settings import Shared
 from tests.common.bus_fixture import BusFixture
 from tests.common.program import SPECIMEN, Program, on, program
-from verification.harness.ports import free_port
+from tests.common.systemd_manager import Manager
 from verification.harness.waiting import wait_until
 
 # --- settings -----------------------------------------------------------------------------------
@@ -48,30 +49,6 @@ def test_what_cannot_be_opened_ends_it(shared_router: str) -> None:
     with program(SPECIMEN, "refused", *on(shared_router, "refused")) as it:
         assert it.code() == EXIT_LINK == 69
         assert it.events() == ["port 4002 is taken"]
-
-
-def test_a_long_text_of_an_event_is_cut() -> None:
-    node = Node("odom", load(Shared, Sources(environ={})))
-    node.event("lost", "error", "x" * 5000, folder="y" * 5000)
-    (sent,) = (each.last for each in node.bus.publishers if isinstance(each.last, Event))
-    assert codec.decode(codec.encode(sent), Event) == sent
-    assert (len(sent.text), sent.about) == (MAX_TEXT, {"folder": "y" * MAX_TEXT})
-    node.loop.close()
-
-
-def test_zenoh_has_a_thread_for_each_session(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """A dead TCP link occupies its thread for 10 s: the others must not share it."""
-    monkeypatch.delenv(RUNTIME_ENV, raising=False)
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    sets = ["bus.connect=tcp/127.0.0.1:1"]
-    node = Node("safety", load(Shared, Sources(environ={}, sets=sets)))
-    node.open_bus()
-    node.open_drive(listens=False)
-    node.open()
-    node.close()
-    assert os.environ[RUNTIME_ENV] == ONE_POOL.format(links=3)
 
 
 # --- on a router --------------------------------------------------------------------------------
@@ -147,14 +124,6 @@ def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
     ]
 
 
-def test_its_token_carries_its_boot(lived: Lived) -> None:
-    buses, _, witness = lived
-    wait_until(lambda: witness.tokens, "the token")
-    key, alive = witness.tokens[0]
-    assert key == keys.live_key(buses.robot, "specimen", f"{witness.health[0].boot:x}")
-    assert alive
-
-
 def test_its_schemas_settings_and_last_values_are_looked_up(lived: Lived) -> None:
     buses, _, _ = lived
     schemas, settings = info(buses, "schema"), info(buses, "config")
@@ -167,33 +136,104 @@ def test_its_schemas_settings_and_last_values_are_looked_up(lived: Lived) -> Non
     assert last[keys.HEALTH.on(buses.robot, service="specimen")]["service"] == "specimen"
 
 
-def test_sigterm_lets_it_come_to_rest_and_its_token_goes(lived: Lived) -> None:
-    """The last of those that share it."""
-    _, it, witness = lived
-    it.process.send_signal(signal.SIGTERM)
-    assert it.code() == 0
-    assert it.events()[-2:] == ["stopping", "stopped"]
-    key = witness.tokens[0][0]
-    wait_until(lambda: (key, False) in witness.tokens, "the token's end")
-
-
 def test_a_bug_of_ours_ends_it_though_its_session_is_open(shared_router: str) -> None:
     with program(SPECIMEN, "failing", *on(shared_router, "failing")) as it:
         assert it.code() == 1
         assert "RuntimeError: a bug of ours" in it.text
 
 
-# --- without one, and with one that comes and goes ----------------------------------------------
-
-
-def test_on_a_terminal_it_writes_text_and_it_ends_though_it_finds_no_rest() -> None:
-    where = f"tcp/127.0.0.1:{free_port()}"
-    with program(SPECIMEN, "restless", *on(where, "001"), tty=True) as it:
-        it.wait_for("started")
+def test_sigterm_ends_it_with_its_token_though_it_finds_no_rest(buses: BusFixture) -> None:
+    """On a terminal it writes text."""
+    witness = Witness(buses.robot)
+    buses.bus(witness.declare)
+    with program(SPECIMEN, "restless", *on(buses.endpoint, buses.robot), tty=True) as it:
+        wait_until(lambda: witness.tokens and witness.health, "the token")
+        key = keys.live_key(buses.robot, "specimen", f"{witness.health[0].boot:x}")
         it.process.send_signal(signal.SIGTERM)
         assert it.code() == 0
-        it.wait_for("stopped")
-        assert not any(line.startswith("{") for line in it.lines)
+    assert it.text.index("stopping") < it.text.index("stopped")
+    assert not any(line.startswith("{") for line in it.lines)
+    wait_until(lambda: witness.tokens == [(key, True), (key, False)], "the token's end")
+
+
+# --- in this process ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Node[Shared]]:
+    """A service without a router; gives the handlers back that ``serve`` replaces."""
+    monkeypatch.delenv(RUNTIME_ENV, raising=False)
+    numbers = signal.SIGINT, signal.SIGTERM
+    before = {number: signal.getsignal(number) for number in numbers}
+    sets = ["bus.connect=tcp/127.0.0.1:1"]
+    yield Node("teleop", load(Shared, Sources(environ={}, sets=sets)))
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("first", ["a bug", "a signal"])
+def test_signals_while_it_leaves_do_not_begin_its_exit_anew(
+    node: Node[Shared], first: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended: list[int] = []
+    said: list[str] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+
+    def on_exit() -> None:
+        said.append("begun")
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
+            signal.raise_signal(number)
+        said.append("over")
+
+    def begin(_: int) -> None:
+        if first == "a bug":
+            raise ZeroDivisionError
+        signal.raise_signal(signal.SIGINT)
+
+    node.on_exit = on_exit
+    node.loop.every(1.0, begin)
+    with contextlib.suppress(ZeroDivisionError):
+        serve(node)
+    assert said == ["begun", "over"]
+    assert ended == []
+
+
+def test_systemd_learns_that_it_is_ready_and_lives_from_its_loop_and_that_it_stops(
+    node: Node[Shared], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with contextlib.closing(Manager(str(tmp_path / "notify"))) as manager:
+        for name, value in manager.environ.items():
+            monkeypatch.setenv(name, value)
+
+        def look(_: int) -> None:
+            if manager.beats() > 2:
+                node.loop.stop()
+
+        node.loop.every(0.01, look)
+        assert serve(node) == 0
+        messages = manager.read()
+    assert messages[0] == "READY=1"
+    assert messages[-1] == "STOPPING=1"
+
+
+def test_a_long_text_of_an_event_is_cut(node: Node[Shared]) -> None:
+    node.event("lost", "error", "x" * 5000, folder="y" * 5000)
+    (sent,) = (each.last for each in node.bus.publishers if isinstance(each.last, Event))
+    assert codec.decode(codec.encode(sent), Event) == sent
+    assert (len(sent.text), sent.about) == (MAX_TEXT, {"folder": "y" * MAX_TEXT})
+    node.loop.close()
+
+
+def test_zenoh_has_a_thread_for_each_session(
+    node: Node[Shared], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A dead TCP link occupies its thread for 10 s: the others must not share it."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    node.open_bus()
+    node.open_drive(listens=False)
+    node.open()
+    node.close()
+    assert os.environ[RUNTIME_ENV] == ONE_POOL.format(links=3)
 
 
 def test_its_version_is_that_of_the_package() -> None:

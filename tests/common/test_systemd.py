@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,10 +9,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.systemd import BEATS_PER_TIMEOUT, Systemd
-from tests.common.program import SPECIMEN, on, program
 from tests.common.systemd_manager import PATIENCE_US, Manager
-from verification.harness.ports import free_port
-from verification.harness.waiting import wait_until
 
 PERIOD_NS = PATIENCE_US * 1000 // BEATS_PER_TIMEOUT
 
@@ -78,29 +74,3 @@ def test_a_socket_that_is_gone_holds_nobody_up(manager: Manager) -> None:
         systemd.ready(2 * NS_PER_S)
         systemd.stopping()
         assert successor.read() == ["READY=1", "WATCHDOG=1", "STOPPING=1"]
-
-
-# --- a service ----------------------------------------------------------------------------------
-
-
-def test_a_service_is_ready_when_its_loop_runs_and_beats_until_it_hangs(
-    manager: Manager, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("NOTIFY_SOCKET", manager.environ["NOTIFY_SOCKET"])
-    monkeypatch.setenv("WATCHDOG_USEC", str(PATIENCE_US))
-    where = f"tcp/127.0.0.1:{free_port()}"  # there is no router, and it is there all the same
-    with program(SPECIMEN, "hanging", *on(where, "001")) as it:
-        wait_until(lambda: manager.beats() > 3, "beats")
-        assert manager.messages[0] == "READY=1"
-        it.process.send_signal(signal.SIGUSR1)  # its loop hangs from here on
-        it.wait_for("hangs")
-        beats = manager.beats()
-        with pytest.raises(AssertionError):
-            wait_until(
-                lambda: manager.beats() > beats, "a beat of a service that hangs", patience_s=0.6
-            )
-        it.process.send_signal(signal.SIGUSR1)
-        wait_until(lambda: manager.beats() > beats, "beats again")
-        it.process.send_signal(signal.SIGTERM)
-        assert it.code() == 0
-    assert "STOPPING=1" in manager.read()

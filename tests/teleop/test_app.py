@@ -65,10 +65,11 @@ def test_losing_the_focus_of_the_screen_releases(screen: Screen) -> None:
     play(screen, act)
 
 
-def test_quitting_twice_does_not_wait(screen: Screen) -> None:
+@pytest.mark.parametrize("key", ["q", "ctrl+c"])
+def test_quitting_twice_does_not_wait(screen: Screen, key: str) -> None:
     async def act(pilot: Pilot[None]) -> None:
-        await pilot.press("q")
-        await pilot.press("q")
+        await pilot.press(key)
+        await pilot.press(key)
         await until(lambda: not screen.app.is_running, "the screen to leave")
 
     play(screen, act)
@@ -91,7 +92,7 @@ def test_a_redraw_that_is_posted_late_keeps_its_time(screen: Screen) -> None:
     play(screen, act)
 
 
-def test_a_terminal_that_does_not_answer_is_queried_less_often(
+def test_a_terminal_that_does_not_answer_is_queried_less_often_and_drives_nothing(
     screen: Screen, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[str] = []
@@ -108,6 +109,9 @@ def test_a_terminal_that_does_not_answer_is_queried_less_often(
         screen.now_ns += 10 * NS_PER_S
         screen.controller.tick(screen.now_ns)
         await until(lambda: "KEYS OFF" in screen.text_of("hints"), "the refusal")
+        await pilot.press("w")
+        screen.controller.tick(screen.now_ns)
+        assert screen.node.requests[0] == 0
 
     play(screen, act)
 

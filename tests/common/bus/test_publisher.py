@@ -11,8 +11,7 @@ import pytest
 import zenoh
 
 from common import keys
-from common.bus.publisher import BOOT_ID, Publisher, host_id, qos
-from common.keys import ClassOfService
+from common.bus.publisher import BOOT_ID, Publisher, host_id
 from common.messages import Bumper, Motion
 from common.motion import Command
 
@@ -30,18 +29,6 @@ def test_it_numbers_and_stamps_even_without_a_bus() -> None:
     assert publisher.last is second
     assert second.pressed
     assert not counts  # nothing was sent
-
-
-@pytest.mark.parametrize(
-    "service",
-    [keys.ESTOP_CLASS, keys.COMMAND, keys.FAST, keys.SLOW, keys.EVENT],
-    ids=lambda service: service.name,
-)
-def test_congestion_never_blocks(service: ClassOfService) -> None:
-    options = qos(service)
-    assert options["congestion_control"] == zenoh.CongestionControl.DROP
-    assert options["priority"] == getattr(zenoh.Priority, service.priority)
-    assert options["express"] is service.express
 
 
 class Session:

@@ -5,103 +5,52 @@ from contextlib import ExitStack
 import zenoh
 
 from common import keys
-from common.bus.bus import Arrival, Bus
 from common.bus.session import client_config, router
-from common.messages import Bumper, Event, ResetDone, ResetRequest
-from tests.common.bus_fixture import BusFixture, until_received
+from tests.common.bus_fixture import until_received
 from verification.harness.bus import at, listening
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 
-def somewhere() -> str:
-    """Return an endpoint where nobody listens yet."""
-    return f"tcp/127.0.0.1:{free_port()}"
+class Client:
+    """A session on a router, and what it receives."""
 
-
-class Onboard:
-    """The bus clients on a robot."""
-
-    def __init__(self, buses: BusFixture) -> None:
-        self.stops: list[int] = []
-        self.bus = buses.bus(self.declare)
-        self.bumper = self.bus.publisher(keys.BUMPER)
-        events = self.bus.publisher(keys.EVENTS, service="safety")
-        events.put(Event(name="old", level="info", text="before the site was there"))
-
-    def declare(self, bus: Bus) -> None:
-        bus.on_any(keys.estop_key(bus.robot), self.stops.append)
-        bus.serve(keys.RESET, lambda _, caller: caller.reply(ResetDone(text="done")))
-        bus.live(keys.live_key(bus.robot, "safety", "1"))
-
-    def put(self) -> None:
-        self.bumper.put(Bumper(pressed=True))
-
-
-class Room:
-    """A client at the site."""
-
-    def __init__(self, buses: BusFixture) -> None:
-        self.received: list[Arrival[Bumper]] = []
-        self.late: list[str] = []
-        self.tokens: list[str] = []
-        self.replies: list[ResetDone] = []
-        self.bus = buses.bus(self.declare)
-
-    def declare(self, bus: Bus) -> None:
-        bus.subscribe(keys.BUMPER, self.received.append)
-        bus.subscribe(
-            keys.EVENTS, lambda a: self.late.append(a.message.name), depth=99, service="*"
-        )
-        bus.watch_live(keys.live_key("berlin-$*", "*", "*"), lambda key, _: self.tokens.append(key))
-
-    def request(self) -> None:
-        self.bus.call(keys.RESET, ResetRequest(), self.replies.append, print)
-
-
-def test_a_site_sees_asks_and_stops_a_robot_whoever_starts_anew(buses: BusFixture) -> None:
-    site, own = somewhere(), somewhere()
-    buses.endpoint, buses.robot = own, "berlin-007"
-    with router(listening(own, site)):  # which does without the site's
-        onboard = Onboard(buses)
-        for _ in range(2):  # the site's is restarted in between
-            onboard.stops.clear()
-            with router(listening(site)), zenoh.open(client_config(at(site))) as session:
-                buses.endpoint = site
-                room = Room(buses)
-                until_received(onboard.put, lambda r=room: r.received, "a bumper")  # type: ignore[misc]
-                wait_until(lambda r=room: r.tokens, "the token")  # type: ignore[misc]
-                wait_until(lambda r=room: r.late, "the event")  # type: ignore[misc]
-                until_received(room.request, lambda r=room: r.replies, "a reply")  # type: ignore[misc]
-                until_received(
-                    lambda s=session: s.put(keys.estop_key("berlin-$*"), b""),  # type: ignore[misc]
-                    lambda: onboard.stops,
-                    "a stop",
-                )
-                room.bus.close()
-
-
-def test_robots_do_not_hear_each_other(buses: BusFixture) -> None:
-    """So the declarations of one cost the others nothing, and none can drive another."""
-    site, first, second = somewhere(), somewhere(), somewhere()
-    with ExitStack() as stack:
-        for where in (listening(site), listening(first, site), listening(second, site)):
-            stack.enter_context(router(where))
-        one, other, room = (
-            stack.enter_context(zenoh.open(client_config(at(e)))) for e in (first, second, site)
-        )
-        received: list[str] = []
-        seen: list[str] = []
-        subscribers = [
-            other.declare_subscriber("t2/**", lambda sample: received.append(str(sample.key_expr))),
-            room.declare_subscriber("t2/**", lambda sample: seen.append(str(sample.key_expr))),
+    def __init__(self, stack: ExitStack, endpoint: str) -> None:
+        self.session = stack.enter_context(zenoh.open(client_config(at(endpoint))))
+        self.received: set[str] = set()
+        self.subscribers = [
+            self.session.declare_subscriber("t2/**", self.take),
+            self.session.liveliness().declare_subscriber("t2/**", self.take, history=True),
         ]
-        until_received(lambda: one.put("t2/v1/a/tel/x", b""), lambda: seen, "what the site sees")
+        stack.callback(lambda: [each.undeclare() for each in self.subscribers])
+
+    def take(self, sample: zenoh.Sample) -> None:
+        self.received.add(str(sample.key_expr))
+
+    def put_until(self, key: str, other: "Client") -> None:
+        """Publish until the other one has it: samples before all declarations are lost."""
+        arrived = [str(zenoh.KeyExpr(key))]
         until_received(
-            lambda: room.put("t2/v1/a/tel/end", b""),
-            lambda: "t2/v1/a/tel/end" in received,
-            "the end",
+            lambda: self.session.put(key, b""), lambda: set(arrived) <= other.received, key
         )
-        assert set(received) == {"t2/v1/a/tel/end"}
-        for subscriber in subscribers:
-            subscriber.undeclare()
+
+
+def test_a_site_sees_and_stops_its_robots_which_do_not_receive_each_other() -> None:
+    """So the declarations of one cost the others nothing, and none can drive another."""
+    site, first, second = (f"tcp/127.0.0.1:{free_port()}" for _ in range(3))
+    measured, token = "t2/v1/berlin-1/tel/x", keys.live_key("berlin-1", "safety", "1")
+    with ExitStack() as stack:
+        for where in (listening(first, site), listening(second, site)):  # before the site is up
+            stack.enter_context(router(where))
+        one, other = Client(stack, first), Client(stack, second)
+        alive = one.session.liveliness().declare_token(token)
+        for _ in range(2):  # the site's router is restarted in between
+            with router(listening(site)), ExitStack() as visit:
+                room = Client(visit, site)
+                one.put_until(measured, room)
+                wait_until(lambda r=room: token in r.received, "the token")  # type: ignore[misc]
+                for robot in (one, other):
+                    room.put_until(keys.estop_key("berlin-$*"), robot)
+                    robot.received.discard(keys.estop_key("berlin-$*"))
+        assert not {measured, token} & other.received
+        alive.undeclare()
