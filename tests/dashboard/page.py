@@ -53,10 +53,10 @@ def drive_until_moving(
     stack: RunningStack, press: Callable[[], None], release: Callable[[], None]
 ) -> None:
     """Hold until the vehicle moves; release and retry after a stall of the host."""
-    for _ in range(10):
+    for _ in range(40):
         press()
         try:
-            wait_until(lambda: abs(stack.speed()) > 0.1, "the vehicle moves", patience_s=4)
+            wait_until(lambda: abs(stack.speed()) > 0.1, "the vehicle moves", patience_s=1)
         except AssertionError:
             release()
         else:

@@ -80,7 +80,7 @@ def test_an_emergency_stop_beside_tls_handshakes_that_never_end(
 def test_a_viewer_that_floods_is_disconnected(server: Server) -> None:
     def flood(it: Client) -> None:
         while True:
-            it.socket.socket.sendall(PING * 100)
+            it.socket.socket.sendall(PING * 1000)
             it.next_snapshot()
 
     with connected(server) as it, pytest.raises((ConnectionClosed, OSError)):

@@ -102,7 +102,17 @@ def test_a_stop_of_an_unknown_robot_is_refused(server: Server, ada: Client) -> N
     assert "made-up" not in ada.wait_for("slow")["robots"]
 
 
-@pytest.mark.parametrize("text", ["{}", "x" * 5000, '{"x":' + "[" * 2000])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{}",
+        "x" * 5000,
+        '{"x":' + "[" * 2000,
+        '{"k":"hold","echo":1,"z":1}',
+        '{"k":"hold","echo":1,"release":"sideways"}',
+        '{"k":"gear","gear":6}',
+    ],
+)
 def test_an_invalid_message_closes_the_connection(server: Server, text: str) -> None:
     with connected(server) as it:
         it.socket.send(text)
