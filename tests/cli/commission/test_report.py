@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from cli.commission.report import Report, Verdict, failed, judged, render
+from cli.commission.report import Report, Verdict, render
 
 GOOD = ("Link", Verdict("passed", "The board's link is up.", (("state", "up"),)))
 SKIPPED = ("Turn", Verdict("skipped", "no blocks | today\nsorry"))
@@ -80,9 +80,3 @@ def test_a_partial_checkout_may_pass() -> None:
     report = replace(REPORT, left_out=["bumper", "sonar"])
     assert report.passed
     assert "Partial checkout, left out: bumper, sonar." in render(report)
-
-
-def test_a_verdict_is_failed_by_any_problem() -> None:
-    assert judged(["", "A.", "B."], "good") == Verdict("failed", "A. B.")
-    assert failed("A.") == judged(["A."], "good")
-    assert judged(["", ""], "good") == Verdict("passed", "good")

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from cli.inspect import hz
-from cli.inspect.ls import as_cells, members
+from cli.inspect.ls import as_cells
 from common import keys
 from common.bus.bus import Bus
 from common.bus.session import router
@@ -15,8 +15,6 @@ from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import listening
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
-
-TOKENS = ["t2/v1/7/live/bridge/1a", "t2/v1/7/live/safety/2b"]
 
 
 @pytest.fixture
@@ -75,34 +73,6 @@ def test_services_of_a_robot_that_dials_a_site(capsys: pytest.CaptureFixture[str
         pretend(buses, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
         alone = {"bridge": ["tel/bridge/velocity"]}
         wait_until(lambda: found(own) == found(site) == alone, "the bridge alone")
-
-
-def test_members_of_tokens_and_declarations() -> None:
-    def entry(role: str, key: str, *zids: str) -> tuple[str, Any]:
-        lists = {"routers": ["r0"], "peers": ["p0"], "clients": list(zids)}
-        return f"@/r0/router/{role}/{key}", lists
-
-    declared = dict(
-        [
-            entry("token", TOKENS[0], "zb"),
-            entry("token", TOKENS[1], "zs"),
-            entry("token", "t2/v1/7/live/other/3c", "zx"),
-            entry("publisher", "t2/v1/7/tel/bridge/bumper", "zb"),
-            entry("subscriber", "t2/v1/7/tel/bridge/bumper", "zs", "me"),
-            entry("subscriber", "t2/v1/7/tel/**", "stranger-1"),
-            entry("queryable", "t2/v1/7/srv/safety/reset", "zs"),
-            entry("queryable", "t2/v1/7/evt/safety/@adv/pub/x", "zs"),
-            ("@/r0/router", {"version": "v1"}),
-            ("@/r0/router/linkstate/x", "graph {}"),
-        ]
-    )  # fmt: skip
-    bridge, safety, other = members(TOKENS, declared, "me")
-    assert (bridge.name, bridge.robot, bridge.instance) == ("bridge", "7", "1a")
-    assert bridge.publishes == {"t2/v1/7/tel/bridge/bumper"}
-    assert safety.reads == {"t2/v1/7/tel/bridge/bumper"}
-    assert safety.answers == {"t2/v1/7/srv/safety/reset"}
-    assert (other.name, other.instance) == ("stranger", "")
-    assert [each.name for each in members(TOKENS, {}, "me")] == ["bridge", "safety"]
 
 
 def test_nothing_to_list(tool: Tool) -> None:

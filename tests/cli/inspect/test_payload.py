@@ -87,17 +87,6 @@ def test_a_missing_field_names_the_existing_ones(value: object, path: str, phras
 # --- as text --------------------------------------------------------------------------------------
 
 
-def test_a_table_is_aligned_with_numbers_to_the_right() -> None:
-    shown = output.table(("key", "Hz"), [("tel/a", "5.0"), ("b\x1b", "120.5"), ("c", "-")])
-    assert shown.splitlines() == [
-        "key         Hz",
-        "tel/a      5.0",
-        "b\\u001b  120.5",
-        "c            -",
-    ]
-    assert output.table(("a", "b"), []) == "a  b"
-
-
 @pytest.mark.parametrize(
     ("value", "shown"),
     [

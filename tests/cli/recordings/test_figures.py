@@ -44,15 +44,6 @@ def test_a_single_point_makes_no_path() -> None:
     assert re.findall(r' d="[^"]*L *"', drawn) == []
 
 
-def test_the_path_has_equal_scales() -> None:
-    timeline = timeline_of_the_drive()
-    segment = timeline.path[0]
-    segment.times[:], segment.xs[:], segment.ys[:] = [0.0, 9.0], [0.0, 2.0], [0.0, 1.0]
-    (points,) = lines_of(figures.path(timeline), figures.MEASURED)
-    (x1, y1), (x2, y2) = (map(float, at) for at in re.findall(r"([\d.]+),([\d.]+)", points))
-    assert abs((x2 - x1) - 2 * (y1 - y2)) < 0.5
-
-
 def test_non_finite_values_are_left_out() -> None:
     timeline, value = Timeline(), math.inf
     pose = drive_fixture.odometry(1)

@@ -1,6 +1,6 @@
 """The HTML page: complete, self-contained, and with escaped content."""
 
-from html.parser import HTMLParser
+import re
 from pathlib import Path
 
 import pytest
@@ -27,26 +27,6 @@ def file(tmp_path: Path) -> Path:
     return made.path
 
 
-class Page(HTMLParser):
-    """Collects the URLs that a browser would load, and all ids."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.fetched: list[str] = []
-        self.ids: list[str] = []
-        self.tags: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        for name, value in attrs:
-            fetches = name in ("src", "href", "xlink:href", "action", "data", "poster")
-            if fetches and value and not value.startswith("#"):
-                self.fetched.append(value)
-            if name == "id" and value:
-                self.ids.append(value)
-
-
 def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(file)]) == 0
     out = file.with_suffix(".html")
@@ -58,19 +38,9 @@ def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "2023-11-14 22:13:20 UTC",
     ):  # fmt: skip
         assert word in text, word
-
-
-def test_the_page_loads_nothing_and_has_no_script(file: Path) -> None:
-    main(["report", str(file)])
-    page = Page(file.with_suffix(".html").read_text())
-    assert page.fetched == []
-    assert "script" not in page.tags
-    assert page.tags.count("svg") == 2
-
-
-def test_content_from_the_bus_is_escaped(file: Path) -> None:
-    main(["report", str(file)])
-    text = file.with_suffix(".html").read_text()
+    # It loads nothing, and content of the bus is escaped.
+    assert not re.findall(r"<script|(?:src|href|action|data|poster)=[^#]{2}", text)
+    assert text.count("<svg") == 2
     assert "<i>" not in text
     assert "tel/&lt;i&gt;\\u202e" in text
     assert text.replace("\n", "").isprintable()

@@ -8,10 +8,8 @@ import pytest
 import zenoh
 
 from cli.__main__ import main
-from cli.run.router import open_to
 from common.bus.session import client_config
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.settings import BusSettings
 from tests.cli.processes import PATIENCE_S, ran, sets
 from verification.harness.bus import at, router_process
 from verification.harness.ports import free_port
@@ -62,21 +60,6 @@ def test_print_the_configuration_for_zenohd(
     assert json.loads((tmp_path / "router.json5").read_text())["mode"] == "router"
     assert main(["router", "--print", str(tmp_path / "none" / "x")]) == EXIT_CONFIG
     assert "/none/x: cannot be written: No such file" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("bus", "words"),
-    [
-        (BusSettings(), "every program on this machine"),
-        (BusSettings(insecure=True), "everyone on the network, without a certificate"),
-        (
-            BusSettings(uplink=("tcp/127.0.0.1:1",)),
-            "every program on this machine, and clients of the router tcp/127.0.0.1:1",
-        ),
-    ],
-)
-def test_open_to_describes_the_clients(bus: BusSettings, words: str) -> None:
-    assert open_to(bus) == words
 
 
 @pytest.mark.parametrize(

@@ -89,25 +89,6 @@ def test_the_probe_is_restarted_and_ends_with_its_router(endpoint: str) -> None:
         wait_gone([second])
 
 
-def test_the_probe_ignores_ctrl_c(endpoint: str) -> None:
-    with router_process(endpoint) as process:
-        probe = probe_of(process)
-        ends = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        wait_until(
-            lambda: all(_ignores(probe, number) for number in ends),
-            "a probe that has set its signals",
-        )
-        for number in ends:
-            os.kill(probe, number)
-        time.sleep(0.2)
-        assert alive(probe)
-
-
-def _ignores(pid: int, number: signal.Signals) -> bool:
-    words = Path(f"/proc/{pid}/status").read_text(encoding="ascii").split()
-    return bool(int(words[words.index("SigIgn:") + 1], 16) >> (number - 1) & 1)
-
-
 def _command(pid: int) -> bytes:
     return Path(f"/proc/{pid}/cmdline").read_bytes()
 
