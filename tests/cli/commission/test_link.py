@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from cli.commission.link import (
     CRC_FRAMES,
@@ -48,93 +49,54 @@ def test_a_good_link_passes_with_its_data() -> None:
     assert data["waiting for"] == "nothing"
 
 
+RELAY = Relay(state="up", version="0.1.0", braking="", uptime=1.0, counters={})
+
+
 @pytest.mark.parametrize(
-    ("last", "phrase"),
+    ("given", "phrase"),
     [
         ({"state": "lost"}, "The link is lost"),
         ({"state": "never"}, "The link is never"),
         ({"epoch": 1}, "restarted during this step"),
         ({"rejected": {"wrong_address": 20}}, "20 frames rejected as wrong_address"),
+        ({"rejected": {"truncated": 5}}, ""),  # one in a hundred of 545 frames
+        ({"rejected": {"truncated": 6}}, "6 frames rejected as truncated"),
+        ({"switches": None}, "both its emergency brakes"),
+        ({"switches": Switches(ultrasonic_brake=True)}, "both its emergency brakes"),
+        (
+            {"switches": Switches(ultrasonic_brake=False, bumper_brake=True)},
+            "both its emergency brakes",
+        ),
+        ({"frames": CRC_FRAMES - 1, "nonzero": 900}, "Too few frames for a verdict"),
+        ({"nonzero": NONZERO_FRAMES - 1}, "Too few frames for a verdict"),
+        ({"rejected": {"bad_crc": 1}}, "check the cable"),
+        ({"rejected": {"bad_crc": 499}, "frames": 501}, "check the cable"),
+        ({"rejected": {"bad_crc": 500}, "frames": 500}, "another CRC"),
+        ({"relay": RELAY}, ""),
+        ({"relay": replace(RELAY, braking="silent")}, "now: 0.1.0, braking: silent."),
+        ({"relay": replace(RELAY, state="lost")}, "now: silent."),
     ],
 )
-def test_problems_are_named(last: dict[str, Any], phrase: str) -> None:
-    verdict = judge(**last)
-    assert verdict.outcome == "failed"
+def test_problems_are_named(given: dict[str, Any], phrase: str) -> None:
+    verdict = judge(**given)
+    assert (verdict.outcome == "passed") == (not phrase)
     assert phrase in verdict.text
 
 
 @pytest.mark.parametrize(
-    "switches",
+    ("rates", "problem"),
     [
-        None,
-        Switches(ultrasonic_brake=True, bumper_brake=None),
-        Switches(ultrasonic_brake=False, bumper_brake=True),
+        ({"UltrasonicReport": 14.0}, ""),
+        ({"UltrasonicReport": 13.9}, "UltrasonicReport has 14 Hz, expected are 20 Hz."),
+        ({"BumperReport": 0.0}, "BumperReport has 0 Hz, expected are 50 Hz."),
     ],
 )
-def test_the_emergency_brakes_must_be_confirmed(switches: Switches | None) -> None:
-    verdict = judge(switches)
-    assert verdict.outcome == "failed"
-    assert "both its emergency brakes" in verdict.text
-
-
-@pytest.mark.parametrize(("rate", "outcome"), [(14.0, "passed"), (13.9, "failed"), (0, "failed")])
-def test_lowest_allowed_rate(rate: float, outcome: str) -> None:
-    links = [link(rates=EXPECTED_HZ | {"UltrasonicReport": rate})] * 5
-    assert judge_link(links, ON, CRC_FRAMES, NONZERO_FRAMES).outcome == outcome
-
-
-def test_a_missing_report_is_named() -> None:
-    rates = {name: rate for name, rate in EXPECTED_HZ.items() if name != "BumperReport"}
-    verdict = judge_link([link(rates=rates)], ON, CRC_FRAMES, NONZERO_FRAMES)
-    assert verdict.text == "BumperReport has 0 Hz, expected are 50 Hz."
-
-
-@pytest.mark.parametrize(("count", "outcome"), [(5, "passed"), (6, "failed")])
-def test_one_in_a_hundred_may_be_damaged(count: int, outcome: str) -> None:
-    # 109 frames a second for five seconds: 545 frames
-    assert judge(rejected={"truncated": count}).outcome == outcome
+def test_lowest_allowed_rate(rates: dict[str, float], problem: str) -> None:
+    links = [link(rates=EXPECTED_HZ | rates)] * 5
+    verdict = judge_link(links, ON, CRC_FRAMES, NONZERO_FRAMES)
+    assert problem == ("" if verdict.outcome == "passed" else verdict.text)
 
 
 def test_only_rejections_of_the_step_count() -> None:
-    links = [
-        link(rejected={"bad_crc": 3, "no_magic": 1}),
-        link(rejected={"bad_crc": 5, "no_magic": 1}),
-    ]
-    assert rejected(links) == {"bad_crc": 2}
-
-
-@pytest.mark.parametrize(
-    ("frames", "nonzero"), [(CRC_FRAMES - 1, 900), (CRC_FRAMES, NONZERO_FRAMES - 1)]
-)
-def test_too_few_frames(frames: int, nonzero: int) -> None:
-    verdict = judge(frames=frames, nonzero=nonzero)
-    assert verdict.outcome == "failed"
-    assert verdict.text.startswith("Too few frames for a verdict")
-
-
-@pytest.mark.parametrize(
-    ("bad", "frames", "phrase"),
-    [(1, 1000, "check the cable"), (499, 501, "check the cable"), (500, 500, "another CRC")],
-)
-def test_a_bad_cable_and_another_firmware_differ(bad: int, frames: int, phrase: str) -> None:
-    verdict = judge(frames=frames, rejected={"bad_crc": bad})
-    assert verdict.outcome == "failed"
-    assert phrase in verdict.text
-
-
-@pytest.mark.parametrize(
-    ("state", "braking", "text", "passed"),
-    [
-        ("up", "", "0.1.0, passing", True),
-        ("up", "silent", "0.1.0, braking: silent", False),
-        ("lost", "", "silent", False),
-    ],
-)
-def test_a_configured_relay_must_pass_commands(
-    state: Any, braking: str, text: str, passed: bool
-) -> None:
-    relay = Relay(state=state, version="0.1.0", braking=braking, uptime=1.0, counters={})
-    verdict = judge(relay=relay)
-    assert ("relay", text) in verdict.data
-    assert (verdict.outcome == "passed") == passed
-    assert ("relay did not pass" in verdict.text) != passed
+    before, after = ({"bad_crc": bad, "no_magic": 1} for bad in (3, 5))
+    assert rejected([link(rejected=before), link(rejected=after)]) == {"bad_crc": 2}

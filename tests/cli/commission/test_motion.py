@@ -39,50 +39,28 @@ class Vehicle:
 
     def run(self, requested: Twist, unit: str = "decidegree", feedback: str = "decidegree") -> Run:
         end_ns = round(self.driven_s * NS_PER_S)
-        times = range(0, end_ns + NS_PER_S, PERIOD_NS)
-        released = [t <= end_ns for t in times]
-        moving = [t <= end_ns + self.stands_after_s * NS_PER_S for t in times]
-        linear, angular = requested.linear * self.granted, requested.angular * self.granted
-        turns = requested.angular != 0
-        speed = (angular if turns else linear) * self.counted
-        way = [speed * min(t, end_ns) / NS_PER_S for t in times]
-        aside = [0.0] * len(times)
-        distances, headings = (aside, way) if turns else (way, aside)
-        return Run(
-            requested=requested,
-            unit=unit,
-            feedback=feedback,
-            released_ns=end_ns,
-            motions=[
-                Latest(Motion(command=Command.RUN, linear=linear * on, angular=angular * on), t)
-                for t, on in zip(times, released, strict=True)
-            ],
-            velocities=[
-                Latest(
-                    Velocity(
-                        linear=linear * self.measured * on, angular=angular * self.measured * on
-                    ),
-                    t,
-                )
-                for t, on in zip(times, moving, strict=True)
-            ],
-            mileages=[
-                Latest(
-                    Mileage(
-                        distance=distance,
-                        heading=math.remainder(self.starts_at + heading, math.tau),
-                        epoch=0,
-                        mono_ns=t,
-                    ),
-                    t,
-                )
-                for t, distance, heading in zip(times, distances, headings, strict=True)
-            ],
-            states=[
-                Latest(safety_state(verdict="stop", text="blocked"), 0),
-                Latest(safety_state(verdict="run"), 1),
-            ],
+        stand_ns = end_ns + round(self.stands_after_s * NS_PER_S)
+        asked = Motion(
+            command=Command.RUN,
+            linear=requested.linear * self.granted,
+            angular=requested.angular * self.granted,
         )
+        motions, velocities, mileages = [], [], []
+        for t in range(0, end_ns + NS_PER_S, PERIOD_NS):
+            motions.append(Latest(asked if t <= end_ns else Motion(command=Command.RUN), t))
+            moving = self.measured * (t <= stand_ns)
+            linear, angular = asked.linear * moving, asked.angular * moving
+            velocities.append(Latest(Velocity(linear=linear, angular=angular), t))
+            counted = self.counted * min(t, end_ns) / NS_PER_S
+            heading = math.remainder(self.starts_at + asked.angular * counted, math.tau)
+            distance = asked.linear * counted
+            counts = Mileage(distance=distance, heading=heading, epoch=0, mono_ns=t)
+            mileages.append(Latest(counts, t))
+        states = [
+            Latest(safety_state(verdict="stop", text="blocked"), 0),
+            Latest(safety_state(verdict="run"), 1),
+        ]
+        return Run(requested, unit, feedback, end_ns, motions, velocities, mileages, states)
 
 
 def judge(vehicle: Vehicle, requested: Twist = FORWARD, unit: str = "decidegree") -> Verdict:
