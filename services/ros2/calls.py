@@ -1,5 +1,12 @@
-"""Services of ROS 2 as calls of the bus: emergency stop, reset, the board's brake switches."""
+"""Services of ROS 2 as calls of the bus: emergency stop, reset, the board's brake switches.
 
+A reset that the network held back must not clear a stop that its sender cannot have seen. The
+attachment has the sender's clock, and a client that calls once has no fastest delivery to compare
+with, as ``command`` does. So the clocks of robot and client must agree as far as the stop is old. A
+brake switch that was held back must not undo a later one: its clocks must agree within a second.
+"""
+
+import math
 import time
 from collections.abc import Callable
 
@@ -8,7 +15,6 @@ from common import messages as m
 from common.client import reset_request
 from common.freshness import NS_PER_S
 from common.service import Node
-from services.ros2.call_age import reset_refusal, switch_refusal
 from services.ros2.cdr import Attachment, Value
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Answer, Endpoints, Serve
@@ -16,6 +22,8 @@ from services.ros2.endpoints import Answer, Endpoints, Serve
 CONFIRM_NS, REPEAT_S = 3 * NS_PER_S, 0.05
 FRESH_NS = NS_PER_S // 2  # age of safety's state; older, and safety counts as silent
 STOPS_MAX = 32  # calls that wait
+TOLERANCE_S = 0.2  # of the two clocks, and of the age of safety's state
+SWITCH_S = 1.0  # age of a call of a switch
 TRIGGER, SET_BOOL = "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
 SWITCHES = ("ultrasonic_brake", "bumper_brake")
 
@@ -97,3 +105,36 @@ class Calls:
             )
 
         return handle
+
+
+def reset_refusal(state: SafetyState, sent_ns: int, now_ns: int) -> str:
+    """Return why a reset must not clear what this state has latched; empty when it may.
+
+    ``sent_ns`` and ``now_ns`` are the wall clocks of the sender and of the robot.
+    """
+    age_s = (now_ns - sent_ns) / NS_PER_S
+    latched_s = min(
+        (cause.age for cause in state.causes if cause.name in state.latched), default=math.inf
+    )
+    if age_s < -TOLERANCE_S:
+        return _ahead(age_s)
+    if max(age_s, 0.0) + TOLERANCE_S <= latched_s:
+        return ""
+    return (
+        f"The reset was sent {age_s:.1f} s ago by its sender's clock, and the last stop was "
+        f"{latched_s:.1f} s ago. Reset again; if that fails, synchronize the clocks."
+    )
+
+
+def switch_refusal(sent_ns: int, now_ns: int) -> str:
+    """Return why a brake switch must not follow a call; empty when it may."""
+    age_s = (now_ns - sent_ns) / NS_PER_S
+    if age_s < -TOLERANCE_S:
+        return _ahead(age_s)
+    if age_s <= SWITCH_S:
+        return ""
+    return f"The call was sent {age_s:.1f} s ago by its sender's clock. Synchronize the clocks."
+
+
+def _ahead(age_s: float) -> str:
+    return f"The sender's clock is {-age_s:.1f} s ahead of the robot's. Synchronize the clocks."

@@ -4,7 +4,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.messages import Cause, SafetyState
-from services.ros2.call_age import TOLERANCE_S, reset_refusal, switch_refusal
+from services.ros2.calls import TOLERANCE_S, reset_refusal, switch_refusal
 from tests.factories import safety_state
 
 NOW_NS = 1_700_000_000 * NS_PER_S
