@@ -1,6 +1,5 @@
 """``t2 health``: all services by their messages, one service by its answer."""
 
-import threading
 from functools import partial
 
 import msgspec
@@ -8,7 +7,6 @@ import pytest
 
 from cli.inspect import health as command
 from common import keys
-from common.bus.bus import Bus
 from common.messages import Durations, Health
 from tests.cli.inspect.tool import Tool, health, pretend
 from tests.common.bus_fixture import BusFixture
@@ -38,70 +36,25 @@ def test_health(buses: BusFixture, tool: Tool) -> None:
     assert "it hangs" in result.err
 
 
-@pytest.fixture
-def answers() -> dict[str, bytes]:
-    """Safety's answers to a query for its last messages, by robot."""
-    return {}
-
-
-@pytest.fixture
-def safety(buses: BusFixture, answers: dict[str, bytes]) -> Bus:
-    last = {keys.HEALTH.on(buses.robot, service="safety"): health("safety"), "another": None}
-    answers[buses.robot] = msgspec.json.encode(last)
-
-    def answer(bus: Bus) -> None:
-        key = keys.info_key(buses.robot, "safety", "last")
-        bus.answer(key, lambda: answers[buses.robot], "application/json")
-
-    return pretend(buses, "safety", {}, answer)
-
-
-def test_query_of_one_service(safety: Bus, tool: Tool) -> None:
+def test_one_service(buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend(buses, "safety", {keys.HEALTH: partial(health, "safety")}, service="safety")
+    pretend(buses, "bridge", {keys.HEALTH: partial(health, "safety")}, service="bridge")
+    pretend(buses, "odom", {})
     result = tool("health", "safety")
     assert (result.code, result.err) == (0, "")
     (line,) = result.lines
-    assert (line["service"], line["alive"], line["told"], line["rss"]) == (
-        "safety", True, True, 5_000_000,
-    )  # fmt: skip
-    shown = tool("health", "safety", text=True).out.splitlines()[1]
-    assert shown.split()[1:4] == ["safety", "ok", "1"]
+    found = (line["service"], line["alive"], line["told"], line["rss"])
+    assert found == ("safety", True, True, 5_000_000)
+    monkeypatch.setattr(command, "LISTEN_S", 0.3)
     assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [tool.robot]
-
-
-@pytest.mark.parametrize(
-    ("payload", "problem"),
-    [
-        (b"{}", ""),  # in its first second
-        (b"\xff", "answers with an invalid health message"),
-        (b'{"KEY": {"service": 1}}', "answers with an invalid health message"),
-    ],
-)
-def test_an_answer_without_health(
-    payload: bytes, problem: str, safety: Bus, tool: Tool, answers: dict[str, bytes]
-) -> None:
-    key = keys.HEALTH.on(tool.robot, service="safety")
-    answers[tool.robot] = payload.replace(b"KEY", key.encode())
-    result = tool("health", "safety")
-    assert (result.code, result.lines[0]["alive"]) == (bool(problem), not problem)
-    assert not result.lines[0]["told"]
-    assert problem in result.err
-
-
-def test_an_absent_service_and_one_with_a_blocked_loop(
-    buses: BusFixture, safety: Bus, tool: Tool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(command, "ANSWER_S", 0.3)
-    end = threading.Event()
-
-    def hang() -> None:
-        end.wait(20.0)
-
-    buses.loop.post(hang)
-    for name in ("odom", "safety"):
+    for name, problem in (
+        ("odom", "is present and publishes no health: it hangs"),
+        ("bridge", "is present and publishes no health: it hangs"),  # another service's messages
+        ("recorder", "is not running"),
+    ):
         result = tool("health", name)
-        assert (result.code, result.lines[0]["alive"]) == (1, False)
-        assert f"{name} of robot {tool.robot} does not answer" in result.err
-    end.set()
+        assert (result.code, result.lines[0]["told"]) == (1, False)
+        assert f"{name} of robot {tool.robot} {problem}" in result.err
 
 
 def test_health_of_the_router(tool: Tool) -> None:
