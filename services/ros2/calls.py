@@ -107,7 +107,7 @@ class Calls:
         return handle
 
 
-def reset_refusal(state: SafetyState, sent_ns: int, now_ns: int) -> str:
+def reset_refusal(state: m.SafetyState, sent_ns: int, now_ns: int) -> str:
     """Return why a reset must not clear what this state has latched; empty when it may.
 
     ``sent_ns`` and ``now_ns`` are the wall clocks of the sender and of the robot.
