@@ -14,7 +14,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from cli.inspect.addressing import chunks
-from cli.inspect.session import decoded
+from cli.inspect.session import decoded, services
 from common import clock, codec, keys
 from common.bus.bus import no_answer, not_allowed
 from common.bus.probe import Answer, Probe
@@ -141,6 +141,6 @@ class SafetyClient:
 
         The router announces no queryable to a certificate that may not call it.
         """
-        runs = self.probe.alive(keys.live_key(self.robot, call.server, "*"))
+        runs = services(self.probe, self.robot, call.server)
         barred = runs and not self.probe.has_server(key)
         return not_allowed(call.server) if barred else no_answer(call.server)

@@ -18,7 +18,7 @@ from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
 from cli.inspect.diagnosis import NEEDED, Finding, Observation, diagnose
 from cli.inspect.payload import read
-from cli.inspect.session import add_duration, add_options, settings, until_interrupt
+from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
 from common import keys
 from common.bus.probe import Probe, probe
 from common.bus.publisher import host_id
@@ -147,8 +147,7 @@ def observe(opened: Probe, robot: str, seconds: float) -> Observation:
             version_text = str(record.get("version", ""))
             seen.routers.append(version_text.removeprefix("v").partition("-")[0])
     listen(opened, robot, seconds, seen)
-    present = [chunks(token) for token in opened.alive(keys.live_key("*", "*", "*"))]
-    running = [(name, path.split("/")[1]) for name, path in present]
+    running = services(opened, "*")
     seen.instances = Counter(service for name, service in running if name == robot)
     on_board = {name for name, service in running if service in NEEDED}
     seen.others = sorted(on_board - {robot})

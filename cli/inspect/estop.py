@@ -17,9 +17,8 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from cli.inspect import output
-from cli.inspect.addressing import chunks
 from cli.inspect.client import SafetyClient
-from cli.inspect.session import add_options, open_session, until_interrupt
+from cli.inspect.session import add_options, open_session, services, until_interrupt
 from common import keys
 from common.bus.probe import Probe
 from common.cli_args import source_words
@@ -84,8 +83,7 @@ def expected_robots(probe: Probe, robot: str) -> set[str]:
     """Return the robots that must confirm: the named one, or all present ones."""
     if "*" not in robot:
         return {robot}
-    tokens = map(chunks, probe.alive(keys.live_key(robot, "*", "*")))
-    return {name for name, path in tokens if path.split("/")[1] in MOVES}
+    return {name for name, service in services(probe, robot) if service in MOVES}
 
 
 def report(confirmed: set[str], missing: Sequence[str], settings: Sequence[str]) -> None:
@@ -113,13 +111,13 @@ def report(confirmed: set[str], missing: Sequence[str], settings: Sequence[str])
 
 def other_robots(probe: Probe, robot: str) -> list[str]:
     """Return the robots at the router if the named one is not among them; otherwise nothing."""
-    present = {chunks(token)[0] for token in probe.alive(keys.live_key("*", "*", "*"))}
+    present = {name for name, _ in services(probe, "*")}
     return [] if robot in present else sorted(present)
 
 
 def is_barred(probe: Probe, robot: str) -> bool:
     """Return whether the router drops the commands of this certificate, as it seems."""
-    serves = probe.alive(keys.live_key(robot, "safety", "*"))
+    serves = services(probe, robot, "safety")
     # Each role that may stop may also do one of these, except fleet.
     topics = (keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE)
     commands = (topic.on(robot, source="*") for topic in topics)

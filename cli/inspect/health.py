@@ -13,7 +13,7 @@ import msgspec
 from cli.inspect import output
 from cli.inspect.addressing import chunks, decode
 from cli.inspect.diagnosis import LATE_S, NEEDED
-from cli.inspect.session import BusSession, add_options, open_session
+from cli.inspect.session import BusSession, add_options, open_session, services
 from common import keys
 from common.errors import MessageError
 from common.messages import Health, SafetyState
@@ -82,8 +82,7 @@ def listen(session: BusSession, service: str | None) -> list[Row]:
             output.warn(f"t2 health: {sample.key}: {error}")
         if (session.robot, service) in newest:
             break
-    tokens = map(chunks, session.probe.alive(keys.live_key(session.robot, service or "*", "*")))
-    alive = {(robot, path.split("/")[1]) for robot, path in tokens}
+    alive = {*services(session.probe, session.robot, service or "*")}
     robots = {robot for robot, _ in newest.keys() | alive} or {session.robot}
     needed = {(robot, name) for robot in robots for name in ([service] if service else NEEDED)}
     return [

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from cli.inspect.addressing import EVERY_ROBOT, parse_site
-from common import codec
+from cli.inspect.addressing import EVERY_ROBOT, chunks, parse_site
+from common import codec, keys
 from common.bus.probe import Answer, Probe, probe
 from common.cli_args import add_sources, sources
 from common.codec import Sample
@@ -102,6 +102,12 @@ def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
     several = options.robot and "*" in options.robot
     with probe(config.bus) as opened:
         yield BusSession(opened, options.robot if several else config.robot.id)
+
+
+def services(opened: Probe, robot: str, service: str = "*") -> list[tuple[str, str]]:
+    """Return robot and service of each liveliness token."""
+    tokens = map(chunks, opened.alive(keys.live_key(robot, service, "*")))
+    return [(name, path.split("/")[1]) for name, path in tokens]
 
 
 def decoded(received: Iterable[Sample | Answer], kind: type[codec.S]) -> Iterator[codec.S]:

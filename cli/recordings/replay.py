@@ -16,7 +16,14 @@ from pathlib import Path
 from typing import Self
 
 from cli.inspect.addressing import chunks, topic_of
-from cli.inspect.session import BusSession, add_options, open_session, positive, until_interrupt
+from cli.inspect.session import (
+    BusSession,
+    add_options,
+    open_session,
+    positive,
+    services,
+    until_interrupt,
+)
 from cli.recordings.info import open_recording
 from common import keys
 from common.bus.probe import intersects, valid
@@ -94,8 +101,7 @@ class BusTarget:
 
     def check(self) -> set[str]:
         """Return the running services; raise ``RobotError`` if bridge or safety is among them."""
-        tokens = self._probe.alive(keys.live_key(self._robot, "*", "*"))
-        alive = {token.split("/")[-2] for token in tokens}
+        alive = {service for _, service in services(self._probe, self._robot)}
         if running := " and ".join(name for name in DECIDING if name in alive):
             raise RobotError(
                 f"robot {self._robot} has a running {running}: others would take replayed messages "
