@@ -30,7 +30,8 @@ GROUPS = {
     },
     "Inspect": {
         "doctor": ("cli.inspect.doctor", "diagnose the path from this laptop to the wheels"),
-        "health": ("cli.inspect.health", "service health, and what each robot does"),
+        "robots": ("cli.inspect.robots", "the robots on the bus: verdict, speed, driver"),
+        "health": ("cli.inspect.health", "service health"),
         "ls": ("cli.inspect.ls", "active keys with type, rate and publishers; the services"),
         "echo": ("cli.inspect.echo", "print messages received on a key"),
         "hz": ("cli.inspect.hz", "rate, gaps, losses, bandwidth and delay of keys"),

@@ -104,8 +104,7 @@ def report(confirmed: set[str], missing: Sequence[str], settings: Sequence[str])
         output.warn(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}")
     if not robots:
         output.warn(
-            f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. "
-            "`t2 health --all` lists ids"
+            f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. `t2 robots` lists ids"
         )
 
 

@@ -1,7 +1,7 @@
-"""``t2 health``: service health, from the health messages at 1 Hz, and the state of each robot.
+"""``t2 health``: service health, from the health messages at 1 Hz.
 
-``t2 health safety`` queries one service, which answers in its own loop. The command ends with the
-answer, so a container's health check can run it often.
+``t2 health safety`` ends with the next message of one service, so a container's health check can run
+it often.
 """
 
 import argparse
@@ -16,8 +16,7 @@ from cli.inspect.diagnosis import LATE_S, NEEDED
 from cli.inspect.session import BusSession, add_options, open_session, services
 from common import keys
 from common.errors import MessageError
-from common.messages import Health, SafetyState
-from common.text import printable
+from common.messages import Health
 
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
 LISTEN_S = 2.5  # two periods of the health messages, and a margin
@@ -29,13 +28,12 @@ REASONS = {
 
 
 class Row(NamedTuple):
-    """One service with its state and last messages."""
+    """One service with its state and last health message."""
 
     robot: str
     name: str
     state: str  # ok, or a key of REASONS
     health: Health | None
-    safety: SafetyState | None = None  # of the service safety
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,17 +65,11 @@ def run(options: argparse.Namespace) -> int:
 def listen(session: BusSession, service: str | None) -> list[Row]:
     """Listen to one or all services, and list those without a health message from their tokens."""
     newest: dict[tuple[str, str], Health] = {}
-    states: dict[tuple[str, str], SafetyState] = {}
     session.probe.listen(keys.HEALTH.on(session.robot, service=service or "*"))
-    if not service:
-        session.probe.listen(keys.SAFETY.on(session.robot))
     for sample in session.probe.samples(LISTEN_S):
-        robot, path = chunks(sample.key)
         try:
-            if path == keys.SAFETY.path:
-                states[robot, "safety"] = decode(sample, SafetyState)
-            else:
-                newest[robot, path.split("/")[1]] = decode(sample, Health)
+            health = decode(sample, Health)
+            newest[chunks(sample.key)[0], health.service] = health
         except MessageError as error:
             output.warn(f"t2 health: {sample.key}: {error}")
         if (session.robot, service) in newest:
@@ -87,7 +79,7 @@ def listen(session: BusSession, service: str | None) -> list[Row]:
     needed = {(robot, name) for robot in robots for name in ([service] if service else NEEDED)}
     return [
         Row(*each, "ok" if each in newest else "hangs" if each in alive else "missing",
-            newest.get(each), states.get(each))
+            newest.get(each))
         for each in sorted(newest.keys() | alive | needed)
     ]  # fmt: skip
 
@@ -96,9 +88,6 @@ def as_json(row: Row) -> dict[str, Any]:
     """Return one service as a JSON object."""
     fields = msgspec.to_builtins(row.health) if row.health else {}
     alive, has_health = row.state in ("ok", "hangs"), row.health is not None
-    if row.safety:
-        names = ("verdict", "latched", "source", "text")
-        fields |= {name: getattr(row.safety, name) for name in names}
     return {"robot": row.robot, "service": row.name, "alive": alive, "told": has_health} | fields
 
 
@@ -123,7 +112,7 @@ def as_cells(row: Row) -> list[str]:
 
 
 def notes(rows: list[Row]) -> Iterator[str]:
-    """Yield each reaction that was measured since a service's start, and each robot's state."""
+    """Yield each reaction that was measured since a service's start."""
     for row in rows:
         for name, each in row.health.reactions.items() if row.health else ():
             if any(each.counts):
@@ -131,10 +120,6 @@ def notes(rows: list[Row]) -> Iterator[str]:
                     f"{row.name} of robot {row.robot}: {name} measured {sum(each.counts)} times, "
                     f"worst {1e3 * each.worst:.2f} ms"
                 )
-    for row in rows:
-        if state := row.safety:
-            source = f" by {state.source}" if state.source else ""
-            yield printable(f"robot {row.robot}: {state.verdict.upper()}{source}. {state.text}")
 
 
 def duration(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""Emergency stop and state of one robot, a site or all."""
+"""Emergency stop of one robot, a site or all, and the list of robots."""
 
 import contextlib
 import threading
@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from cli.inspect import estop
+from cli.inspect import estop, robots
 from cli.inspect.client import SafetyClient
 from common import client as machine
 from common import keys
 from common.bus.bus import Bus
 from common.cli_args import EXIT_LINK
-from common.messages import Limits, SafetyState
+from common.messages import Limits, SafetyState, Velocity
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import router_process
@@ -153,18 +153,42 @@ def test_invalid_arguments(words: tuple[str, ...], phrase: str, t2: Tool) -> Non
     assert phrase in result.err
 
 
-# --- the state of each robot ------------------------------------------------------------------
+# --- robots -----------------------------------------------------------------------------------
 
 
-def test_health_shows_what_each_robot_does(join: Join, t2: Tool) -> None:
-    Robot(join("berlin-001"))
+def test_list_of_robots(join: Join, t2: Tool) -> None:
+    one = join("berlin-001")
+    Robot(one)
+    pretend(one, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
     Robot(join("munich-001"))
-    result = t2("health", "--all", text=True)
-    assert result.code == 1  # their bridges are missing
-    assert result.out.splitlines()[-2:] == [
-        "robot berlin-001: RUN by web. Drives.",
-        "robot munich-001: RUN by web. Drives.",
-    ]
-    lines = {line["service"]: line for line in t2("health", "--site", "munich").lines}
-    assert (lines["safety"]["robot"], lines["safety"]["verdict"]) == ("munich-001", "run")
-    assert lines["bridge"]["alive"] is False
+    result = t2("robots")
+    assert (result.code, result.err) == (0, "")
+    first, second = result.lines
+    assert first == {
+        "robot": "berlin-001", "services": ["bridge", "safety"], "verdict": "run", "latched": [],
+        "source": "web", "linear": 0.5, "text": "Drives.",
+    }  # fmt: skip
+    assert (second["robot"], second["linear"]) == ("munich-001", None)
+    assert [line["robot"] for line in t2("robots", "--site", "munich").lines] == ["munich-001"]
+    assert [line["robot"] for line in t2("robots", robot="berlin-001").lines] == ["berlin-001"]
+    rows = [line.split() for line in t2("robots", text=True).out.splitlines()]
+    assert rows[0] == ["robot", "services", "verdict", "m/s", "driver"]
+    assert rows[1] == ["berlin-001", "bridge", "safety", "run", "0.50", "web", "Drives."]
+
+
+def test_silent_robots_are_listed(join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robots, "LISTEN_S", 0.3)
+    pretend(join("a"), "safety", {})
+    pretend(join("b"), "bridge", {})
+    pretend(join("c"), "dashboard", {})
+    result = t2("robots")
+    assert result.code == 1
+    assert {line["robot"]: line["verdict"] for line in result.lines} == {
+        "a": "silent", "b": "no safety", "c": "-",
+    }  # fmt: skip
+
+
+def test_no_robots(t2: Tool) -> None:
+    result = t2("robots", "--site", "nowhere")
+    assert (result.code, result.out) == (1, "")
+    assert "no robot found" in result.err
