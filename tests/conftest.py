@@ -41,6 +41,14 @@ def _own_runtime() -> Iterator[None]:
         os.environ.pop(RUNTIME_ENV, None)
 
 
+@pytest.fixture(scope="session")
+def shared_router() -> Iterator[str]:
+    """Run one real router for all tests that leave it as it is, and name its endpoint."""
+    where = f"tcp/127.0.0.1:{free_port()}"
+    with router_process(where):
+        yield where
+
+
 @pytest.fixture
 def endpoint() -> Iterator[str]:
     """Run a real router on an ephemeral port for one test, and name its endpoint."""

@@ -1,4 +1,4 @@
-"""A real bridge between a test board and a test bus; one router for all of a file."""
+"""A real bridge between a test board and a test bus; on the shared router."""
 
 import subprocess
 import sys
@@ -17,9 +17,8 @@ from common.loop import Loop
 from common.motion import Command
 from common.wire.commands import MotionKind
 from tests.factories import safety_state
-from verification.harness.bus import bus_on, router_process, running, set_options
+from verification.harness.bus import bus_on, running, set_options
 from verification.harness.fake_board import Board, board
-from verification.harness.ports import free_port
 
 
 @dataclass
@@ -87,24 +86,16 @@ def bridge_command(made: Board, endpoint: str) -> list[str]:
     return [sys.executable, "-m", "services.bridge", *settings]
 
 
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    """Share one router among these tests: each has a bridge of its own."""
-    where = f"tcp/127.0.0.1:{free_port()}"
-    with router_process(where):
-        yield where
-
-
 @pytest.fixture
-def bridge(endpoint: str) -> Iterator[BridgeFixture]:
+def bridge(shared_router: str) -> Iterator[BridgeFixture]:
     with (
         board() as made,
-        subprocess.Popen(bridge_command(made, endpoint)) as process,
+        subprocess.Popen(bridge_command(made, shared_router)) as process,
         running(Loop()) as loop,
     ):
-        bridge = BridgeFixture(made, endpoint, loop, process)
+        bridge = BridgeFixture(made, shared_router, loop, process)
         try:
-            with bus_on(endpoint, loop, bridge.declare):
+            with bus_on(shared_router, loop, bridge.declare):
                 yield bridge
         finally:
             process.terminate()

@@ -1,4 +1,4 @@
-"""One router for all these tests; each test has a robot of its own on it."""
+"""A robot of its own for each test, on the shared router."""
 
 from collections.abc import Iterator
 
@@ -6,16 +6,7 @@ import pytest
 
 from common import log
 from tests.common.bus_fixture import BusFixture
-from verification.harness.bus import Lines, router_process
-from verification.harness.ports import free_port
-
-
-@pytest.fixture(scope="package")
-def shared_router() -> Iterator[str]:
-    """Run a real router, and name its endpoint."""
-    where = f"tcp/127.0.0.1:{free_port()}"
-    with router_process(where):
-        yield where
+from verification.harness.bus import Lines
 
 
 @pytest.fixture

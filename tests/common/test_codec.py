@@ -1,13 +1,11 @@
 """Messages to bytes and back, and what is refused on the way in."""
 
-import math
-
 import msgpack
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.codec import decode, encode, finite
+from common.codec import decode, encode
 from common.errors import MessageError
 from common.messages import (
     Bumper,
@@ -77,17 +75,3 @@ HOSTILE = {
 def test_hostile_bytes_are_refused(payload: bytes) -> None:
     with pytest.raises(MessageError):
         decode(payload, SafetyState)
-
-
-@pytest.mark.parametrize(
-    ("values", "answer"),
-    [
-        ((), True),
-        ((0.0, -1.5, 3), True),
-        ((0.0, math.nan), False),
-        ((math.inf,), False),
-        ((-math.inf, 0.0), False),
-    ],
-)
-def test_finite(values: tuple[float, ...], answer: bool) -> None:
-    assert finite(*values) is answer

@@ -141,6 +141,7 @@ def test_a_robots_id_is_one_plain_chunk_of_a_key(name: str) -> None:
         ({"listen_ports": (4002, 4002)}, "names a port twice"),
         ({"port": 4001}, "port 4001 of 127.0.0.1 is both the board's and in listen_ports"),
         ({"relay_port": 4003}, "relay_port is 4003, as port: the relay reports from another"),
+        ({"relay_port": 65536}, "relay_port"),
     ],
 )
 def test_a_board_that_cannot_be_reached_is_refused(given: dict[str, object], sentence: str) -> None:

@@ -56,7 +56,7 @@ def test_who_may_only_watch_is_denied(
     assert not source.denied
 
 
-def test_a_subscriber_of_the_same_session_is_no_permission(endpoint: str) -> None:
+def test_a_subscriber_of_the_same_session_is_no_permission(shared_router: str) -> None:
     sources: list[DriveSource] = []
 
     def declare(bus: Bus) -> None:
@@ -66,8 +66,8 @@ def test_a_subscriber_of_the_same_session_is_no_permission(endpoint: str) -> Non
     loop = Loop()
     with (
         running(loop),
-        bus_on(endpoint, loop, lambda _: None) as safety,
-        bus_on(endpoint, loop, declare),
+        bus_on(shared_router, loop, lambda _: None) as safety,
+        bus_on(shared_router, loop, declare),
     ):
         state = safety.publisher(keys.SAFETY)
 

@@ -197,13 +197,13 @@ class World:
         return answers[0]
 
 
-def test_the_process_follows_the_drive_sets_the_pose_and_ends(endpoint: str) -> None:
+def test_the_process_follows_the_drive_sets_the_pose_and_ends(shared_router: str) -> None:
     world, loop = World(), Loop()
-    sets = ["--set", f"bus.connect={endpoint}"]
+    sets = ["--set", f"bus.connect={shared_router}"]
     with (
         subprocess.Popen([sys.executable, "-m", "services.odom", *sets]) as process,
         running(loop),
-        bus_on(endpoint, loop, world.declare),
+        bus_on(shared_router, loop, world.declare),
     ):
         try:
             loop.post(lambda: loop.every(PERIOD_S, world.tick))

@@ -9,37 +9,33 @@ import pytest
 import zenoh
 from msgspec.structs import replace
 
-from common import clock, codec, keys, realtime
+from common import clock, keys, realtime
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink
 from common.bus.session import client_config
 from common.client import reset_request
 from common.config import Sources, load
 from common.loop import Loop
-from common.messages import (
-    Bumper,
-    Drive,
-    Motion,
-    SafetyState,
-    Velocity,
-)
+from common.messages import Bumper, Drive, Motion, SafetyState, Velocity
 from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
 from services.safety.service import SafetyService
 from tests.factories import safety_state
-from verification.harness.bus import at, bus_on, running
+from verification.harness.bus import at, joined, running
 from verification.harness.waiting import wait_until
+
+ROBOT = "berlin-007"
 
 
 def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:
-    sources = Sources(environ={}, sets=[f"bus.connect={endpoint}", *sets])
-    return Node("safety", load(SafetyConfig, sources))
+    here = f"bus.connect={endpoint}", f"robot.id={ROBOT}"
+    return Node("safety", load(SafetyConfig, Sources(environ={}, sets=[*here, *sets])))
 
 
 @contextlib.contextmanager
-def safety_on(endpoint: str, *sets: str) -> Iterator[Node[SafetyConfig]]:
-    node = make_node(endpoint, *sets)
+def safety_on(endpoint: str) -> Iterator[Node[SafetyConfig]]:
+    node = make_node(endpoint)
     reader = node.open_bus()
     SafetyService(node, reader)
     with running(node.loop):
@@ -58,26 +54,40 @@ def safety_on(endpoint: str, *sets: str) -> Iterator[Node[SafetyConfig]]:
 
 
 @dataclass
-class Seen:
+class Safety:
+    """A safety service, a bus that plays the bridge, a client of the router, and what came."""
+
+    node: Node[SafetyConfig]
+    session: zenoh.Session
     motions: list[Motion] = field(default_factory=list)
     states: list[SafetyState] = field(default_factory=list)
-    answers: list[str] = field(default_factory=list)
     drive: DriveLink = field(init=False)
+    bus: Bus = field(init=False)
 
     def watch(self, bus: Bus) -> None:
-        self.drive = DriveLink(bus, listens=True)
-        bus.subscribe(keys.MOTION, self._motion, depth=64)
-        bus.subscribe(keys.SAFETY, self._state, depth=64)
+        self.bus, self.drive = bus, DriveLink(bus, listens=True)
+        bus.subscribe(keys.MOTION, lambda it: self.motions.append(it.message), depth=64)
+        bus.subscribe(keys.SAFETY, lambda it: self.states.append(it.message), depth=64)
 
-    def _motion(self, arrival: Arrival[Motion]) -> None:
-        self.motions.append(arrival.message)
+    @property
+    def brakes(self) -> bool:
+        return bool(self.motions) and self.motions[-1].command == "brake"
 
-    def _state(self, arrival: Arrival[SafetyState]) -> None:
-        self.states.append(arrival.message)
+
+@pytest.fixture
+def safety(shared_router: str) -> Iterator[Safety]:
+    with (
+        running(Loop()) as loop,
+        safety_on(shared_router) as node,
+        zenoh.open(client_config(at(shared_router))) as session,
+    ):
+        made = Safety(node, session)
+        with joined(at(shared_router), ROBOT, loop, made.watch):
+            yield made
 
 
 def repeat_until(do: Callable[[], object], true: Callable[[], object], what: str) -> None:
-    """Do it again and again: samples right after a declaration may be lost."""
+    """Do it repeatedly: samples right after a declaration may be lost."""
 
     def tried() -> object:
         do()
@@ -86,123 +96,79 @@ def repeat_until(do: Callable[[], object], true: Callable[[], object], what: str
     wait_until(tried, what)
 
 
-def test_stop_is_published_from_the_beginning_and_the_heartbeat_rises(endpoint: str) -> None:
-    loop, seen = Loop(), Seen()
-    with running(loop), safety_on(endpoint), bus_on(endpoint, loop, seen.watch):
-        wait_until(lambda: len(seen.motions) > 20 and len(seen.states) > 5, "a stream of both")
-    assert "run" not in {motion.command for motion in seen.motions}
-    beats = [state.heartbeat for state in seen.states]
+def test_it_stops_from_the_beginning_judges_a_hit_and_answers_calls(safety: Safety) -> None:
+    wait_until(lambda: len(safety.motions) > 20 and len(safety.states) > 5, "a stream of both")
+    assert "run" not in {motion.command for motion in safety.motions}
+    beats = [state.heartbeat for state in safety.states]
     assert beats == sorted(set(beats))
-    assert seen.states[0].text  # in words, whatever the reason is
+    bumper, velocity = (safety.drive.publisher(each) for each in (keys.BUMPER, keys.VELOCITY))
+    repeat_until(
+        lambda: (velocity.put(Velocity(linear=0.0, angular=0.0)), bumper.put(Bumper(pressed=True))),
+        lambda: safety.brakes,
+        "the brake",
+    )
+    assert safety.motions[-1].judged_boot == safety.bus.boot
+    wait_until(lambda: safety.states[-1].release, "a latched contact")
+    answers: list[str] = []
+    request = reset_request(safety.states[-1])
+    safety.bus.call(keys.RESET, request, lambda done: answers.append(done.text), answers.append)
+    wait_until(lambda: answers, "an answer")
+    assert "Still present" in answers[0]
+    wait_until(safety.node.is_stopped, "rest")
+    wait_until(lambda: "leaving" in {c.name for c in safety.states[-1].causes}, "leaving")
 
 
-def test_a_hit_brakes_and_is_judged_and_calls_are_answered(endpoint: str) -> None:
-    loop, seen = Loop(), Seen()
-    with (
-        running(loop),
-        safety_on(endpoint) as node,
-        bus_on(endpoint, loop, seen.watch) as bus,
-    ):
-        bumper, velocity = (seen.drive.publisher(each) for each in (keys.BUMPER, keys.VELOCITY))
-        repeat_until(
-            lambda: (
-                velocity.put(Velocity(linear=0.0, angular=0.0)),
-                bumper.put(Bumper(pressed=True)),
-            ),
-            lambda: seen.motions and seen.motions[-1].command == "brake",
-            "the brake",
-        )
-        assert seen.motions[-1].judged_boot == bus.boot
-        wait_until(lambda: seen.states and seen.states[-1].release, "a latched contact")
-        bus.call(
-            keys.RESET,
-            reset_request(seen.states[-1]),
-            lambda done: seen.answers.append(done.text),
-            seen.answers.append,
-        )
-        wait_until(lambda: seen.answers, "an answer")
-        assert "Still present" in seen.answers[0]
-        wait_until(node.is_stopped, "rest")
-        wait_until(
-            lambda: any(c.name == "leaving" for state in seen.states[-1:] for c in state.causes),
-            "leaving",
-        )
+def test_refused_requests_are_counted_by_their_reason(safety: Safety) -> None:
+    drive, other = (safety.bus.publisher(keys.DRIVE, source=name) for name in ("demo", "nobody"))
+    key = keys.DRIVE.on(ROBOT, source="demo")
+    wanted = {"refused_late", "refused_unknown_source", "refused_not_a_request"}
+    repeat_until(
+        lambda: (
+            drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+            other.put(Drive(linear=0.0, angular=0.0, echo=-1)),
+            safety.session.put(key, b"\xc1"),
+            safety.session.delete(key),
+        ),
+        lambda: wanted <= set(safety.node.counters),
+        "every reason",
+    )
 
 
-def test_refused_requests_are_counted_by_their_reason(endpoint: str) -> None:
-    loop, seen = Loop(), Seen()
-    with (
-        running(loop),
-        safety_on(endpoint) as node,
-        bus_on(endpoint, loop, seen.watch) as bus,
-        zenoh.open(client_config(at(endpoint))) as session,
-    ):
-        drive, other = (bus.publisher(keys.DRIVE, source=name) for name in ("demo", "nobody"))
-        key = keys.DRIVE.on("001", source="demo")
-        wanted = {"refused_late", "refused_unknown_source", "refused_not_a_request"}
-        repeat_until(
-            lambda: (
-                drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
-                other.put(Drive(linear=0.0, angular=0.0, echo=-1)),
-                session.put(key, b"\xc1"),
-                session.delete(key),
-            ),
-            lambda: wanted <= set(node.counters),
-            "every reason",
-        )
+@pytest.mark.parametrize("robots", [ROBOT, "berlin-$*", "*"])
+def test_an_estop_by_delete_for_one_a_site_or_all_latches(safety: Safety, robots: str) -> None:
+    repeat_until(
+        lambda: safety.session.delete(keys.estop_key(robots)),
+        lambda: safety.states and "estop" in safety.states[-1].latched,
+        "a latched emergency stop",
+    )
 
 
-def test_an_estop_by_delete_latches(endpoint: str) -> None:
-    loop, seen = Loop(), Seen()
-    with (
-        running(loop),
-        safety_on(endpoint),
-        bus_on(endpoint, loop, seen.watch),
-        zenoh.open(client_config(at(endpoint))) as session,
-    ):
-        repeat_until(
-            lambda: session.delete("t2/v1/001/estop"),
-            lambda: seen.states and "estop" in seen.states[-1].latched,
-            "a latched emergency stop",
-        )
+def test_what_the_bridge_measures_is_not_taken_from_the_router(safety: Safety) -> None:
+    measured = [topic for topic in keys.TOPICS if topic.publisher == "bridge"]
+    repeat_until(
+        lambda: [
+            safety.session.put(topic.on(ROBOT, side=side), b"\xc1")
+            for topic in measured
+            for side in ("left", "right")
+        ],
+        lambda: safety.node.bus.counts[keys.MOTION.on(ROBOT)] > 50,
+        "a second",
+    )
+    assert safety.node.bus.counters["undecodable"] == 0
+    bumper = safety.drive.publisher(keys.BUMPER)
+    repeat_until(
+        lambda: bumper.put(Bumper(pressed=True)),
+        lambda: safety.brakes,
+        "what comes by the drive link",
+    )
 
 
-def test_only_its_own_state_shows_that_an_emergency_stop_would_arrive(endpoint: str) -> None:
-    node = make_node(endpoint)
-    with contextlib.closing(node.loop):
-        service = SafetyService(node, node.open_bus())
-        for boot, counts in ((node.bus.boot + 1, False), (node.bus.boot, True)):
-            state = replace(safety_state(), boot=boot)
-            service._on_estop_path(Arrival(state, "", 1, None))
-            assert (service._inputs.estop_path is not None) is counts
+# --- without a bus ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("who", ["berlin-$*", "*"])
-def test_an_estop_for_one_a_site_or_all_latches(endpoint: str, who: str) -> None:
-    latched: list[tuple[str, ...]] = []
-    with (
-        safety_on(endpoint, "robot.id=berlin-007"),
-        zenoh.open(client_config(at(endpoint))) as session,
-    ):
-        states = session.declare_subscriber(
-            keys.SAFETY.on("berlin-007"),
-            lambda sample: latched.append(
-                codec.decode(sample.payload.to_bytes(), SafetyState).latched
-            ),
-        )
-        repeat_until(
-            lambda: session.put(keys.estop_key(who), b""),
-            lambda: latched and "estop" in latched[-1],
-            "a latched emergency stop",
-        )
-        states.undeclare()
-
-
-def test_the_emergency_stop_has_a_session_of_its_own(
-    endpoint: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_emergency_stop_has_a_session_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     def run(
-        name: str,
+        _: str,
         root: object,
         build: Callable[[Node[SafetyConfig]], None],
         argv: object,
@@ -210,7 +176,8 @@ def test_the_emergency_stop_has_a_session_of_its_own(
         priority: int,
     ) -> int:
         assert priority == realtime.SAFETY
-        node = make_node(endpoint, "safety.margin=0.0", 'safety.unsafe_overrides=["margin"]')
+        unsafe = "safety.margin=0.0", 'safety.unsafe_overrides=["margin"]'
+        node = make_node("tcp/127.0.0.1:1", *unsafe)
         build(node)
         assert [len(bus.sessions) for bus in node.buses] == [2, 1]  # one is the drive link
         node.loop.close()
@@ -220,47 +187,32 @@ def test_the_emergency_stop_has_a_session_of_its_own(
     assert program.main([]) == 5
 
 
-def test_what_the_bridge_measures_is_not_taken_from_the_router(endpoint: str) -> None:
-    loop, seen = Loop(), Seen()
-    with (
-        running(loop),
-        safety_on(endpoint) as node,
-        bus_on(endpoint, loop, seen.watch),
-        zenoh.open(client_config(at(endpoint))) as session,
-    ):
-        measured = [topic for topic in keys.TOPICS if topic.publisher == "bridge"]
-        repeat_until(
-            lambda: [
-                session.put(topic.on("001", side=side), b"\xc1")
-                for topic in measured
-                for side in ("left", "right")
-            ],
-            lambda: node.bus.counts[keys.MOTION.on("001")] > 50,
-            "a second",
-        )
-        assert node.bus.counters["undecodable"] == 0
-        bumper = seen.drive.publisher(keys.BUMPER)
-        repeat_until(
-            lambda: bumper.put(Bumper(pressed=True)),
-            lambda: seen.motions and seen.motions[-1].command == "brake",
-            "what comes by the drive link",
-        )
+@pytest.fixture
+def service() -> Iterator[SafetyService]:
+    node = make_node("tcp/127.0.0.1:1")
+    with contextlib.closing(node.loop):
+        yield SafetyService(node, node.open_bus())
+
+
+def test_only_its_own_state_shows_that_an_emergency_stop_would_arrive(
+    service: SafetyService,
+) -> None:
+    own = service._node.bus.boot
+    for boot, counts in ((own + 1, False), (own, True)):
+        service._on_estop_path(Arrival(replace(safety_state(), boot=boot), "", 1, None))
+        assert (service._inputs.estop_path is not None) is counts
 
 
 def test_bumper_samples_without_news_are_decided_on_in_time_and_not_one_by_one(
-    endpoint: str,
+    service: SafetyService,
 ) -> None:
-    node = make_node(endpoint)
-    with contextlib.closing(node.loop):
-        service = SafetyService(node, node.open_bus())
+    def decisions(seq: int, *, pressed: bool = False, lost: int = 0) -> int:
+        before = service._state.decision
+        bumper = Bumper(pressed=pressed, lost=lost, seq=seq, boot=5)
+        service._on_bumper(Arrival(bumper, "", clock.now_ns(), None))
+        assert "bumper" not in service._state.latches  # no sample seems lost
+        return service._state.decision - before
 
-        def decisions(seq: int, *, pressed: bool = False, lost: int = 0) -> int:
-            before = service._state.decision
-            bumper = Bumper(pressed=pressed, lost=lost, seq=seq, boot=5)
-            service._on_bumper(Arrival(bumper, "", clock.now_ns(), None))
-            assert "bumper" not in service._state.latches  # no sample seems lost
-            return service._state.decision - before
-
-        assert [decisions(seq) for seq in range(1, 9)] == [1, 0, 0, 1, 0, 0, 1, 0]
-        assert [decisions(9, pressed=True), decisions(10, pressed=True)] == [1, 1]
-        assert [decisions(11), decisions(12), decisions(13, lost=1)] == [1, 0, 1]
+    assert [decisions(seq) for seq in range(1, 9)] == [1, 0, 0, 1, 0, 0, 1, 0]
+    assert [decisions(9, pressed=True), decisions(10, pressed=True)] == [1, 1]
+    assert [decisions(11), decisions(12), decisions(13, lost=1)] == [1, 0, 1]

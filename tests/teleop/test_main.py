@@ -14,8 +14,7 @@ from common.loop import Loop
 from common.messages import Drive, Event, Health
 from services.teleop import __main__ as teleop
 from tests.teleop.terminal import STRICT, TELEOP, Terminal, terminal
-from verification.harness.bus import bus_on, router_process, running
-from verification.harness.ports import free_port
+from verification.harness.bus import bus_on, running
 from verification.harness.waiting import wait_until
 
 REPEAT_S = 0.033
@@ -58,18 +57,10 @@ class Listener:
         return max((at - since_ns for at, linear in self.asked if linear), default=0) / NS_PER_S
 
 
-@pytest.fixture(scope="module")
-def endpoint() -> Iterator[str]:
-    """Share one router among these tests."""
-    where = f"tcp/127.0.0.1:{free_port()}"
-    with router_process(where):
-        yield where
-
-
 @pytest.fixture
-def listener(endpoint: str) -> Iterator[Listener]:
+def listener(shared_router: str) -> Iterator[Listener]:
     listener = Listener()
-    with running(Loop()) as loop, bus_on(endpoint, loop, listener.declare):
+    with running(Loop()) as loop, bus_on(shared_router, loop, listener.declare):
         yield listener
 
 
@@ -116,9 +107,9 @@ def drive_off(it: Terminal, listener: Listener) -> None:
     ],
 )
 def test_a_release_and_every_end_send_zeros_and_then_nothing(
-    endpoint: str, listener: Listener, end: Callable[[Terminal], None], code: int
+    shared_router: str, listener: Listener, end: Callable[[Terminal], None], code: int
 ) -> None:
-    with terminal(endpoint, *TELEOP, delay_s=0.05) as it:
+    with terminal(shared_router, *TELEOP, delay_s=0.05) as it:
         drive_off(it, listener)
         released_ns = hold(it, 0.5)
         wait_until(lambda: listener.zeros >= 3, "zeros")
@@ -137,9 +128,9 @@ def test_a_release_and_every_end_send_zeros_and_then_nothing(
 
 
 def test_a_far_terminal_does_not_drive_and_its_estop_counts(
-    endpoint: str, listener: Listener
+    shared_router: str, listener: Listener
 ) -> None:
-    with terminal(endpoint, *STRICT, delay_s=FAR_S) as it:
+    with terminal(shared_router, *STRICT, delay_s=FAR_S) as it:
         ready(it, listener)
         hold(it, 1.5)
         wait_until(lambda: it.shows(b"KEYS OFF: terminal too slow: 0.4"), "the reason")
@@ -148,8 +139,8 @@ def test_a_far_terminal_does_not_drive_and_its_estop_counts(
         wait_until(lambda: "estop" in listener.events, "the emergency stop")
 
 
-def test_keys_that_a_stall_held_up_do_not_drive(endpoint: str, listener: Listener) -> None:
-    with terminal(endpoint, *STRICT, delay_s=0.02) as it:
+def test_keys_that_a_stall_held_up_do_not_drive(shared_router: str, listener: Listener) -> None:
+    with terminal(shared_router, *STRICT, delay_s=0.02) as it:
         drive_off(it, listener)
         it.stall(1.2)
         released_ns = hold(it, 0.3)

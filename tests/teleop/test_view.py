@@ -5,18 +5,7 @@ import pytest
 from common.log import Logger
 from common.messages import MAX_TEXT
 from common.settings import Log
-from services.teleop.view import LINES, EventLog, Line
-
-
-def test_lines_are_kept_the_newest_last() -> None:
-    event_log = EventLog()
-    for number in range(LINES + 5):
-        event_log.add("safety", "info", str(number), t_ns=number)
-    assert event_log.lines()[-2:] == (
-        Line(LINES + 3, "safety", "info", str(LINES + 3)),
-        Line(LINES + 4, "safety", "info", str(LINES + 4)),
-    )
-    assert len(event_log.lines()) == LINES
+from services.teleop.view import EventLog
 
 
 def test_log_lines_go_to_the_event_log_and_not_to_the_terminal(

@@ -6,13 +6,10 @@ from typing import Any
 import pytest
 
 from common import messages as m
-from common.config import Sources, load
-from common.errors import ConfigError
 from common.freshness import NS_PER_S
 from common.motion import STOP
 from common.wire import reports
 from common.wire.commands import BumperBrakeSet, MotionKind, UltrasonicBrakeSet
-from services.bridge.config import BridgeConfig
 from services.bridge.core.output import Event, Output
 from services.bridge.core.readiness import (
     AGAIN_NS,
@@ -317,15 +314,3 @@ def test_an_invalid_report_is_refused(datagram: bytes) -> None:
 def test_the_relays_own_report_is_valid() -> None:
     (own,) = (datagram for to, _, datagram in Relay(0).tick(0) if to == REPORT)
     assert take(Bench(CONFIGURED), own) == [braking("start")]
-
-
-@pytest.mark.parametrize(
-    ("sets", "text"),
-    [
-        (["board.relay_port=4003"], "relay_port is 4003, as port"),
-        (["board.relay_port=65536"], "relay_port"),
-    ],
-)
-def test_a_setting_that_the_relay_cannot_meet_is_refused(sets: list[str], text: str) -> None:
-    with pytest.raises(ConfigError, match=text):
-        load(BridgeConfig, Sources(environ={}, sets=sets))

@@ -4,9 +4,9 @@ import pytest
 
 from tests.cli.inspect.tool import Tool
 from tests.common.bus_fixture import BusFixture
-from tests.common.conftest import buses, shared_router
+from tests.common.conftest import buses
 
-__all__ = ["buses", "shared_router", "tool"]
+__all__ = ["buses", "tool"]
 
 
 @pytest.fixture

@@ -9,14 +9,14 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from common import keys
-from tests.cli.inspect.conftest import buses, shared_router, tool
+from tests.cli.inspect.conftest import buses, tool
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from tests.recorder import samples
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
 
-__all__ = ["buses", "shared_router", "tool"]
+__all__ = ["buses", "tool"]
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 MESSAGE_DATA = 1

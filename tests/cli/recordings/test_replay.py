@@ -16,7 +16,7 @@ from common.motion import Command
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
-from tests.cli.inspect.conftest import buses, shared_router, tool
+from tests.cli.inspect.conftest import buses, tool
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import sets
 from tests.common.bus_fixture import BusFixture
@@ -25,7 +25,7 @@ from tests.recorder.samples import bare, sample
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
-__all__ = ["buses", "shared_router", "tool"]
+__all__ = ["buses", "tool"]
 
 FAST = ("--rate", "1000")
 
