@@ -4,7 +4,7 @@ Each cell of the table of rights is tried in ``tests/cli/keys/test_rights.py``.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -17,10 +17,7 @@ from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
 from common.errors import RobotError
 from common.loop import Loop
-from common.messages import (
-    Drive,
-    ResetRequest,
-)
+from common.messages import Drive, ResetRequest
 from common.settings import BusSettings as Where
 from common.source import DriveSource
 from tests.factories import safety_state
@@ -31,12 +28,18 @@ from verification.harness.waiting import wait_until
 CERTIFIED = ("ca", "certificate", "private_key")
 
 
+Join = Callable[[Where, str, Callable[[Bus], object]], Bus]
+
+
 class OnBoard:
     """Subscriptions of safety on one robot."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, join: Join, endpoint: str, robot: str = "001") -> None:
         self.received: list[Arrival[Drive]] = []
         self.estops: list[int] = []
+        join(at(endpoint), robot, self.declare)
+
+    def declare(self, bus: Bus) -> None:
         bus.subscribe(keys.DRIVE, self.received.append, source="*")
         for source in ("teleop", "web", "nav"):  # as safety does for each in its settings
             bus.on_any(keys.DRIVE.on(bus.robot, source=source), lambda _: None)
@@ -49,70 +52,55 @@ class OnBoard:
 class Member:
     """A member's own program."""
 
-    def __init__(self, bus: Bus, source: str) -> None:
-        self.bus = bus
-        self.source = DriveSource(bus, source)
+    def __init__(self, join: Join, where: Where, robot: str = "001") -> None:
+        self.bus = join(where, robot, self.declare)
+
+    def declare(self, bus: Bus) -> None:
+        self.source = DriveSource(bus, "teleop")
+
+    def drives(self, robot: OnBoard) -> bool:
+        """Return whether its request reaches safety; repeat until it does or is barred."""
+
+        def came() -> bool:
+            return any(arrival.message.boot == self.bus.boot for arrival in robot.received)
+
+        def settled() -> bool:
+            robot.state.put(safety_state(heartbeat=1))
+            self.source.request(0.1, 0.0)
+            return came() or self.source.denied
+
+        wait_until(settled, "a request, or the refusal of one")
+        return came()
+
+
+def made(folder: Path) -> Site:
+    site = Site(folder / "keys")
+    for robot in ("001", "002"):
+        site.member("robot", robot, "--address", "127.0.0.1")
+    site.member("site", "berlin", "--address", "127.0.0.1")
+    site.member("driver", "anna", "--robot", "001")
+    site.member("viewer", "hall")
+    site.member("fleet", "room")
+    return site
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Site:
-    made = Site(tmp_path_factory.mktemp("site") / "keys")
-    for robot in ("001", "002"):
-        made.member("robot", robot, "--address", "127.0.0.1")
-    made.member("site", "berlin", "--address", "127.0.0.1")
-    made.member("driver", "anna", "--robot", "001")
-    made.member("viewer", "hall")
-    made.member("fleet", "room")
-    return made
+    return made(tmp_path_factory.mktemp("site"))
 
 
 @pytest.fixture
-def loop() -> Iterator[Loop]:
-    with running(Loop()) as it:
-        yield it
-
-
-@pytest.fixture
-def join(loop: Loop) -> Iterator[Callable[..., Bus]]:
+def join() -> Iterator[Join]:
     """Return a function that joins the bus with a program's declarations."""
-    with ExitStack() as closing:
+    with running(Loop()) as loop, ExitStack() as closing:
         yield lambda where, robot, declare: closing.enter_context(
             joined(where, robot, loop, declare)
         )
 
 
-def on_board(join: Callable[..., Bus], endpoint: str, robot: str = "001") -> OnBoard:
-    made: list[OnBoard] = []
-    join(at(endpoint), robot, lambda bus: made.append(OnBoard(bus)))
-    return made[0]
-
-
-def member(
-    join: Callable[..., Bus], where: Where, robot: str = "001", source: str = "teleop"
-) -> Member:
-    made: list[Member] = []
-    join(where, robot, lambda bus: made.append(Member(bus, source)))
-    return made[0]
-
-
-def drives(it: Member, robot: OnBoard) -> bool:
-    """Return whether a member's request reaches safety; repeat until it does or is barred."""
-
-    def came() -> bool:
-        return any(arrival.message.boot == it.bus.boot for arrival in robot.received)
-
-    def settled() -> bool:
-        robot.state.put(safety_state(heartbeat=1))
-        it.source.request(0.1, 0.0)
-        return came() or it.source.denied
-
-    wait_until(settled, "a request, or the refusal of one")
-    return came()
-
-
 def test_t2_estop_reports_the_reason_before_the_advice(
     site: Site,
-    join: Callable[..., Bus],
+    join: Join,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -125,7 +113,7 @@ def test_t2_estop_reports_the_reason_before_the_advice(
 
     monkeypatch.setattr(machine, "ESTOP_TICKS", 10)
     with site.router(site.settings("robot", "001")) as (secured, onboard):
-        on_board(join, onboard)
+        OnBoard(join, onboard)
         reason, advice = stopped("viewer", "hall")
         assert reason.startswith(
             "t2 estop: not allowed: this certificate has no right to stop robot 001 (as it seems: "
@@ -138,7 +126,7 @@ def test_t2_estop_reports_the_reason_before_the_advice(
         assert stopped("driver", "anna", "009") == [unknown]
 
 
-def test_t2_call_reports_why_no_service_answers(site: Site, join: Callable[..., Bus]) -> None:
+def test_t2_call_reports_why_no_service_answers(site: Site, join: Join) -> None:
     def reason(role: str, name: str, robot: str = "001") -> str:
         with (
             probe(connecting(site.settings(role, name), secured)) as session,
@@ -148,25 +136,23 @@ def test_t2_call_reports_why_no_service_answers(site: Site, join: Callable[..., 
         return str(error.value)
 
     with site.router(site.settings("robot", "001")) as (secured, onboard):
-        on_board(join, onboard)
+        OnBoard(join, onboard)
         assert "this certificate may not call it" in reason("viewer", "hall")
         assert "safety does not answer" in reason("driver", "anna")
         assert "safety does not answer" in reason("viewer", "hall", "009")
 
 
-def test_members_reach_their_own_robots_through_the_sites_router(
-    site: Site, join: Callable[..., Bus]
-) -> None:
+def test_members_reach_their_own_robots_through_the_sites_router(site: Site, join: Join) -> None:
     with (
         site.router(site.settings("site", "berlin")) as (center, _),
         site.router(site.settings("robot", "001"), center) as (_, one),
         site.router(site.settings("robot", "002"), center) as (_, two),
     ):
-        first, second = on_board(join, one), on_board(join, two, "002")
+        first, second = OnBoard(join, one), OnBoard(join, two, "002")
         driver = connecting(site.settings("driver", "anna"), center)
-        assert drives(member(join, driver), first)
-        assert not drives(member(join, driver, "002"), second)
-        fleet_client = member(join, connecting(site.settings("fleet", "room"), center), "*")
+        assert Member(join, driver).drives(first)
+        assert not Member(join, driver, "002").drives(second)
+        fleet_client = Member(join, connecting(site.settings("fleet", "room"), center), "*")
 
         def stopped() -> bool:
             fleet_client.bus.estop()
@@ -175,29 +161,14 @@ def test_members_reach_their_own_robots_through_the_sites_router(
         wait_until(stopped, "all robots stopped")
 
 
-@contextmanager
-def revoked(site: Site, tmp_path: Path) -> Iterator[None]:
-    """Revoke Anna's certificate during the context."""
-    listed = site.folder / "members.json"
-    before = listed.read_bytes()
+def test_a_revoked_certificate_has_no_rights(join: Join, tmp_path: Path) -> None:
+    site = made(tmp_path)
     site.keys("revoke", "driver", "anna")
-    try:
-        yield
-    finally:
-        listed.write_bytes(before)
-
-
-def test_a_revoked_certificate_has_no_rights(
-    site: Site, join: Callable[..., Bus], tmp_path: Path
-) -> None:
-    with (
-        revoked(site, tmp_path),
-        site.router(site.settings("robot", "001")) as (secured, onboard),
-    ):
-        robot = on_board(join, onboard)
-        anna = member(join, connecting(site.settings("driver", "anna"), secured))
-        hall = member(join, connecting(site.settings("viewer", "hall"), secured))
-        assert not drives(hall, robot)  # by then it has received safety's state
+    with site.router(site.settings("robot", "001")) as (secured, onboard):
+        robot = OnBoard(join, onboard)
+        anna = Member(join, connecting(site.settings("driver", "anna"), secured))
+        hall = Member(join, connecting(site.settings("viewer", "hall"), secured))
+        assert not hall.drives(robot)  # by then it has received safety's state
         for _ in range(20):
             anna.source.request(0.1, 0.0)
         assert anna.source.request(0.1, 0.0).echo == 0  # it receives no heartbeat
