@@ -8,13 +8,13 @@ import errno
 import socket
 import sys
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from typing import Literal, NamedTuple
 
 from cli.settings import Everything
 from common.errors import LinkError
-from common.settings import BusSettings, protocol
+from common.settings import protocol
 
 PATIENCE_S = 5.0  # children of a killed supervisor may still be stopping the vehicle
 LOOK_S = 0.1
@@ -28,7 +28,6 @@ class Port(NamedTuple):
     kind: Literal["tcp", "udp", "unix"]
     host: str  # or the path of a unix socket
     number: int
-    owner: str  # process that uses it
     setting: str  # setting that defines it
 
     def __str__(self) -> str:
@@ -38,30 +37,28 @@ class Port(NamedTuple):
 
 def wanted(config: Everything, names: Collection[str]) -> list[Port]:
     """Return the ports of these processes."""
+    board = config.board
     found: list[Port] = []
     if "router" in names:
-        found += routers(config.bus)
+        found += map(_listener, config.bus.listen)
     if "bridge" in names:
         found += [
-            Port("udp", config.board.listen_address, port, "bridge", "board.listen_ports")
-            for port in config.board.listen_ports
+            Port("udp", board.listen_address, port, "board.listen_ports")
+            for port in board.listen_ports
         ]
     if "sim" in names:
-        found += [Port("udp", config.board.address, config.board.port, "sim", "board.port")]
+        found += [Port("udp", board.address, board.port, "board.port")]
     return found
 
 
-def routers(bus: BusSettings) -> Iterator[Port]:
-    """Yield the ports of a router."""
-    for endpoint in bus.listen:
-        scheme = protocol(endpoint)
-        address = endpoint.partition("/")[2].partition("?")[0].partition("#")[0]
-        if scheme == "unixsock-stream":
-            yield Port("unix", address, 0, "router", "bus.listen")
-            continue
-        host, _, number = address.rpartition(":")
-        kind: Literal["tcp", "udp"] = "udp" if scheme in DATAGRAMS else "tcp"
-        yield Port(kind, host.strip("[]"), int(number), "router", "bus.listen")
+def _listener(endpoint: str) -> Port:
+    """Return the port of a router's endpoint."""
+    address = endpoint.partition("/")[2].partition("?")[0].partition("#")[0]
+    if protocol(endpoint) == "unixsock-stream":
+        return Port("unix", address, 0, "bus.listen")
+    host, _, number = address.rpartition(":")
+    kind: Literal["tcp", "udp"] = "udp" if protocol(endpoint) in DATAGRAMS else "tcp"
+    return Port(kind, host.strip("[]"), int(number), "bus.listen")
 
 
 def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
@@ -123,7 +120,7 @@ def _claim(port: Port, claims: ExitStack) -> None:
 
 
 def _advice(port: Port) -> str:
-    if port.owner == "router":
+    if port.setting == "bus.listen":
         return (
             "is a stack already running? `t2 up --no-router` uses the running router, and "
             "--set bus.listen=tcp/127.0.0.1:PORT selects another port"

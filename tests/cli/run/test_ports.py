@@ -10,15 +10,12 @@ from pathlib import Path
 import pytest
 
 from cli.run import ports
-from cli.run.ports import Port, claimed, routers, wanted
+from cli.run.ports import Port, claimed, wanted
 from cli.settings import Everything
-from common import settings
 from common.bus.session import router
 from common.errors import LinkError
+from common.settings import BusSettings
 from verification.harness.bus import listening
-from verification.harness.ports import free_port
-
-ALL = ("router", "sim", "bridge", "safety", "odom", "recorder")
 
 
 @contextlib.contextmanager
@@ -32,37 +29,26 @@ def held(kind: socket.SocketKind) -> Iterator[int]:
 
 
 def udp(number: int) -> Port:
-    return Port("udp", "127.0.0.1", number, "bridge", "board.listen_ports")
+    return Port("udp", "127.0.0.1", number, "board.listen_ports")
 
 
 def tcp(number: int) -> Port:
-    return Port("tcp", "127.0.0.1", number, "router", "bus.listen")
-
-
-# --- ports by process ----------------------------------------------------------------------------
+    return Port("tcp", "127.0.0.1", number, "bus.listen")
 
 
 def test_ports_by_process() -> None:
-    config = Everything()
-    owners = [port.owner for port in wanted(config, ALL)]
-    assert owners == ["router", "bridge", "bridge", "sim"]
-    assert {port.owner for port in wanted(config, ["bridge", "safety"])} == {"bridge"}
-    assert wanted(config, ["safety"]) == []
-
-
-def test_router_endpoints() -> None:
     listen = ("tcp/127.0.0.1:7447", "tls/[::1]:7448#iface=lo", "quic/localhost:9?a=b",
               "unixsock-stream//run/t2/bus.sock")  # fmt: skip
-    bus = settings.BusSettings(listen=listen, ca="a", certificate="b", private_key="c", members="d")
-    assert [(port.kind, port.host, port.number) for port in routers(bus)] == [
+    bus = BusSettings(listen=listen, ca="a", certificate="b", private_key="c", members="d")
+    config = Everything(bus=bus)
+    assert [port[:3] for port in wanted(config, ["router"])] == [
         ("tcp", "127.0.0.1", 7447),
         ("tcp", "::1", 7448),
         ("udp", "localhost", 9),
         ("unix", "/run/t2/bus.sock", 0),
     ]
-
-
-# --- taken or free -------------------------------------------------------------------------------
+    assert [port[2] for port in wanted(config, ["bridge", "safety"])] == [4002, 4001]
+    assert [port[2] for port in wanted(config, ["sim"])] == [4002]
 
 
 @pytest.mark.parametrize(("kind", "of"), [(socket.SOCK_STREAM, tcp), (socket.SOCK_DGRAM, udp)])
@@ -76,12 +62,13 @@ def test_a_taken_port_is_named_with_advice(
     message = str(raised.value)
     assert f"127.0.0.1:{number} ({port.setting}): used by another program" in message
     assert "is a stack already running?" in message
-    claimed([port], 0.0).close()  # free again
+    with claimed([port], 0.0), pytest.raises(LinkError, match="used by another program"):
+        claimed([port], 0.0)  # of two concurrent starts one continues
 
 
 def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
     path = str(tmp_path / "bus.sock")
-    port = Port("unix", path, 0, "router", "bus.listen")
+    port = Port("unix", path, 0, "bus.listen")
     with (
         router(listening(f"unixsock-stream/{path}")),
         pytest.raises(LinkError, match="used by another"),
@@ -91,12 +78,6 @@ def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
         stale.bind(f"{path}.2")
     with claimed([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0):
         pass
-
-
-def test_of_two_concurrent_starts_one_continues() -> None:
-    port = udp(free_port(socket.SOCK_DGRAM))
-    with claimed([port], 0.0), pytest.raises(LinkError, match="used by another program"):
-        claimed([port], 0.0)
 
 
 def test_ports_of_a_killed_stack_are_awaited() -> None:

@@ -116,38 +116,24 @@ def reporter(name: str, file: Path, on_term: str = "exit 0") -> list[str]:
     return ["sh", "-c", script + "while :; do sleep 0.05; done"]
 
 
-def test_processes_stop_in_reverse_order(tmp_path: Path, supervised: list[Supervisor]) -> None:
+def test_processes_stop_in_reverse_order_and_are_killed_at_last(
+    tmp_path: Path, supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "PATIENCE_S", 0.5)
     file = tmp_path / "order"
-    supervisor = Supervisor({name: reporter(name, file) for name in "abc"})
+    supervisor = Supervisor({
+        "a": reporter("a", file), "b": reporter("b", file, on_term=":"), "c": reporter("c", file),
+    })  # fmt: skip
     supervised.append(supervisor)
     supervisor.look(0.0)
     wait_until(lambda: file.exists() and len(file.read_text().split()) == 3, "three starts")
+    # Ctrl-C goes to the terminal's process group and must not reach the bridge directly.
+    processes = [child.process for child in supervisor.children if child.process]
+    assert [os.getpgid(it.pid) for it in processes] == [it.pid for it in processes]
+    assert [os.getsid(it.pid) for it in processes] == [it.pid for it in processes]
     supervisor.end()
     assert file.read_text().split()[3:] == ["-c", "-b", "-a"]
-
-
-def test_a_process_that_ignores_sigterm_is_killed(
-    tmp_path: Path, supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "PATIENCE_S", 0.2)
-    file = tmp_path / "order"
-    supervisor = Supervisor({"deaf": reporter("deaf", file, on_term=":")})
-    supervised.append(supervisor)
-    supervisor.look(0.0)
-    wait_until(lambda: file.exists() and file.read_text(), "its start")
-    supervisor.end()
-    process = supervisor.children[0].process
-    assert process is not None
-    assert process.returncode == -signal.SIGKILL
-
-
-def test_a_child_has_its_own_process_group(supervised: list[Supervisor]) -> None:
-    # Ctrl-C goes to the terminal's process group and must not reach the bridge directly.
-    supervisor, child = one(supervised, *SLEEP)
-    supervisor.look(0.0)
-    assert child.process is not None
-    assert os.getpgid(child.process.pid) == child.process.pid != os.getpgid(0)
-    assert os.getsid(child.process.pid) == child.process.pid  # not in our session
+    assert [it.returncode for it in processes] == [0, -signal.SIGKILL, 0]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends children with their parent")
