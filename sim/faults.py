@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from common.freshness import NS_PER_S
 from sim.model import Line
 
+QUEUE = 65536  # bytes that may wait for a limited rate; more are dropped
 REORDER_S = 0.03  # long enough that datagrams sent at 50 Hz overtake
 NONE = Line()
 
@@ -79,7 +80,7 @@ class Cable:
             return now_ns
         a_byte_ns = 8 * NS_PER_S / faults.rate
         begins_ns = max(now_ns, self._free_ns)
-        if (begins_ns - now_ns) / a_byte_ns + size > faults.queue:
+        if (begins_ns - now_ns) / a_byte_ns + size > QUEUE:
             return None
         self._free_ns = begins_ns + round(size * a_byte_ns)
         return self._free_ns

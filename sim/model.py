@@ -118,7 +118,6 @@ class Line(Section, frozen=True, kw_only=True):
     delay: Delay = 0.0  # s
     jitter: Delay = 0.0  # s, maximum additional delay
     rate: Annotated[float, Meta(ge=1e3)] | None = None  # bit/s; unlimited without any
-    queue: Annotated[float, Meta(ge=2048)] = 65536  # bytes of the queue; more are dropped
 
 
 class Cable(Section, frozen=True, kw_only=True):

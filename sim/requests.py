@@ -77,11 +77,9 @@ class Firmware(model.Firmware, frozen=True, kw_only=True, tag_field="do", tag="f
 
 
 class Flood(Request, frozen=True, kw_only=True, tag="flood"):
-    """Make the board send this many extra datagrams a second, for a time."""
+    """Make the board send 20 000 extra velocity reports a second, for a time."""
 
-    rate: Annotated[int, Meta(ge=100, le=100_000)] = 20_000
     seconds: Seconds = 1.0
-    garbage: bool = False  # otherwise valid velocity reports
 
 
 class Wire(model.Line, frozen=True, kw_only=True, tag_field="do", tag="wire"):

@@ -38,7 +38,7 @@ STREAM_STEPS = 2  # velocity at 50 Hz
 SONAR_STEPS = 5  # one round of echoes: 20 Hz
 TRUTH_STEPS = 5  # 20 Hz
 CATCH_UP_NS = NS_PER_S // 2  # a longer gap is skipped: the world is paused meanwhile
-GARBAGE = b"GS" + bytes(20)  # starts with a frame's magic
+FLOOD_PER_STEP = 200  # datagrams: 20 000 a second
 
 COMMANDS = {
     MotionKind.STOP: Command.STOP,
@@ -90,7 +90,6 @@ class Simulation:
         self._contact = self.world.contact(self.body, self.pose)
         self._silent_until_ns = now_ns
         self._powered = True
-        self._flood = q.Flood()
         self._flood_until_ns = now_ns
         self._reported_pressed = False
         self._command = t.Command(mono_ns=now_ns, kind=Command.STOP, linear=0.0, angular=0.0)
@@ -176,7 +175,6 @@ class Simulation:
 
     @_apply.register
     def _(self, request: q.Flood, now_ns: int) -> None:
-        self._flood = request
         self._flood_until_ns = now_ns + round(request.seconds * NS_PER_S)
 
     @_apply.register
@@ -232,7 +230,7 @@ class Simulation:
         if self._steps % STREAM_STEPS == 0:
             self._send(self._output.unasked(self.board.velocity()), self.now_ns)
         if self.now_ns < self._flood_until_ns:
-            self._send_flood(self._flood)
+            self._send_flood()
         if self._is_merged():
             self._send(self._output.merged(), self.now_ns)
         if self._steps % TRUTH_STEPS == 0:
@@ -298,9 +296,9 @@ class Simulation:
             angular=target.angular,
         )
 
-    def _send_flood(self, flood: q.Flood) -> None:
-        payload = GARBAGE if flood.garbage else framing.pack(self.board.velocity())
-        for number in range(flood.rate * STEP_NS // NS_PER_S):
+    def _send_flood(self) -> None:
+        payload = framing.pack(self.board.velocity())
+        for number in range(FLOOD_PER_STEP):
             port = self._ports[number % len(self._ports)]
             self._send([Datagram(payload, port)], self.now_ns)
 

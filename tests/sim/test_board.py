@@ -58,16 +58,12 @@ def test_every_query_and_setting_is_answered(command: Frame, answer: Frame) -> N
     assert board().answer(command) == answer
 
 
-def test_a_motion_command_is_held_without_an_answer() -> None:
+def test_a_motion_command_is_held_without_an_answer_whatever_is_sensed() -> None:
     some = board()
     assert some.drive() == STOP
     assert some.answer(FORWARD) is None
-    assert some.drive() == FORWARD
-
-
-def test_reports_tell_what_was_sensed() -> None:
-    some = board()
     some.sense(Twist(0.25, math.radians(-12)), near(2), pressed=True)
+    assert some.drive() == FORWARD  # both emergency brakes are off at first
     assert some.velocity() == r.VelocityReport(250, -120)
     assert some.answer(c.UltrasonicQuery()) == r.UltrasonicReport(near(2))
     assert some.answer(c.BumperQuery()) == r.BumperReport(True)
@@ -125,50 +121,36 @@ def test_the_slip_of_wheels_grows_with_the_root_of_the_way() -> None:
         assert 0.8 < statistics.stdev(errors) / deviation < 1.2
 
 
-def test_both_brakes_are_off_at_first() -> None:
-    some = board()
-    some.answer(FORWARD)
-    some.sense(Twist(0.5), near(1, 2, 3), pressed=True)
-    assert some.drive() == FORWARD
-
-
 @pytest.mark.parametrize(
-    ("command", "rolling", "sonar", "brakes"),
+    ("command", "rolling", "sonar", "millimetres", "brakes"),
     [
-        (FORWARD, 0.0, 1, True),
-        (FORWARD, 0.0, 2, True),
-        (FORWARD, 0.0, 3, True),
-        (FORWARD, 0.0, 0, False),
-        (FORWARD, 0.0, 6, False),
-        (BACKWARD, 0.0, 2, False),
-        (BACKWARD, 0.0, 5, True),
-        (BACKWARD, 0.0, 7, True),
-        (BACKWARD, 0.5, 2, True),  # still rolling the other way
-        (STOP, 0.5, 2, True),  # coasting
-        (STOP, 0.0, 2, False),
-        (TURN, 0.0, 2, False),
+        (FORWARD, 0.0, 1, 100, True),
+        (FORWARD, 0.0, 2, 100, True),
+        (FORWARD, 0.0, 3, 100, True),
+        (FORWARD, 0.0, 0, 100, False),
+        (FORWARD, 0.0, 6, 100, False),
+        (BACKWARD, 0.0, 2, 100, False),
+        (BACKWARD, 0.0, 5, 100, True),
+        (BACKWARD, 0.0, 7, 100, True),
+        (BACKWARD, 0.5, 2, 100, True),  # still rolling the other way
+        (STOP, 0.5, 2, 100, True),  # coasting
+        (STOP, 0.0, 2, 100, False),
+        (TURN, 0.0, 2, 100, False),
+        (FORWARD, 0.0, 2, 0, True),
+        (FORWARD, 0.0, 2, 149, True),
+        (FORWARD, 0.0, 2, 150, False),
+        (FORWARD, 0.0, 2, 0xFFFF, False),
     ],
 )
 def test_the_sonar_brake_watches_the_direction_of_motion(
-    command: c.MotionCommand, rolling: float, sonar: int, brakes: bool
+    command: c.MotionCommand, rolling: float, sonar: int, millimetres: int, brakes: bool
 ) -> None:
-    some = board()
-    some.answer(c.UltrasonicBrakeSet(True))
-    some.answer(command)
-    some.sense(Twist(rolling), near(sonar), pressed=False)
-    assert some.braking() is brakes
-    assert some.drive() == (BREAK if brakes else command)
-
-
-@pytest.mark.parametrize(
-    ("millimetres", "brakes"), [(0, True), (149, True), (150, False), (0xFFFF, False)]
-)
-def test_the_sonar_brake_has_a_range(millimetres: int, brakes: bool) -> None:
     some = board(brake_range=0.15)
     some.answer(c.UltrasonicBrakeSet(True))
-    some.answer(FORWARD)
-    some.sense(Twist(), near(2, millimetres=millimetres), pressed=False)
+    some.answer(command)
+    some.sense(Twist(rolling), near(sonar, millimetres=millimetres), pressed=False)
     assert some.braking() is brakes
+    assert some.drive() == (BREAK if brakes else command)
 
 
 @pytest.mark.parametrize(
@@ -201,9 +183,6 @@ def test_the_bumper_brake_remembers_the_way_of_the_hit_until_the_release() -> No
     assert some.braking()
     some.sense(Twist(), CLEAR, pressed=False)
     assert some.drive() == FORWARD
-
-
-def test_a_bumper_brake_may_refuse_all() -> None:
     some = hit(0.5, bumper_brake="all")
     some.answer(BACKWARD)
     assert some.drive() == BREAK

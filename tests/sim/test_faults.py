@@ -4,7 +4,7 @@ from typing import Any, Literal
 import pytest
 
 from common.freshness import NS_PER_S
-from sim.faults import Cable, Datagram
+from sim.faults import QUEUE, Cable, Datagram
 from sim.model import Line
 
 MANY = [Datagram(bytes([k % 256, k // 256, 7]), 4002) for k in range(1000)]
@@ -39,15 +39,13 @@ def test_reordering_loses_nothing_and_changes_the_order() -> None:
     assert sorted(arrived, key=MANY.index) == MANY
 
 
-def test_corrupting_flips_one_to_three_bits() -> None:
+def test_corrupting_flips_one_to_three_bits_and_foreign_ones_are_marked() -> None:
     for before, after in zip(MANY, through(corrupt=1.0), strict=True):
         flipped = int.from_bytes(before.payload, "big") ^ int.from_bytes(after.payload, "big")
         assert flipped.bit_count() in (0, 1, 2, 3)  # the same bit twice is as before
     assert through(corrupt=1.0) != MANY
-
-
-def test_an_empty_datagram_has_no_bits_to_flip() -> None:
     assert through([Datagram(b"", 4002)], corrupt=1.0) == [Datagram(b"", 4002)]
+    assert all(datagram.foreign for datagram in through(foreign=1.0))
 
 
 @pytest.mark.parametrize(("port", "hit"), [("first", 4002), ("second", 4001)])
@@ -56,10 +54,6 @@ def test_faults_may_be_those_of_one_port(port: Literal["first", "second"], hit: 
     for each in (4002, 4001):
         cable.put(Datagram(b"a", each), 0)
     assert [d.port for d in cable.take(0)] == [each for each in (4002, 4001) if each != hit]
-
-
-def test_foreign_ones_are_marked() -> None:
-    assert all(datagram.foreign for datagram in through(foreign=1.0))
 
 
 @pytest.mark.parametrize("at_ns", [0, NS_PER_S // 2 - 1])
@@ -96,10 +90,9 @@ def test_a_thin_cable_lets_one_after_the_other_through() -> None:
 
 
 def test_what_the_queue_of_a_thin_cable_does_not_hold_is_lost() -> None:
-    cable = Cable(1)
-    cable.faults = Line(rate=8e6, queue=2048)
-    big = [Datagram(bytes([k]) * 1000, 4002) for k in range(4)]
+    cable = Cable(1, Line(rate=8e6))
+    big = [Datagram(bytes([k]) * (QUEUE // 2 - 24), 4002) for k in range(4)]
     for datagram in big[:3]:
         cable.put(datagram, 0)
-    cable.put(big[3], 1_000_000)  # a microsecond for a byte: one has left
+    cable.put(big[3], NS_PER_S // 25)  # a microsecond for a byte: one has left
     assert cable.take(NS_PER_S) == [big[0], big[1], big[3]]

@@ -1,5 +1,6 @@
 """What the board sends, and in which datagrams, by its firmware."""
 
+import msgspec
 import pytest
 
 from common.motion import Command
@@ -7,7 +8,6 @@ from common.wire import commands as c
 from common.wire import framing
 from common.wire import reports as r
 from sim import requests as q
-from sim.model import Where
 from tests.sim.sim_fixture import SimFixture, model
 
 
@@ -16,13 +16,10 @@ def sim_with(**firmware: object) -> SimFixture:
 
 
 def test_a_request_replaces_the_model_s_firmware() -> None:
-    sim = sim_with(answers="second", echoes=False)
+    sim = sim_with(echoes=False)
     assert sim.say(c.BumperBrakeSet(True)) == []
-    sim.say(c.BumperQuery())
-    assert sim.datagrams[-1].port == 4001
     sim.do(q.Firmware())
-    sim.say(c.BumperQuery())
-    assert sim.datagrams[-1].port == 4002
+    assert sim.say(c.BumperBrakeSet(True)) == [r.BumperBrakeReport(True)]
 
 
 def test_a_split_frame_comes_in_two_datagrams() -> None:
@@ -58,25 +55,24 @@ def test_a_watchdog_stops_a_vehicle_that_gets_no_commands() -> None:
 
 
 @pytest.mark.parametrize(
-    ("where", "ports"),
-    [("asked", [4001]), ("first", [4002]), ("second", [4001]), ("both", [4002, 4001])],
+    ("firmware", "pressed", "ports"),
+    [
+        ({}, False, [4001]),
+        ({"answers": "first"}, False, [4002]),
+        ({"answers": "second"}, True, [4001]),
+        ({"answers": "both"}, False, [4002, 4001]),
+        ({"hits": "first"}, False, [4001]),
+        ({"hits": "first"}, True, [4002]),
+    ],
 )
-def test_answers_go_where_the_firmware_sends_them(where: Where, ports: list[int]) -> None:
+def test_answers_go_where_the_firmware_sends_them(
+    firmware: dict[str, str], pressed: bool, ports: list[int]
+) -> None:
     sim = SimFixture()
-    sim.do(q.Firmware(answers=where))
-    before = len(sim.datagrams)
+    sim.do(msgspec.convert({"do": "firmware", **firmware}, q.Firmware))
+    sim.do(q.Bumper(pressed=pressed))
     sim.say(c.BumperQuery(), port=4001)
-    assert [datagram.port for datagram in sim.datagrams[before:]] == ports
-
-
-def test_hits_may_be_reported_on_the_other_port() -> None:
-    sim = SimFixture()
-    sim.do(q.Firmware(hits="second"))
-    for pressed, port in ((False, 4002), (True, 4001)):
-        sim.do(q.Bumper(pressed=pressed))
-        before = len(sim.datagrams)
-        assert sim.say(c.BumperQuery()) == [r.BumperReport(pressed)]
-        assert [datagram.port for datagram in sim.datagrams[before:]] == [port]
+    assert [datagram.port for datagram in sim.datagrams] == ports
 
 
 def test_a_board_that_ignores_stop_drives_on_and_obeys_break() -> None:

@@ -7,7 +7,6 @@ import pytest
 from common.wire import commands as c
 from common.wire import reports as r
 from sim import requests as q
-from sim.trace import Disturbed
 from tests.sim.sim_fixture import START_NS, SimFixture, room
 
 BOX: dict[str, Any] = {"name": "crate", "x": 3.0, "y": 0.0, "length": 1.0, "width": 1.0}
@@ -27,15 +26,6 @@ def test_a_hand_does_not_lift_the_bumper_off_an_obstacle() -> None:
     sim.do(q.Place(x=2.5 - 0.55 - 0.001, y=0.0))
     sim.do(q.Bumper(pressed=False))
     assert sim.truth.pressed
-
-
-def test_a_sonar_is_disturbed() -> None:
-    sim = SimFixture()
-    sim.do(q.Sonar(name="rear", range=0.5))
-    sim.after(0.05)
-    (ranges,) = sim.say(c.UltrasonicQuery())
-    assert isinstance(ranges, r.UltrasonicReport)
-    assert ranges.ranges_mm[6] == 500
 
 
 @pytest.mark.parametrize(
@@ -60,29 +50,20 @@ def test_it_is_placed_and_stands_there() -> None:
     assert (sim.truth.x, sim.truth.y, sim.truth.linear) == (-3.0, 2.0, 0.0)
 
 
-def test_it_is_not_placed_into_something() -> None:
+def test_a_refused_request_changes_nothing_and_is_traced_with_its_reason() -> None:
     sim = SimFixture(room(BOX))
     reply = sim.do(q.Place(x=3.0, y=0.0))
     assert (reply.ok, reply.error) == (False, "an obstacle is at x 3, y 0")
+    assert sim.do(q.GetTruth()).truth == sim.truth  # which leaves no line
     assert sim.truth.x == 0.0
-
-
-def test_the_truth_leaves_no_line() -> None:
-    sim = SimFixture()
-    assert sim.do(q.GetTruth()).truth == sim.truth
-    assert sim.records == []
-
-
-def test_what_is_asked_for_is_traced_with_its_error() -> None:
-    sim = SimFixture(room(BOX))
-    sim.do(q.Place(x=3.0, y=0.0))
-    (line,) = sim.of(Disturbed)
-    assert msgspec.to_builtins(line) == {
-        "event": "fault",
-        "mono_ns": START_NS,
-        "request": {"do": "place", "x": 3.0, "y": 0.0, "heading": 0.0},
-        "error": "an obstacle is at x 3, y 0",
-    }
+    assert msgspec.to_builtins(sim.records) == [
+        {
+            "event": "fault",
+            "mono_ns": START_NS,
+            "request": {"do": "place", "x": 3.0, "y": 0.0, "heading": 0.0},
+            "error": "an obstacle is at x 3, y 0",
+        }
+    ]
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,7 @@ def process(bench: Bench, *words: str) -> Iterator["subprocess.Popen[bytes]"]:
 
 
 def test_a_process_streams_drives_and_is_disturbed(bench: Bench) -> None:
-    with process(bench, "--world", "empty") as running:
+    with process(bench, "--world", "office", "--profile", "centimetre-sonar") as running:
         wait_until(lambda: VelocityReport(0, 0) in bench.received(1), "the second port's stream")
         bench.send(MotionCommand(MotionKind.RUN, 500))
         wait_until(lambda: VelocityReport(500, 0) in bench.received(), "500 mm/s")
@@ -101,31 +101,25 @@ def test_a_process_streams_drives_and_is_disturbed(bench: Bench) -> None:
         bench.send(BumperQuery())
         wait_until(lambda: BumperReport(True) in bench.received(), "a pressed bumper")
         assert control.truth().pressed
+        with pytest.raises(MessageError, match="an obstacle is at x 4, y 0"):
+            control.do(Place(x=4.0, y=0.0))
         control.do(Wire(direction="to_pc", foreign=1.0))
         bench.send(BumperQuery())
         wait_until(lambda: BumperReport(True) in bench.received(), "the same from elsewhere")
         control.do(Wire())
         control.do(PowerCycle(seconds=0.1))
         wait_until(lambda: len(bench.lines("power")) == 2, "power again")
-        running.send_signal(signal.SIGTERM)
-        assert running.wait(PATIENCE_S) == 0
-    (command,) = bench.lines("command")
-    assert (command["kind"], command["linear"]) == ("run", 0.5)
-    assert bench.lines("truth")[-1]["x"] > 0.0
-    done = [line["request"]["do"] for line in bench.lines("fault")]
-    assert done == ["bumper", "wire", "wire", "power_cycle"]
-    assert [line["pressed"] for line in bench.lines("bumper_sent")] == [True]
-    assert [line["on"] for line in bench.lines("power")] == [False, True]
-
-
-def test_a_refused_request_and_ctrl_c(bench: Bench) -> None:
-    with process(bench, "--profile", "slope") as running:
-        with pytest.raises(MessageError, match="an obstacle is at x 4, y 0"):
-            Control(bench.control_port, PATIENCE_S).do(Place(x=4.0, y=0.0))
         running.send_signal(signal.SIGINT)
         assert running.wait(PATIENCE_S) == 0
         assert running.stderr is not None
         assert b"Traceback" not in running.stderr.read()
+    (command,) = bench.lines("command")
+    assert (command["kind"], command["linear"]) == ("run", 0.5)
+    assert bench.lines("truth")[-1]["x"] > 0.0
+    done = [line["request"]["do"] for line in bench.lines("fault")]
+    assert done == ["bumper", "place", "wire", "wire", "power_cycle"]
+    assert [line["pressed"] for line in bench.lines("bumper_sent")] == [True]
+    assert [line["on"] for line in bench.lines("power")] == [False, True]
 
 
 @needs_right

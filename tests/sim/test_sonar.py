@@ -54,12 +54,20 @@ def test_a_cone_sees_what_a_ray_would_miss() -> None:
     assert 1900 < measured(sonars(cone=0.6), "front", world=world) < 2100
 
 
+COARSE: dict[str, Any] = {"quantum": 0.01, "saturation": 3.0}
+
+
 @pytest.mark.parametrize(
-    ("gap", "expected"), [(0.049, 0), (0.051, 51), (3.999, 3999), (4.001, 4000)]
+    ("parameters", "gap", "expected"),
+    [
+        *(({}, *row) for row in ((0.049, 0), (0.051, 51), (3.999, 3999), (4.001, 4000))),
+        *((COARSE, *row) for row in ((1.234, 1230), (1.236, 1240), (9.0, 3000))),
+    ],
 )
-def test_the_ends_of_the_range(gap: float, expected: int) -> None:
+def test_the_ends_of_the_range(parameters: dict[str, Any], gap: float, expected: int) -> None:
     wall = room(walls=[{"points": [[0.5 + gap, -9], [0.5 + gap, 9]]}])
-    assert measured(sonars(), "front", world=World.of(wall)) == expected
+    some = Sonars(VEHICLE, model.Sonar(noise=0.0, cone=0.0, **parameters), 1)
+    assert measured(some, "front", world=World.of(wall)) == expected
 
 
 def test_noise_is_small_and_around_the_distance() -> None:
@@ -69,49 +77,31 @@ def test_noise_is_small_and_around_the_distance() -> None:
     assert 8 < statistics.stdev(values) < 12
 
 
-def test_a_faulty_one_says_so_and_the_others_do_not() -> None:
-    some = sonars()
-    some.inject(Sonar(name="front", fault=True))
-    assert measured(some, "front") == 0xFFFF
-    assert measured(some, "right") == 700
-
-
-def test_a_stuck_one_keeps_its_last_range_and_comes_back() -> None:
-    some = sonars()
-    assert measured(some, "front") == 2500
-    some.inject(Sonar(name="front", stuck=True))
-    assert measured(some, "front", Pose(1.0, 0.0, 0.0)) == 2500
+@pytest.mark.parametrize(
+    ("injected", "expected"),
+    [
+        (Sonar(name="front", fault=True), 0xFFFF),
+        (Sonar(name="front", stuck=True), 2500),  # its last range
+        (Sonar(name="front", range=1.234), 1234),
+        (Sonar(name="front", range=0.01), 0),
+        (Sonar(name="front", range=50.0), 4000),
+    ],
+)
+def test_a_disturbed_one_comes_back_and_leaves_the_others(injected: Sonar, expected: int) -> None:
+    some, nearer = sonars(noise=0.01), Pose(1.0, 0.0, 0.0)
+    undisturbed = sonars(noise=0.01)
+    for one in (some, undisturbed):
+        assert measured(one, "front") == pytest.approx(2500, abs=50)
+    some.inject(injected)
+    ranges, others = (one.measure(ROOM, nearer) for one in (some, undisturbed))
+    assert ranges[2] == pytest.approx(expected, abs=50)
+    assert ranges[:2] + ranges[3:] == others[:2] + others[3:]  # with the same noise
     some.inject(Sonar(name="front"))
-    assert measured(some, "front", Pose(1.0, 0.0, 0.0)) == 1500
-
-
-@pytest.mark.parametrize(("value", "expected"), [(1.234, 1234), (0.01, 0), (50.0, 4000)])
-def test_a_range_can_be_made_up(value: float, expected: int) -> None:
-    some = sonars()
-    some.inject(Sonar(name="left", range=value))
-    assert measured(some, "left") == expected
-
-
-def test_a_fault_does_not_change_the_noise_of_others() -> None:
-    well, ill = sonars(noise=0.01), sonars(noise=0.01)
-    ill.inject(Sonar(name="front", fault=True))
-    assert measured(well, "right") == measured(ill, "right")
+    assert some.measure(ROOM, nearer) == undisturbed.measure(ROOM, nearer)
 
 
 def test_requests_name_the_sonars_as_messages_do() -> None:
     assert SonarName.__args__ == SONAR_NAMES  # type: ignore[attr-defined]
-
-
-@pytest.mark.parametrize(("gap", "expected"), [(1.234, 1230), (1.236, 1240), (9.0, 3000)])
-def test_coarse_ones_that_saturate_early(gap: float, expected: int) -> None:
-    wall = room(walls=[{"points": [[0.5 + gap, -9], [0.5 + gap, 9]]}])
-    some = Sonars(VEHICLE, model.Sonar(noise=0.0, cone=0.0, quantum=0.01, saturation=3.0), 1)
-    assert measured(some, "front", world=World.of(wall)) == expected
-
-
-def test_false_echoes_are_reported() -> None:
-    some = Sonars(VEHICLE, model.Sonar(noise=0.0, floor_chance=1.0, floor_range=1.5), 1)
-    assert measured(some, "front") == 1500
 
 
 def rounds(
@@ -129,6 +119,8 @@ def test_the_floor_echoes_at_its_range() -> None:
     found = rounds(FAR, floor_chance=0.1, floor_range=1.4)
     assert {value for each in found for value in each} == {4.0, 1.4}
     assert share(found, FRONT, 1.4) == pytest.approx(0.1, abs=0.03)
+    some = Sonars(VEHICLE, model.Sonar(noise=0.0, floor_chance=1.0, floor_range=1.5), 1)
+    assert measured(some, "front") == 1500  # and is reported
 
 
 def test_a_neighbour_s_echo_is_taken_half_of_the_times_if_one_of_two_is_nearer() -> None:

@@ -36,6 +36,7 @@ def settled(twist: Twist, kind: MotionKind, target: Twist) -> tuple[Twist, float
         (AT_SPEED, STOP, AT_SPEED, STANDING, 1.0 / DRIVE.coast),
         (STANDING, RUN, Twist(0.6, 0.3), Twist(0.6, 0.3), 0.6 / DRIVE.acceleration),
         (Twist(-0.6), RUN, STANDING, STANDING, 0.6 / DRIVE.acceleration),
+        (STANDING, RUN, Twist(30.0, -50.0), Twist(1.5, -1.5), 1.5 / DRIVE.acceleration),
     ],
 )
 def test_each_command_reaches_its_velocity_by_its_ramp(
@@ -44,11 +45,6 @@ def test_each_command_reaches_its_velocity_by_its_ramp(
     reached, after_s = settled(start, kind, target)
     assert reached == end
     assert after_s == pytest.approx(seconds, abs=DT)
-
-
-def test_the_motors_have_a_greatest_speed() -> None:
-    end, _ = settled(STANDING, RUN, Twist(30.0, -50.0))
-    assert end == Twist(DRIVE.max_linear, -DRIVE.max_angular)
 
 
 def test_a_straight_way_and_a_quarter_circle_are_exact() -> None:
@@ -68,17 +64,13 @@ def test_many_short_steps_are_one_long_one(twist: Twist, steps: int) -> None:
 
 
 def test_a_way_ends_just_before_what_blocks_it() -> None:
-    way = move(Pose(0.0, 0.0, 0.0), Twist(1.0), 0.1, lambda pose: pose.x > 0.03)
+    start = Pose(0.0, 0.0, 0.0)
+    way = move(start, Twist(1.0), 0.1, lambda pose: pose.x > 0.03)
     assert way.held
     assert 0.0299 < way.pose.x <= 0.03
     assert way.distance == pytest.approx(way.pose.x)
-
-
-def test_a_way_that_is_blocked_at_once_stays() -> None:
-    start = Pose(1.0, 2.0, 3.0)
     way = move(start, Twist(1.0, 1.0), 0.1, lambda pose: pose != start)
-    assert way.held
-    assert (way.pose, way.distance, way.turn) == (start, 0.0, 0.0)
+    assert (way.held, way.pose, way.distance, way.turn) == (True, start, 0.0, 0.0)
 
 
 class Ride:
@@ -115,22 +107,21 @@ def test_nothing_happens_within_the_dead_time_not_even_brake() -> None:
     assert ride.after(DT, BREAK) == Twist()
 
 
-def test_a_lag_makes_the_way_to_stop_longer() -> None:
-    ways = []
-    for lag in (0.0, 0.3):
-        ride = Ride(lag=lag)
-        ride.after(4.0, RUN, 0.5)
-        assert ride.twist == Twist(0.5)
-        ways.append(ride.stopping(STOP))
-    assert ways[0] == pytest.approx(0.5**2 / (2 * 0.8), abs=0.01)
-    # At 0.8 m/s^2 down to 0.24 m/s, and from there by the time constant.
-    assert ways[1] == pytest.approx((0.5**2 - 0.24**2) / (2 * 0.8) + 0.24 * 0.3, abs=0.01)
-
-
-def test_a_brake_has_a_deceleration() -> None:
-    ride = Ride(brake=2.0)
-    ride.after(2.0, RUN, 0.8)
-    assert ride.stopping(BREAK) == pytest.approx(0.8**2 / (2 * 2.0), abs=0.01)
+@pytest.mark.parametrize(
+    ("drive", "speed", "kind", "distance"),
+    [
+        ({}, 0.5, STOP, 0.5**2 / (2 * 0.8)),
+        # At 0.8 m/s^2 down to 0.24 m/s, and from there by the time constant.
+        ({"lag": 0.3}, 0.5, STOP, (0.5**2 - 0.24**2) / (2 * 0.8) + 0.24 * 0.3),
+        ({"brake": 2.0}, 0.8, BREAK, 0.8**2 / (2 * 2.0)),
+    ],
+)
+def test_the_distance_of_a_stop(
+    drive: dict[str, float], speed: float, kind: MotionKind, distance: float
+) -> None:
+    ride = Ride(**drive)
+    assert ride.after(4.0, RUN, speed) == Twist(speed)
+    assert ride.stopping(kind) == pytest.approx(distance, abs=0.01)
 
 
 def test_slower_than_the_dead_zone_stands_still() -> None:
@@ -143,21 +134,19 @@ def test_slower_than_the_dead_zone_stands_still() -> None:
     assert (twist.linear, twist.angular) == pytest.approx((0.078, 0.156 / TRACK))
 
 
-def test_unlike_sides_curve_a_straight_line() -> None:
-    ride = Ride(asymmetry=0.04)
-    twist = ride.after(2.0, RUN, 0.5)
-    assert twist.linear == pytest.approx(0.5)
-    assert twist.angular == pytest.approx(0.5 * 0.04 / TRACK)
-    ride = Ride(asymmetry=-0.04)
-    assert ride.after(2.0, RUN, 0.5).angular == pytest.approx(-0.5 * 0.04 / TRACK)
-
-
-def test_a_weak_left_wheel_slows_and_pulls_to_the_left() -> None:
-    ride = Ride(weak_wheel=0.3)
-    twist = ride.after(3.0, RUN, 0.5)
-    assert twist.linear == pytest.approx(0.5 * (1 - 0.3 / 4))
-    assert twist.angular == pytest.approx(0.5 * 0.15 / TRACK)
-    assert ride.stopping(STOP) == pytest.approx(twist.linear**2 / (2 * 0.8 * 0.925), abs=0.01)
+@pytest.mark.parametrize(
+    ("drive", "linear", "angular"),
+    [
+        ({"asymmetry": 0.04}, 0.5, 0.5 * 0.04 / TRACK),
+        ({"asymmetry": -0.04}, 0.5, -0.5 * 0.04 / TRACK),
+        ({"weak_wheel": 0.3}, 0.5 * (1 - 0.3 / 4), 0.5 * 0.15 / TRACK),  # a left one
+    ],
+)
+def test_unlike_wheels_curve_a_straight_line(
+    drive: dict[str, float], linear: float, angular: float
+) -> None:
+    twist = Ride(**drive).after(3.0, RUN, 0.5)
+    assert (twist.linear, twist.angular) == pytest.approx((linear, angular))
 
 
 def test_on_a_slope_stop_ramps_down_and_then_lets_roll() -> None:
@@ -169,7 +158,4 @@ def test_on_a_slope_stop_ramps_down_and_then_lets_roll() -> None:
     assert ride.after(DT, BREAK) == Twist()
     assert ride.after(1.0, BREAK) == Twist()
     assert ride.after(1.0, STOP).linear == pytest.approx(0.342, abs=0.02)
-
-
-def test_a_slope_that_rises_ahead_lets_roll_backward_to_the_greatest_speed() -> None:
-    assert Ride(slope=-0.2).after(5.0, STOP) == Twist(-1.5)
+    assert Ride(slope=-0.2).after(5.0, STOP) == Twist(-1.5)  # it rises ahead
