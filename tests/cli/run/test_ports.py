@@ -48,7 +48,7 @@ def test_ports_by_process() -> None:
         ("unix", "/run/t2/bus.sock", 0),
     ]
     assert [port[2] for port in wanted(config, ["bridge", "safety"])] == [4002, 4001]
-    assert [port[2] for port in wanted(config, ["sim"])] == [4002]
+    assert [port[2] for port in wanted(config, ["sim"])] == [4003]
 
 
 @pytest.mark.parametrize(("kind", "of"), [(socket.SOCK_STREAM, tcp), (socket.SOCK_DGRAM, udp)])

@@ -119,7 +119,7 @@ def reporter(name: str, file: Path, on_term: str = "exit 0") -> list[str]:
 def test_processes_stop_in_reverse_order_and_are_killed_at_last(
     tmp_path: Path, supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(module, "PATIENCE_S", 2.0)
     file = tmp_path / "order"
     supervisor = Supervisor({
         "a": reporter("a", file), "b": reporter("b", file, on_term=":"), "c": reporter("c", file),
