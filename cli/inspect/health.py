@@ -1,7 +1,7 @@
 """``t2 health``: service health, from the health messages at 1 Hz.
 
-``t2 health safety`` ends with the next message of one service, so a container's health check can run
-it often.
+``t2 health safety`` ends with the next message of one service, so a container's health check can
+run it often.
 """
 
 import argparse

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from cli.inspect import output
-from cli.inspect.addressing import EVERY_ROBOT, chunks
+from cli.inspect.addressing import EVERY_ROBOT
 from cli.inspect.estop import MOVES
-from cli.inspect.session import add_options, decoded, open_session, until_interrupt
+from cli.inspect.session import add_options, decoded, open_session, services, until_interrupt
 from common import keys
 from common.bus.probe import Probe
 from common.codec import Sample
@@ -31,10 +31,10 @@ def run(options: argparse.Namespace) -> int:
     """List the robots; return 1 if one that moves has no safety state."""
     options.robot = options.robot or EVERY_ROBOT
     with open_session(options) as session:
-        services, newest = discover(session.probe, session.robot)
-    if not services:
+        found, newest = discover(session.probe, session.robot)
+    if not found:
         raise RobotError("no robot found; try `t2 doctor`")
-    rows = [row(name, services[name], newest) for name in sorted(services)]
+    rows = [row(name, found[name], newest) for name in sorted(found)]
     output.rows(rows, HEAD, as_cells, as_json=options.json)
     return 1 if {"silent", "no safety"} & {each["verdict"] for each in rows} else 0
 
@@ -43,18 +43,18 @@ def discover(probe: Probe, robot: str) -> tuple[dict[str, set[str]], dict[str, S
     """Return the services of each robot, and the newest message by key within the time limit."""
     for topic in (keys.SAFETY, keys.VELOCITY):
         probe.listen(topic.on(robot))
-    services: defaultdict[str, set[str]] = defaultdict(set)
-    for name, path in map(chunks, probe.alive(keys.live_key(robot, "*", "*"))):
-        services[name].add(path.split("/")[1])
-    wanted = {keys.SAFETY.on(name) for name, has in services.items() if "safety" in has}
-    wanted |= {keys.VELOCITY.on(name) for name, has in services.items() if "bridge" in has}
+    found: defaultdict[str, set[str]] = defaultdict(set)
+    for name, service in services(probe, robot):
+        found[name].add(service)
+    wanted = {keys.SAFETY.on(name) for name, has in found.items() if "safety" in has}
+    wanted |= {keys.VELOCITY.on(name) for name, has in found.items() if "bridge" in has}
     newest: dict[str, Sample] = {}
     with until_interrupt():
         for sample in probe.samples(LISTEN_S):
             newest[sample.key] = sample
             if newest.keys() >= wanted:
                 break
-    return services, newest
+    return found, newest
 
 
 def row(name: str, services: set[str], newest: Mapping[str, Sample]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Profiles, validity, changes of the member list, and the table of ``t2 keys list``."""
 
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
@@ -15,7 +16,7 @@ from cli.keys.member_list import (
     span,
 )
 from common.errors import ConfigError, RobotError
-from common.members import ROLES, Member, Members, Profile
+from common.members import ROLES, Member, Profile
 from tests.cli.keys.site_fixture import NOW_S, member, members
 
 OLD = member("driver", "anna", "00000001", 10)
@@ -47,12 +48,6 @@ def test_valid_profiles(given: tuple[Any, ...], found: dict[str, tuple[str, ...]
     assert profile(*given) == Profile(role=given[0], name=given[1], **found)
 
 
-@pytest.mark.parametrize("source", ["*", "Nav", "n" * 33, "nav\n"])
-def test_invalid_sources(source: str) -> None:
-    with pytest.raises(ConfigError, match="is not a source name"):
-        profile("driver", "anna", ("001",), (), (source,))
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -65,22 +60,17 @@ def test_invalid_sources(source: str) -> None:
         (("driver", "anna", ("0 1",)), "'0 1' is not a name"),
         (("driver", "anna\n", ("001",)), "'anna\\n' is not a name"),
         (("viewer", "hall", (), (), ("nav",)), "--source is for drivers and devices; a viewer"),
+        *((("driver", "anna", ("001",), (), (source,)), "is not a source name")
+          for source in ("*", "Nav", "n" * 33, "nav\n")),
+        *((("site", "x", (), (address,)), "is neither an IP address nor a host name")
+          for address in ("", "300.1.1.1", "a b", "-a.example", "a.", "a:7447", "*.a.example",
+                          "a" * 64, "a\n", ".".join(["a" * 63] * 4))),
     ],
-)
+)  # fmt: skip
 def test_invalid_profiles(given: tuple[Any, ...], message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         profile(*given)
     assert message in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "address",
-    ["", "300.1.1.1", "a b", "-a.example", "a.", "a:7447", "*.a.example", "a" * 64, "a\n",
-     ".".join(["a" * 63] * 4)],
-)  # fmt: skip
-def test_invalid_addresses(address: str) -> None:
-    with pytest.raises(ConfigError, match="is neither an IP address nor a host name"):
-        profile("site", "x", (), (address,))
 
 
 def test_the_common_name_ends_with_the_start_of_the_serial() -> None:
@@ -91,17 +81,19 @@ def test_the_common_name_ends_with_the_start_of_the_serial() -> None:
     assert longest <= 64  # RFC 5280, ub-common-name
 
 
-@pytest.mark.parametrize("days", [0, -1, 11])
-def test_a_certificate_never_exceeds_the_authority(days: int) -> None:
-    assert span(0.0, 10, 10.5 * DAY_S) == (-EARLY_S, 10 * DAY_S)
-    with pytest.raises(ConfigError, match=rf"--days {days}: allowed is 1..10, the remaining"):
-        span(0.0, days, 10.5 * DAY_S)
-
-
-@pytest.mark.parametrize("left_s", [DAY_S - 1, 0, -1])
-def test_an_expired_authority_signs_nothing(left_s: int) -> None:
-    with pytest.raises(RobotError, match="the CA has expired"):
-        span(1e9, 1, 1e9 + left_s)
+@pytest.mark.parametrize(
+    ("days", "left_days", "error"),
+    [
+        (10, 10.5, ""),
+        (0, 10.5, "--days 0: allowed is 1..10, the remaining"),
+        (11, 10.5, "--days 11: allowed is 1..10, the remaining"),
+        (1, 0.99, "the CA has expired"),
+        (1, -1, "the CA has expired"),
+    ],
+)
+def test_a_certificate_never_exceeds_the_authority(days: int, left_days: float, error: str) -> None:
+    with pytest.raises(RobotError, match=error) if error else nullcontext():
+        assert span(1e9, days, 1e9 + left_days * DAY_S) == (1e9 - EARLY_S, 1e9 + days * DAY_S)
 
 
 # --- the list -----------------------------------------------------------------------------------
@@ -109,12 +101,8 @@ def test_an_expired_authority_signs_nothing(left_s: int) -> None:
 
 def test_newest_skips_revoked_certificates() -> None:
     assert member_list.newest(SITE, "driver", "anna") is NEW
-
-
-@pytest.mark.parametrize("there", [members(), members(GONE, OTHER, SAME_NAME)])
-def test_nothing_to_renew(there: Members) -> None:
     with pytest.raises(RobotError, match="driver anna has no certificate, or a revoked one"):
-        member_list.newest(there, "driver", "anna")
+        member_list.newest(members(GONE, OTHER, SAME_NAME), "driver", "anna")
 
 
 def test_a_name_is_free_without_a_valid_certificate() -> None:
@@ -131,20 +119,12 @@ def test_routers_have_the_addresses_of_their_latest_certificate() -> None:
     assert member_list.routers(members(site, old, new, gone, OLD)) == [new, site]
 
 
-def test_revoke_all_certificates_of_a_member() -> None:
-    left, revoked = member_list.revoked(SITE, "driver", "anna", None)
-    assert revoked == [OLD, NEW]
-    assert [each.common_name for each in left.welcome] == [
-        "driver.ann.00000001",
-        "viewer.anna.00000001",
-    ]
+@pytest.mark.parametrize(("serial", "ended"), [(None, [OLD, NEW]), ("00000001", [OLD])])
+def test_revoke_certificates_of_a_member(serial: str | None, ended: list[Member]) -> None:
+    left, revoked = member_list.revoked(SITE, "driver", "anna", serial)
+    assert revoked == ended
+    assert left.welcome == tuple(each for each in SITE.welcome if each not in ended)
     assert len(left.members) == len(SITE.members)
-
-
-def test_revoke_one_certificate_of_a_member() -> None:
-    left, revoked = member_list.revoked(SITE, "driver", "anna", "00000001")
-    assert revoked == [OLD]
-    assert left.welcome == (NEW, OTHER, SAME_NAME)
 
 
 @pytest.mark.parametrize(
