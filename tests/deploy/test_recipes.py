@@ -112,7 +112,7 @@ def test_foreign_packages_have_no_precedence(
         assert up.poll() is None, log.read_text()
         up.terminate()
         assert up.wait(PATIENCE_S) == 0
-    assert "foreign" not in log.read_text()
+    assert "the foreign" not in log.read_text()
 
 
 def test_the_relays_recipe_installs_its_program_and_unit(tmp_path: Path) -> None:

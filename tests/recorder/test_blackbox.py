@@ -103,25 +103,16 @@ def test_a_dump_is_written_in_slices(files: Files) -> None:
     assert [len(each) for each in files.read()] == [3 * SLICE]
 
 
-def test_close_writes_all_pending_samples(files: Files) -> None:
+def test_close_writes_all_pending_samples_and_finish_none(files: Files) -> None:
     box = box_of(files)
-    box.close()
-    for second in range(3):
-        box.add(at(second))
-    box.trigger(["estop", "contact"], ns(2))
-    box.close()
-    assert files.read() == [[0.0, 1.0, 2.0]]
+    for end in (box.close, box.finish):
+        end()  # without a dump
+        for _ in range(SLICE + 5):
+            box.add(at(0))
+        box.trigger(["estop", "contact"], ns(0))
+        box.write(ns(0))
+        end()
+    assert [len(each) for each in files.read()] == [SLICE + 5, SLICE]
     assert files.closed[0].name.endswith("-latch-estop-contact.mcap")
-
-
-def test_finish_discards_pending_samples(files: Files) -> None:
-    box = box_of(files)
-    box.finish()
-    for _ in range(SLICE + 5):
-        box.add(at(0))
-    box.trigger(["contact"], ns(0))
-    box.write(ns(0))
-    box.finish()
-    assert [len(each) for each in files.read()] == [SLICE]
     box.write(ns(9))
-    assert len(files.closed) == 1
+    assert len(files.closed) == 2

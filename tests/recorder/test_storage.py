@@ -77,21 +77,15 @@ def test_room_is_made_with_hysteresis(tmp_path: Path) -> None:
     assert not storage.has_room
 
 
-def test_a_file_with_a_keep_mark_stays(tmp_path: Path) -> None:
-    disk = Disk(tmp_path, 12 * MB, *INCIDENTS)
-    (tmp_path / f"{INCIDENTS[0]}.keep").touch()
-    Storage(tmp_path, 10 * MB, disk.free, robot="001").check(0)
-    assert disk.names() == sorted([INCIDENTS[0], INCIDENTS[2], f"{INCIDENTS[0]}.keep"])
-
-
-def test_the_latest_file_of_this_process_stays_whatever_its_clock(tmp_path: Path) -> None:
-    disk = Disk(tmp_path, 12 * MB, *INCIDENTS)
+def test_a_marked_file_and_the_latest_of_this_process_stay(tmp_path: Path) -> None:
+    disk = Disk(tmp_path, 13 * MB, *INCIDENTS)
+    mark = f"{INCIDENTS[0]}.keep"
+    (tmp_path / mark).touch()
     storage = Storage(tmp_path, 10 * MB, disk.free, robot="001")
     began = storage.new_path("001", 0, "latch-estop")  # a clock at 1970
     began.write_bytes(bytes(MB))
     storage.check(0)
-    assert began.exists()
-    assert disk.names() == sorted([began.name, INCIDENTS[2]])
+    assert disk.names() == sorted([began.name, INCIDENTS[0], INCIDENTS[2], mark])
 
 
 def test_a_file_that_any_process_writes_stays(tmp_path: Path) -> None:
@@ -123,16 +117,6 @@ def test_no_room_if_files_cannot_be_removed(
     assert not storage.has_room
 
 
-def test_continuous_files_first_and_the_newest_of_each_kind_stays() -> None:
-    files = stored(*reversed(CONTINUOUS), *reversed(INCIDENTS))
-    assert names(removable(files, "001")) == [*CONTINUOUS[:2], *INCIDENTS[:2]]
-
-
-def test_marked_files_stay() -> None:
-    files = stored(*CONTINUOUS, *INCIDENTS, kept=(CONTINUOUS[0], INCIDENTS[1]))
-    assert names(removable(files, "001")) == [CONTINUOUS[1], INCIDENTS[0]]
-
-
 def test_files_of_one_second_are_ordered_by_number() -> None:
     same = [f"{OLD}.mcap", *(f"{OLD}-{n}.mcap" for n in (1, 2, 10))]
     assert names(removable(stored(*reversed(same)), "001")) == same[:3]
@@ -155,9 +139,3 @@ def test_only_as_many_files_as_needed_are_removed() -> None:
     assert names(to_remove(files, "001", 1, MB)) == CONTINUOUS[:1]
     assert names(to_remove(files, "001", 1, MB + 1)) == CONTINUOUS[:2]
     assert names(to_remove(files, "001", 4 * MB, 9 * MB)) == [*CONTINUOUS[:2], *INCIDENTS[:2]]
-
-
-def test_nothing_is_removed_if_all_files_are_not_enough() -> None:
-    files = stored(*CONTINUOUS, *INCIDENTS)
-    assert to_remove(files, "001", 4 * MB + 1, 9 * MB) == []
-    assert to_remove([], "001", 0, 0) == []
