@@ -6,7 +6,7 @@ The rights of accepted clients are tested in ``tests/cli/keys/test_rights.py``.
 import contextlib
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -82,27 +82,14 @@ def connect(bus: BusSettings, endpoint: str, **tls: Any) -> zenoh.Session:
     return zenoh.open(config)
 
 
-def without_a_certificate(site: Site, _: Site, endpoint: str) -> zenoh.Session:
-    return connect(site.bus(DRIVER), endpoint, enable_mtls=False)
-
-
-def of_a_foreign_authority(site: Site, stranger: Site, endpoint: str) -> zenoh.Session:
-    """Use a certificate of another authority with the same name, and trust our router."""
+def test_rejected_clients(site: Site, stranger: Site, endpoint: str) -> None:
+    """Without a certificate; of another authority with the same name, and trust in our router."""
     ours = site.bus(DRIVER)
-    return connect(msgspec.structs.replace(stranger.bus(DRIVER), ca=ours.ca), endpoint)
-
-
-@pytest.mark.parametrize(
-    "tried",
-    [without_a_certificate, of_a_foreign_authority],
-    ids=lambda tried: tried.__name__,
-)
-def test_rejected_clients(
-    tried: Callable[[Site, Site, str], zenoh.Session], site: Site, stranger: Site, endpoint: str
-) -> None:
-    with pytest.raises(zenoh.ZError), tried(site, stranger, endpoint):
-        pass
-    with connect(site.bus(DRIVER), endpoint):  # a valid client is accepted
+    with pytest.raises(zenoh.ZError):
+        connect(ours, endpoint, enable_mtls=False)
+    with pytest.raises(zenoh.ZError):
+        connect(msgspec.structs.replace(stranger.bus(DRIVER), ca=ours.ca), endpoint)
+    with connect(ours, endpoint):  # a valid client is accepted
         pass
 
 

@@ -1,9 +1,8 @@
 """The authority's folder: file modes, atomic writes and locking."""
 
+import fcntl
 import os
 import stat
-import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from cli.keys.store import Folder, locked
 from common.errors import RobotError
 from common.members import Members, Profile
 from tests.cli.keys.site_fixture import member, members
-from verification.harness.waiting import wait_until
 
 SPAN = 1.8e9, 1.8e9 + 10 * DAY_S
 ROBOT = profile("robot", "001")
@@ -117,28 +115,9 @@ def test_a_full_disk_or_ctrl_c_keeps_the_old_list(
     assert not [file for file in folder.path.iterdir() if file.name.startswith(".")]
 
 
-def in_a_thread(call: Callable[[], None]) -> threading.Thread:
-    thread = threading.Thread(target=call, daemon=True)
-    thread.start()
-    return thread
-
-
-def test_concurrent_commands_wait_for_the_lock(folder: Folder) -> None:
-    entered: list[str] = []
-
-    def second() -> None:
-        with locked(folder.path):
-            entered.append("second")
-
-    with locked(folder.path):
-        thread = in_a_thread(second)
-        wait_until(lambda: waits_for_a_lock(), "the second command to wait")
-        entered.append("first")
-    thread.join()
-    assert entered == ["first", "second"]
-
-
-def waits_for_a_lock() -> bool:
-    """Return whether a thread of this process waits for a file lock."""
-    lines = Path("/proc/locks").read_text(encoding="ascii").splitlines()
-    return any("->" in line and f" {os.getpid()} " in line for line in lines)
+def test_a_command_locks_the_folder(folder: Folder) -> None:
+    descriptor = os.open(folder.path, os.O_RDONLY)
+    with locked(folder.path), pytest.raises(BlockingIOError):
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    os.close(descriptor)
