@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from common import clock, keys
+from common import keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.client import (
@@ -118,9 +118,7 @@ class Robot:
         self.driver_lock.lapse()
         self._requests.stop()
         self.bus.estop()
-        state = self.telemetry.newest(keys.SAFETY, clock.now_ns())
-        is_latched = state is not None and "estop" in state.latched  # a page repeats its requests
-        if not self._estop.is_pending and not is_latched:
+        if not self._estop.is_pending:  # a page repeats its requests
             self._log.warning("emergency stop", requested_by=requested_by)
         self._estop.start()
 

@@ -1,7 +1,5 @@
 """The driver of one robot on the dashboard: overruled by another source, or without permission."""
 
-from typing import Any
-
 import pytest
 
 from common import keys
@@ -79,18 +77,6 @@ def test_a_driver_who_is_overruled_must_let_go_first(fixture: RobotFixture) -> N
     assert fixture.is_held()
 
 
-def test_a_driver_who_takes_over_is_not_overruled(fixture: RobotFixture) -> None:
-    fixture.ticks(OVERRULED_TICKS - 1, "nav")  # until our first requests are decided
-    fixture.ticks(40, "web")
-    assert fixture.is_held()
-
-
-def test_nobody_is_overruled_who_holds_no_control(fixture: RobotFixture) -> None:
-    fixture.ticks(20, "nav", held=False)
-    assert fixture.overruled_by() is None
-    assert fixture.robot.driver_state().other == "nav"
-
-
 def test_a_request_echoes_what_the_driver_was_shown_and_a_zero_the_newest(
     fixture: RobotFixture,
 ) -> None:
@@ -114,40 +100,19 @@ def test_a_release_is_requested_after_a_neutral_request(fixture: RobotFixture) -
             assert requests.last.release == expected
 
 
-def test_an_unconfirmed_estop_is_reported(fixture: RobotFixture) -> None:
+def test_an_unconfirmed_estop_is_reported_and_a_viewer_has_no_driver(
+    fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fixture.robot.estop("a test")
     fixture.ticks(ESTOP_TICKS, None)
     assert fixture.notices == [("error", "estop_unconfirmed", "")]
-
-
-def test_a_repeated_estop_is_logged_once(
-    fixture: RobotFixture, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A page sends it by WebSocket and by POST, and repeats it until it sees the latch."""
-    fixture.robot.estop("a page")
-    fixture.robot.estop("a page")
-    fixture.latched = ("estop",)
-    fixture.ticks(3, None)
-    monkeypatch.setattr("common.clock.now_ns", lambda: fixture.now_ns)
-    fixture.robot.estop("a page")
-    assert [record.getMessage() for record in caplog.records].count("emergency stop") == 1
-    fixture.ticks(1, None)
-    fixture.latched = ()
-    fixture.ticks(1, None)
-    fixture.robot.estop("a page")
-    assert [record.getMessage() for record in caplog.records].count("emergency stop") == 2
-
-
-def test_a_viewer_has_no_driver(fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert fixture.robot.may_drive
     monkeypatch.setattr(Publisher, "passed_on", False)
     fixture.ticks(DENIED_AFTER, None)
     driver = fixture.robot.driver_state()
     assert (driver.may, driver.id) == (False, None)
-    assert fixture.notices == [("error", "barred", "")]
     fixture.robot.estop("a test")
     fixture.ticks(ESTOP_TICKS, None)
-    assert fixture.notices[1:] == [("error", "estop_denied", "")]
+    assert fixture.notices[1:] == [("error", "barred", ""), ("error", "estop_denied", "")]
 
 
 @pytest.fixture
@@ -160,33 +125,24 @@ def reset(fixture: RobotFixture) -> RobotFixture:
     return fixture
 
 
-def answer(fixture: RobotFixture, **fields: int) -> None:
-    done: dict[str, Any] = {"text": "Reset.", "boot": 0, "heartbeat": 3, "cleared": (CONTACT.id,)}
-    fixture.bus.answers[-1][0](ResetDone(**done | fields))
-
-
-def test_a_reset_names_what_the_screen_showed(reset: RobotFixture) -> None:
-    assert reset.bus.asked == [(keys.RESET.path, ResetRequest(echo=1, causes=(CONTACT.id,)))]
-
-
 @pytest.mark.parametrize(
-    ("latched", "notice"),
-    [((), ("info", "Reset.", "reset_done")), (("estop",), ("warning", "Reset.", "reset_partial"))],
+    ("boot", "latched", "notice"),
+    [
+        (0, (), ("info", "Reset.", "reset_done")),
+        (0, ("estop",), ("warning", "Reset.", "reset_partial")),
+        (1, (), ("error", "reset_unconfirmed", "")),  # an answer that is not safety's
+    ],
 )
 def test_a_reset_is_confirmed_by_the_state_of_safety(
-    reset: RobotFixture, latched: tuple[str, ...], notice: tuple[str, str, str]
+    reset: RobotFixture, boot: int, latched: tuple[str, ...], notice: tuple[str, str, str]
 ) -> None:
-    answer(reset)
+    assert reset.bus.asked == [(keys.RESET.path, ResetRequest(echo=1, causes=(CONTACT.id,)))]
+    done = ResetDone(text="Reset.", boot=boot, heartbeat=3, cleared=(CONTACT.id,))
+    reset.bus.answers[-1][0](done)
     assert reset.notices == []
     reset.latched = latched
-    reset.ticks(1, "web")
+    reset.ticks(40 if boot else 1, "web")
     assert reset.notices == [notice]
-
-
-def test_an_answer_that_is_not_safetys_is_not_confirmed(reset: RobotFixture) -> None:
-    answer(reset, boot=1)
-    reset.ticks(40, "web")
-    assert reset.notices == [("error", "reset_unconfirmed", "")]
 
 
 def test_a_refusal_is_reported(reset: RobotFixture) -> None:
