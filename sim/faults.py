@@ -1,8 +1,7 @@
 """Simulated cable: one direction between board and PC, with datagram faults.
 
-Faults apply to each datagram in this order: dropped, corrupted, sent from a foreign address,
-duplicated, queued by the rate limit, delayed. Datagrams without delay are delivered at once and in
-order.
+Faults apply to each datagram in this order: dropped, corrupted, duplicated, queued by the rate
+limit, delayed. Datagrams without delay are delivered at once and in order.
 """
 
 import heapq
@@ -24,7 +23,6 @@ class Datagram:
 
     payload: bytes
     port: int  # of the PC, in ``board.listen_ports``
-    foreign: bool = False  # comes from an address that is not the sender's own
 
 
 class Cable:
@@ -48,8 +46,6 @@ class Cable:
             return
         if self._happens(faults.corrupt):
             datagram = replace(datagram, payload=self._flip(datagram.payload))
-        if self._happens(faults.foreign):
-            datagram = replace(datagram, foreign=True)
         for _ in range(2 if self._happens(faults.duplicate) else 1):
             left_ns = self._leaves_ns(faults, len(datagram.payload), now_ns)
             if left_ns is not None:

@@ -114,7 +114,6 @@ class Line(Section, frozen=True, kw_only=True):
     duplicate: Chance = 0.0
     reorder: Chance = 0.0  # delayed until later datagrams have overtaken it
     corrupt: Chance = 0.0  # one to three bits flipped
-    foreign: Chance = 0.0  # sent from an address that is not the sender's own
     delay: Delay = 0.0  # s
     jitter: Delay = 0.0  # s, maximum additional delay
     rate: Annotated[float, Meta(ge=1e3)] | None = None  # bit/s; unlimited without any

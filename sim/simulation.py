@@ -264,9 +264,7 @@ class Simulation:
 
     def _receive(self, now_ns: int) -> None:
         for datagram in self.to_board.take(now_ns):
-            if datagram.foreign:
-                self.counters["foreign"] += 1
-            elif self._silent(now_ns):
+            if self._silent(now_ns):
                 self.counters["unheard"] += 1
             else:
                 self._read(datagram, now_ns)
@@ -308,8 +306,6 @@ class Simulation:
                 self.to_pc.put(datagram, now_ns)
 
     def _record_bumper(self, datagram: Datagram, now_ns: int) -> None:
-        if datagram.foreign:
-            return
         for part in framing.read(datagram.payload, r.FROM_BOARD):
             if not isinstance(part, Received) or not isinstance(part.frame, r.BumperReport):
                 continue

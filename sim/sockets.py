@@ -27,13 +27,12 @@ _replies = msgspec.json.Decoder(Reply)
 
 
 class BoardSocket:
-    """The board's socket, and a second one that plays a foreign sender."""
+    """The board's socket."""
 
     def __init__(self, board: Board) -> None:
         self._ports = board.listen_ports
         self._pc = board.listen_address
         self.sock = bound(board.address, board.port, "board.port")
-        self._foreign = _foreign_socket(board.address)
         self.unsent = 0
 
     def receive(self) -> Iterator[tuple[bytes, int | None]]:
@@ -44,16 +43,14 @@ class BoardSocket:
 
     def send(self, datagram: Datagram) -> None:
         """Send to a port of the PC; count errors."""
-        sock = self._foreign if datagram.foreign else self.sock
         try:
-            sock.sendto(datagram.payload, (self._pc, datagram.port))
+            self.sock.sendto(datagram.payload, (self._pc, datagram.port))
         except OSError:
             self.unsent += 1
 
     def close(self) -> None:
-        """Close the sockets."""
+        """Close the socket."""
         self.sock.close()
-        self._foreign.close()
 
 
 class ControlSocket:
@@ -136,12 +133,3 @@ def drain(sock: socket.socket) -> Iterator[tuple[bytes, tuple[str, int]]]:
         for _ in range(BURST):
             payload, address = sock.recvfrom(LARGEST)
             yield payload, address
-
-
-def _foreign_socket(address: str) -> socket.socket:
-    """Return a socket with another loopback address, or another port on other networks."""
-    if address.startswith("127."):
-        other = "127.0.0.2" if address != "127.0.0.2" else "127.0.0.3"
-        with contextlib.suppress(LinkError):  # not every system has the whole of 127.0.0.0/8
-            return bound(other, 0, "board.address")
-    return bound(address, 0, "board.address")

@@ -19,7 +19,7 @@ from common.wire.commands import BumperQuery, MotionCommand, MotionKind
 from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
 from sim.__main__ import main
-from sim.requests import Bumper, Place, PowerCycle, Wire
+from sim.requests import Bumper, Place, PowerCycle
 from sim.sockets import Control
 from sim.trace import read
 from tests.common.rights import needs_right
@@ -103,10 +103,6 @@ def test_a_process_streams_drives_and_is_disturbed(bench: Bench) -> None:
         assert control.truth().pressed
         with pytest.raises(MessageError, match="an obstacle is at x 4, y 0"):
             control.do(Place(x=4.0, y=0.0))
-        control.do(Wire(direction="to_pc", foreign=1.0))
-        bench.send(BumperQuery())
-        wait_until(lambda: BumperReport(True) in bench.received(), "the same from elsewhere")
-        control.do(Wire())
         control.do(PowerCycle(seconds=0.1))
         wait_until(lambda: len(bench.lines("power")) == 2, "power again")
         running.send_signal(signal.SIGINT)
@@ -117,7 +113,7 @@ def test_a_process_streams_drives_and_is_disturbed(bench: Bench) -> None:
     assert (command["kind"], command["linear"]) == ("run", 0.5)
     assert bench.lines("truth")[-1]["x"] > 0.0
     done = [line["request"]["do"] for line in bench.lines("fault")]
-    assert done == ["bumper", "place", "wire", "wire", "power_cycle"]
+    assert done == ["bumper", "place", "power_cycle"]
     assert [line["pressed"] for line in bench.lines("bumper_sent")] == [True]
     assert [line["on"] for line in bench.lines("power")] == [False, True]
 

@@ -6,7 +6,7 @@ from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Side
 from sim import trace as t
-from sim.requests import Driver, Flood, Freeze, PowerCycle, Wire
+from sim.requests import Driver, Flood, Freeze, PowerCycle
 from sim.simulation import CATCH_UP_NS
 from tests.sim.sim_fixture import PORTS, START_NS, WALL_AHEAD, SimFixture
 
@@ -29,10 +29,8 @@ def test_bad_bytes_are_counted_and_what_follows_is_heard() -> None:
 def test_nobody_else_is_obeyed() -> None:
     sim = SimFixture()
     assert sim.say(c.BumperQuery(), c.MotionCommand(c.MotionKind.RUN, 500), port=None) == []
-    sim.do(Wire(direction="to_board", foreign=1.0))
-    sim.run(0.5)
     assert sim.truth.command.kind == "stop"
-    assert sim.simulation.counters["foreign"] == 2
+    assert sim.simulation.counters["foreign"] == 1
 
 
 def test_ranges_are_renewed_at_their_own_rate() -> None:

@@ -71,8 +71,7 @@ class Vehicle:
         """Advance to the current time."""
         self.simulation.advance(self._net.now_ns)
         for datagram in self.simulation.take_sent(self._net.now_ns):
-            if not datagram.foreign:
-                self.inboxes[self.ports.index(datagram.port)].append(datagram.payload)
+            self.inboxes[self.ports.index(datagram.port)].append(datagram.payload)
 
     def take_records(self) -> list[t.Line]:
         """Return what has happened since the last call."""
