@@ -86,8 +86,8 @@ def test_commands_move_the_vehicle_until_they_end(node: RosPeer, stack: RunningS
     start = odom[-1].pose.pose.position
 
     def moved() -> bool:
-        commands.send(1.0)
-        commands.send(1.5, 0.2)  # at once: after a pause it would need zeros again
+        commands.send(0.8)
+        commands.send(0.8, 0.3)  # at once: after a pause it would need zeros again
         now = odom[-1].pose.pose.position
         return math.dist((start.x, start.y), (now.x, now.y)) > 0.1
 
@@ -131,12 +131,12 @@ def test_a_contact_is_seen_at_once_and_its_reset_is_refused(
 def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> None:
     diagnostics = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
     commands = node.commands(STAMPED)
-    commands.send(1.0)
-    commands.send(0.3, math.nan)
-    wait_until(
-        lambda: "not finite" in getattr(statuses(diagnostics).get("t2: cmd_vel"), "message", ""),
-        "the refusal",
-    )
+
+    def refused() -> bool:
+        commands.send(0.1, math.nan)
+        return "not finite" in getattr(statuses(diagnostics).get("t2: cmd_vel"), "message", "")
+
+    wait_until(refused, "the refusal")
     assert stack.speed() == 0
 
 
@@ -145,11 +145,15 @@ def test_a_killed_gateway_stops_the_vehicle_and_nothing_else(
 ) -> None:
     wait_until(lambda: reset(node), "a reset")
     commands = node.commands(PLAIN)
-    commands.send(1.0)
-    commands.send(0.7, -0.2)
-    assert stack.speed() < -0.05
+
+    def moves() -> bool:
+        commands.send(0.8)
+        commands.send(0.5, -0.2)
+        return stack.speed() < -0.05
+
+    wait_until(moves, "a motion")
     stack.kill("ros2")
-    commands.send(1.0, -0.2)
+    commands.send(0.4, -0.2)
     wait_until(lambda: stack.speed() == 0, "a standstill")
     others = {name: it.poll() for name, it in stack.processes.items() if name != "ros2"}
     assert set(others.values()) == {None}
