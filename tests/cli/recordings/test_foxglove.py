@@ -1,5 +1,6 @@
 """``t2 foxglove``: messages that a viewer receives over its WebSocket."""
 
+import _thread
 import json
 import struct
 import threading
@@ -44,6 +45,7 @@ class Viewer(threading.Thread):
                 elif printed[0] == MESSAGE_DATA:
                     # opcode, subscription, log time
                     self.message = json.loads(printed[struct.calcsize("<BIQ") :])
+                    _thread.interrupt_main()  # as Ctrl-C
 
     def _connected(self) -> ClientConnection | None:
         try:
@@ -69,7 +71,7 @@ def test_a_viewer_receives_live_messages(buses: BusFixture, tool: Tool) -> None:
     port = free_port()
     pretend(buses, "odom", {keys.ODOMETRY: samples.odometry})
     viewer = Viewer(port, f"t2/v1/{buses.robot}/tel/odom/odometry")
-    result = tool("foxglove", "--port", str(port), "--duration", "6")
+    result = tool("foxglove", "--port", str(port), "--duration", str(PATIENCE_S))
     viewer.join(PATIENCE_S)
     assert (result.code, result.err) == (0, "")
     assert f"ws://127.0.0.1:{port}" in result.out
