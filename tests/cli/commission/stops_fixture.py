@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from cli.commission.stops import Streams, find_stops
+from cli.commission.stops import Streams
 from common.freshness import NS_PER_S
 from common.messages import Message, Mileage, Motion, Velocity
 from common.motion import Command
@@ -108,11 +108,3 @@ def changed(made: Streams, change: Callable[[Velocity, float], Velocity | None])
     all_of = [(v, v.mono_ns / NS_PER_S - 10) for v in made.velocities]
     made.velocities = [new for v, now in all_of if (new := change(v, now)) is not None]
     return made
-
-
-def left(made: Streams) -> str:
-    """Return why the only stop is left out."""
-    found, reasons = find_stops(made)
-    assert not found
-    assert list(reasons.values()) == [1]
-    return next(iter(reasons))
