@@ -11,7 +11,7 @@ from msgspec import Struct
 from common.freshness import NS_PER_S
 from common.messages import SafetyState
 
-MAX_CALL_AGE_NS = NS_PER_S  # of a call to odometry or the bridge; safety has a setting
+MAX_CALL_AGE_NS = NS_PER_S  # of an operator's call
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
 CAPACITY = 256  # at 20 states a second plus immediate ones: over 10 s, more than any limit
 
@@ -35,7 +35,7 @@ class Heartbeat(Struct, frozen=True):
         age_ns = self.age_ns(echo, now_ns)
         return age_ns is None or age_ns > max_age_ns
 
-    def refusal(self, echo: int | None, now_ns: int, max_age_ns: int) -> str:
+    def refusal(self, echo: int | None, now_ns: int) -> str:
         """Return why an operator's call with this echo is refused, as text; empty if accepted."""
         if echo is None:
             return (
@@ -45,8 +45,8 @@ class Heartbeat(Struct, frozen=True):
         age_ns = self.age_ns(echo, now_ns)
         if age_ns is None:
             return "The call echoes an unknown heartbeat of safety: look again, then repeat it."
-        if age_ns > max_age_ns:
-            age_s, limit_s = age_ns / NS_PER_S, max_age_ns / NS_PER_S
+        if age_ns > MAX_CALL_AGE_NS:
+            age_s, limit_s = age_ns / NS_PER_S, MAX_CALL_AGE_NS / NS_PER_S
             return f"The call is {age_s:.1f} s old, allowed is {limit_s:g} s: repeat it."
         return ""
 
@@ -78,4 +78,4 @@ class Echoes(Struct, frozen=True):
         newest = self.heartbeat.number
         if echo is not None and echo <= newest + AHEAD:
             echo = min(echo, newest)
-        return self.heartbeat.refusal(echo, now_ns, MAX_CALL_AGE_NS)
+        return self.heartbeat.refusal(echo, now_ns)

@@ -137,7 +137,7 @@ class SafetyService:
         self._inputs = replace(self._inputs, bumper=Latest(bumper, arrival.received_ns))
         # Most samples repeat that the bumper is free, and change no verdict. But a decision counts
         # the samples since the last one: too many would look like lost ones.
-        due = bumper.seq - self._state.verdict.acked[1] >= LOST_SAMPLES
+        due = bumper.seq - self._state.verdict.judged[1] >= LOST_SAMPLES
         if due or bumper.pressed or before is None or _content(bumper) != _content(before.value):
             self._decide()
 

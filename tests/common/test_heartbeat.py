@@ -15,17 +15,17 @@ def test_an_echo_counts_up_to_its_limit() -> None:
     assert heartbeat.number == 1001
     assert not heartbeat.is_late(1001, 6 * NS_PER_S, NS_PER_S)
     assert heartbeat.is_late(1001, 6 * NS_PER_S + 1, NS_PER_S)
-    assert heartbeat.refusal(1001, 6 * NS_PER_S, NS_PER_S) == ""
-    assert "1.5 s old, allowed is 1 s" in heartbeat.refusal(1001, 13 * NS_PER_S // 2, NS_PER_S)
+    assert heartbeat.refusal(1001, 6 * NS_PER_S) == ""
+    assert "1.5 s old, allowed is 1 s" in heartbeat.refusal(1001, 13 * NS_PER_S // 2)
 
 
 def test_an_unknown_or_missing_echo_is_refused() -> None:
     heartbeat = START.beat(5 * NS_PER_S)
-    assert heartbeat.is_late(1000, 5 * NS_PER_S, NS_PER_S)
-    assert heartbeat.refusal(1000, 5 * NS_PER_S, NS_PER_S) == (
+    assert heartbeat.is_late(1000, 5 * NS_PER_S)
+    assert heartbeat.refusal(1000, 5 * NS_PER_S) == (
         "The call echoes an unknown heartbeat of safety: look again, then repeat it."
     )
-    assert heartbeat.refusal(None, 5 * NS_PER_S, NS_PER_S) == (
+    assert heartbeat.refusal(None, 5 * NS_PER_S) == (
         "The call carries no echo of safety's heartbeat: send the newest SafetyState.heartbeat "
         "as `echo`."
     )

@@ -28,7 +28,7 @@ def observe_inputs(
     inputs: Inputs, settings: Safety, state: State, now_ns: int
 ) -> Iterator[Observation]:
     """Yield each cause that depends on inputs and state, present or not."""
-    acked = state.verdict.acked if state.verdict.acked != (0, 0) else None
+    judged = state.verdict.judged if state.verdict.judged != (0, 0) else None
     yield _contact(inputs)
     yield Observation("estop", _estop_received(inputs, state))
     if state.keepalives.names:
@@ -40,7 +40,7 @@ def observe_inputs(
     yield _starting(inputs, settings, state.keepalives.missing)
     yield from _link(inputs)
     yield _switches(inputs, settings)
-    yield _bumper(inputs, settings, acked, now_ns)
+    yield _bumper(inputs, settings, judged, now_ns)
     yield _bumper_lossy(inputs, "bumper_lossy" in state.latches)
     yield _silent(inputs, settings, state, now_ns)
     yield from _motion(state.motion, now_ns)
@@ -129,7 +129,7 @@ def _switches(inputs: Inputs, settings: Safety) -> Observation:
     return Observation("switches", not verified)
 
 
-def _bumper(inputs: Inputs, settings: Safety, acked: Token | None, now_ns: int) -> Observation:
+def _bumper(inputs: Inputs, settings: Safety, judged: Token | None, now_ns: int) -> Observation:
     if inputs.bumper is None:
         return Observation("bumper", False)
     if not fresh(inputs.bumper, now_ns, settings.times.bumper_age):
@@ -138,9 +138,9 @@ def _bumper(inputs: Inputs, settings: Safety, acked: Token | None, now_ns: int) 
     polls = inputs.bumper.value.lost
     if polls > LOST_POLLS:
         return Observation("bumper", True, text=f"{polls} bumper polls of 0.2 s were lost.")
-    if acked is not None and boot != acked[0]:
+    if judged is not None and boot != judged[0]:
         return Observation("bumper", True, text="The bridge has restarted.")
-    lost = acked is not None and seq - acked[1] > LOST_SAMPLES
+    lost = judged is not None and seq - judged[1] > LOST_SAMPLES
     return Observation("bumper", lost, text="Samples of the bumper were lost.")
 
 

@@ -8,7 +8,6 @@ and the release that frees it needs the reset. Causes that the reset does not na
 
 from msgspec.structs import replace
 
-from common.freshness import NS_PER_S
 from services.safety.config import Safety
 from services.safety.core.causes import (
     BARRING,
@@ -25,7 +24,6 @@ from services.safety.core.release import SIGN, Release, stopping_distance
 from services.safety.core.sources import DriveChannel
 from services.safety.core.state import Reply, State
 
-CALL_AGE_NS = NS_PER_S  # of a reset, by the heartbeat that it echoes
 BY_HAND = "Push the vehicle off by hand, then reset."
 BUMPER_FREE = "The bumper is free. Next: reset."
 LET_GO = "A release begins with a new hold: let go first."
@@ -42,7 +40,7 @@ def carry_out(
 ) -> tuple[State, Reply]:
     """Carry out a reset, or return the reason of its refusal."""
     reason = (
-        state.heartbeat.refusal(call.echo, now_ns, CALL_AGE_NS)
+        state.heartbeat.refusal(call.echo, now_ns)
         or _not_named(state, call)
         or _no_reset(state, inputs, call, settings)
         or _not_standing(inputs, settings, now_ns)

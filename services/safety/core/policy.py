@@ -75,7 +75,7 @@ class Policy:
         """Yield what to send, urgent first, then the new state; an event is handled once."""
         bumper = inputs.bumper
         if bumper is not None and bumper.value.pressed and "contact" not in state.latches:
-            hit = Verdict(command=BRAKE, acked=_acked(inputs))
+            hit = Verdict(command=BRAKE, judged=_judged(inputs))
             yield _motion(hit, inputs, state.estop, is_latched=True)
         step_s = min((now_ns - (state.decided_ns or now_ns)) / NS_PER_S, LONGEST_STEP_S)
         # 2 equivalent mutants: any step tells one decision from the next.
@@ -195,7 +195,7 @@ class Policy:
             twist=plan.twist if command is RUN else STILL,
             source=source,
             control=source if source and BARRING.isdisjoint(held) else None,
-            acked=_acked(inputs),
+            judged=_judged(inputs),
             limited_by=requested.limited_by if requested else None,
             slowed_by=plan.slowed_by,
             blocked_by=plan.blocked_by,
@@ -209,8 +209,8 @@ def _motion(verdict: Verdict, inputs: Inputs, estop: int | None, *, is_latched: 
         linear=verdict.twist.linear,
         angular=verdict.twist.angular,
         source=verdict.source,
-        judged=verdict.acked[1],
-        judged_boot=verdict.acked[0],
+        judged=verdict.judged[1],
+        judged_boot=verdict.judged[0],
         latched=is_latched,
         predecessor=inputs.link.value.latched_by if inputs.link else None,
         estop=estop,
@@ -239,7 +239,7 @@ def _failing(held: Latches) -> bool:
     return _settling(name for name in held if name != "not_stopping")
 
 
-def _acked(inputs: Inputs) -> tuple[int, int]:
+def _judged(inputs: Inputs) -> tuple[int, int]:
     if inputs.bumper is None:
         return 0, 0
     return inputs.bumper.value.boot, inputs.bumper.value.seq
