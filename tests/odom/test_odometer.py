@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +11,7 @@ import pytest
 
 from common import clock, keys
 from common import messages as m
-from common.bus.bus import Arrival, Bus
+from common.bus.bus import Bus
 from common.config import Loaded
 from common.freshness import NS_PER_S
 from common.loop import Loop
@@ -160,7 +159,7 @@ def test_a_pose_that_was_asked_late_is_refused(odometry: Odometry) -> None:
 
 
 class World:
-    """A bridge that drives an arc, a reader of what odometry makes of it, and a caller."""
+    """A bridge that drives an arc, and a reader of what odometry makes of it."""
 
     def __init__(self) -> None:
         self.received: list[m.Odometry] = []
@@ -171,10 +170,7 @@ class World:
         self.to_velocity = bus.publisher(keys.VELOCITY)
         self.to_mileage = bus.publisher(keys.MILEAGE)
         self.to_safety = bus.publisher(keys.SAFETY)
-        bus.subscribe(keys.ODOMETRY, self._on_odometry, depth=100)
-
-    def _on_odometry(self, arrival: Arrival[m.Odometry]) -> None:
-        self.received.append(arrival.message)
+        bus.subscribe(keys.ODOMETRY, lambda it: self.received.append(it.message), depth=100)
 
     def tick(self, _: int) -> None:
         self.ticks += 1
@@ -183,25 +179,13 @@ class World:
         self.to_velocity.put(m.Velocity(linear=SPEED, angular=TURNING))
         self.to_mileage.put(m.Mileage(distance=100 + SPEED * way, heading=TURNING * way, epoch=0))
 
-    def set_pose(self, request: m.PoseRequest) -> str:
-        """Set the pose; return what was replied, or the refusal."""
-        answers: list[str] = []
-        done = threading.Event()
-
-        def take(text: str) -> None:
-            answers.append(text)
-            done.set()
-
-        self.bus.call(keys.SET_POSE, request, lambda done: take(done.text), take, PATIENCE_S)
-        assert done.wait(PATIENCE_S)
-        return answers[0]
-
 
 def test_the_process_follows_the_drive_sets_the_pose_and_ends(shared_router: str) -> None:
     world, loop = World(), Loop()
-    sets = ["--set", f"bus.connect={shared_router}"]
+    answers: list[str] = []
+    command = [sys.executable, "-m", "services.odom", "--set", f"bus.connect={shared_router}"]
     with (
-        subprocess.Popen([sys.executable, "-m", "services.odom", *sets]) as process,
+        subprocess.Popen(command) as process,
         running(loop),
         bus_on(shared_router, loop, world.declare),
     ):
@@ -213,7 +197,10 @@ def test_the_process_follows_the_drive_sets_the_pose_and_ends(shared_router: str
             assert (last.linear, last.angular) == (SPEED, TURNING)
             assert (last.frame_id, last.child_frame_id, last.epoch) == ("odom", "base_link", 0)
             pose = m.PoseRequest(x=10.0, y=-5.0, heading=3.0, echo=world.ticks)
-            assert "x 10.000 m" in world.set_pose(pose)
+            take = answers.append
+            world.bus.call(keys.SET_POSE, pose, lambda done: take(done.text), take, PATIENCE_S)
+            wait_until(lambda: answers, "an answer")
+            assert "x 10.000 m" in answers[0]
             wait_until(lambda: world.received[-1].epoch == 1, "the new pose")
             assert world.received[-1].x > 5
             process.terminate()

@@ -124,7 +124,7 @@ class BumperFilter:
 
 
 def restarted(
-    before: Mileage, after: Mileage, gap_s: float, *, unbroken: bool, silent: bool = False
+    before: Mileage, after: Mileage, gap_s: float, *, unbroken: bool, silent: bool
 ) -> bool:
     """Return whether the board's counters jumped, ``gap_s`` after the last sample.
 

@@ -17,20 +17,13 @@ def ports(count: int = 2) -> Ports:
 
 
 @pytest.mark.parametrize("port", [0, 1])
-def test_the_first_frame_of_a_kind_is_taken_from_either_port(port: int) -> None:
-    made = ports()
+def test_a_kind_is_taken_from_its_first_port_until_that_is_silent(port: int) -> None:
+    made, other = ports(), 1 - port
     assert made.takes(BumperReport, port, NS_PER_S)
     assert made.streams == {BumperReport: Stream(port, NS_PER_S)}
-    assert not made.takes(BumperReport, 1 - port, NS_PER_S)
-    assert made.takes(BumperReport, port, NS_PER_S)
-
-
-def test_the_other_port_takes_over_when_its_kind_is_silent() -> None:
-    made = ports()
-    made.takes(BumperReport, 0, NS_PER_S)
-    assert not made.takes(BumperReport, 1, NS_PER_S + FAILOVER)
-    assert made.takes(BumperReport, 1, NS_PER_S + FAILOVER + 1)
-    assert not made.takes(BumperReport, 0, NS_PER_S + FAILOVER + 2)
+    assert not made.takes(BumperReport, other, NS_PER_S + FAILOVER)
+    assert made.takes(BumperReport, other, NS_PER_S + FAILOVER + 1)
+    assert not made.takes(BumperReport, port, NS_PER_S + FAILOVER + 2)
 
 
 def test_commands_leave_from_the_port_of_the_velocity() -> None:

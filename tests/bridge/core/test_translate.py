@@ -34,16 +34,6 @@ def by_manual() -> Translator:
     return Translator(Wire(), Vehicle(), 1.0, 1.0)
 
 
-@pytest.fixture
-def by_driver() -> Translator:
-    return Translator(
-        Wire(command_angular_unit="milliradian", feedback_angular_unit="milliradian"),
-        Vehicle(),
-        1.0,
-        1.0,
-    )
-
-
 def run(linear: float, angular: float) -> Motion:
     return Motion(command=Command.RUN, linear=linear, angular=angular)
 
@@ -83,25 +73,18 @@ def test_each_way_has_a_unit_of_its_own(
     assert mixed.velocity(VelocityReport(0, 300)).angular == pytest.approx(angular)
 
 
-def test_the_widest_settings_still_fit_fifteen_bits() -> None:
-    wide = Translator(
-        Wire(command_angular_unit="milliradian", feedback_angular_unit="milliradian"),
-        Vehicle(),
-        100.0,
-        100.0,
-    )
-    frame = wide.command(Command.RUN, run(32.0, 99.0))
-    assert (frame.linear_mmps, frame.angular_raw) == (32000, 32767)
-
-
 @pytest.mark.parametrize(
-    ("order", "kind"), [(Command.STOP, MotionKind.STOP), (Command.BRAKE, MotionKind.BREAK)]
+    ("order", "motion", "kind"),
+    [
+        (Command.STOP, run(1.0, 1.0), MotionKind.STOP),
+        (Command.BRAKE, run(1.0, 1.0), MotionKind.BREAK),
+        (Command.RUN, None, MotionKind.RUN),
+    ],
 )
-def test_stop_and_brake_carry_no_velocity(
-    by_manual: Translator, order: Command, kind: MotionKind
+def test_what_carries_no_velocity(
+    by_manual: Translator, order: Command, motion: Motion | None, kind: MotionKind
 ) -> None:
-    assert by_manual.command(order, run(1.0, 1.0)) == MotionCommand(kind, 0, 0)
-    assert by_manual.command(order) == MotionCommand(kind, 0, 0)
+    assert by_manual.command(order, motion) == MotionCommand(kind, 0, 0)
 
 
 @given(st.integers(-5000, 5000), st.integers(-5729, 5729))
@@ -122,13 +105,10 @@ def test_a_velocity_that_no_vehicle_has_is_refused(
         by_manual.velocity(frame)
 
 
-def test_the_fastest_plausible_velocity_is_taken(by_driver: Translator) -> None:
-    velocity = by_driver.velocity(VelocityReport(-5000, 10_000))
+def test_the_fastest_plausible_velocity_is_taken() -> None:
+    by_driver = Wire(feedback_angular_unit="milliradian")
+    velocity = Translator(by_driver, Vehicle(), 1.0, 1.0).velocity(VelocityReport(-5000, 10_000))
     assert (velocity.linear, velocity.angular) == (-5.0, 10.0)
-
-
-def test_a_run_without_a_motion_carries_no_velocity(by_manual: Translator) -> None:
-    assert by_manual.command(Command.RUN) == MotionCommand(MotionKind.RUN, 0, 0)
 
 
 def test_mileage(by_manual: Translator) -> None:
@@ -177,58 +157,61 @@ def test_a_hit_needs_one_sample_and_clear_three(samples: str, levels: str, hits:
 # --- counters that restarted ----------------------------------------------------------------------
 
 
-def at(distance: float, degrees: float = 0.0) -> Mileage:
-    return Mileage(distance=distance, heading=math.radians(degrees), epoch=0)
+def at(distance: float, heading: float = 0.0) -> Mileage:
+    return Mileage(distance=distance, heading=heading, epoch=0)
+
+
+def deg(distance: float, degrees: float) -> Mileage:
+    return at(distance, math.radians(degrees))
+
+
+NEAR_M, NEAR_RAD = ZERO_M + DRIVEN_MPS * 0.1, ZERO_RAD + TURNED_RADPS * 0.1
+STEP_M, STEP_RAD = STEP_TO_ZERO + DRIVEN_MPS * 0.1, STEP_TO_ZERO + TURNED_RADPS * 0.1
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "gap_s", "anew"),
+    ("before", "after", "gap_s", "unbroken", "anew"),
     [
         # to zero: sooner than any driving
-        (at(5.0), at(0.0), 0.02, True),
-        (at(-5.0), at(0.0), 0.02, True),
-        (at(0.0, -179.0), at(0.0), 0.02, True),
-        (at(0.051), at(0.0), 0.02, True),
-        (at(0.049), at(0.0), 0.02, False),
-        (at(0.051), at(0.0051), 0.02, False),
-        (at(0.051), at(0.0, 0.6), 0.02, False),
-        (at(0.0, 3.5), at(0.0), 0.02, True),
-        (at(0.0, 3.4), at(0.0), 0.02, False),
+        (at(-5.0), at(0.0), 0.02, False, True),
+        (deg(0.0, -179.0), at(0.0), 0.02, False, True),
+        (at(0.051), at(0.0), 0.02, False, True),
+        (at(0.049), at(0.0), 0.02, False, False),
+        (at(0.051), at(0.0051), 0.02, False, False),
+        (at(0.051), deg(0.0, 0.6), 0.02, False, False),
+        (deg(0.0, 3.5), at(0.0), 0.02, False, True),
+        (deg(0.0, 3.4), at(0.0), 0.02, False, False),
+        (at(0.3), at(ZERO_M), 0.1, True, True),
+        (at(0.3), at(0.0, ZERO_RAD), 0.1, True, True),
+        (at(STEP_M), at(0.0), 0.1, True, False),
+        (at(0.0, STEP_RAD), at(0.0), 0.1, True, False),
         # through zero, with samples missing
-        (at(0.3), at(0.0), 0.2, False),
-        (at(0.33), at(0.0), 0.2, True),
-        (at(0.33), at(0.0), 60.0, True),
+        (at(0.3), at(0.0), 0.2, False, False),
+        (at(0.33), at(0.0), 0.2, False, True),
+        (at(0.33), at(0.0), 60.0, False, True),
+        (at(0.33), at(0.0), 60.0, True, True),
         # anywhere: further than the vehicle can have moved
-        (at(5.0), at(6.099), 0.02, False),
-        (at(5.0), at(6.101), 0.02, True),
-        (at(5.0), at(6.9), 0.2, False),
-        (at(5.0), at(7.1), 0.2, True),
-        (at(5.0), at(7.1), 60.0, True),
-        (at(5.0, 0.0), at(5.0, 62.0), 0.02, False),
-        (at(5.0, 0.0), at(5.0, 64.0), 0.02, True),
-        # the wrap is no jump
-        (at(5.0, 179.9), at(5.0, -179.9), 0.02, False),
+        (at(5.0), at(6.099), 0.02, False, False),
+        (at(5.0), at(6.101), 0.02, False, True),
+        (at(5.0), at(6.9), 0.2, False, False),
+        (at(5.0), at(7.1), 60.0, False, True),
+        (deg(5.0, 0.0), deg(5.0, 62.0), 0.02, False, False),
+        (deg(5.0, 0.0), deg(5.0, 64.0), 0.02, False, True),
+        (at(0.0), at(STEP + FAST_MPS * 0.1), 0.1, True, False),
+        (at(0.0), at(0.0, STEP + FAST_RADPS * 0.1), 0.1, True, False),
+        (at(5.0, 1.5), at(5.0, 1.5), 0.1, True, False),
+        (deg(5.0, 179.9), deg(5.0, -179.9), 0.02, False, False),  # the wrap is no jump
+        # counters alone that were silent went on as far as it can drive
+        (at(5.0), at(25.9), 4.0, True, False),
+        (at(5.0), at(26.1), 4.0, True, True),
+        (deg(5.0, 0.0), deg(5.0, 179.0), 4.0, True, False),
+        (deg(5.0, 0.0), deg(5.0, 64.0), 0.02, True, True),
     ],
 )
-def test_restarted(before: Mileage, after: Mileage, gap_s: float, anew: bool) -> None:
-    assert restarted(before, after, gap_s, unbroken=False) is anew
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "gap_s", "anew"),
-    [
-        (at(5.0), at(25.9), 4.0, False),
-        (at(5.0), at(26.1), 4.0, True),
-        (at(5.0, 0.0), at(5.0, 179.0), 4.0, False),
-        (at(5.0, 0.0), at(5.0, 62.0), 0.02, False),
-        (at(5.0, 0.0), at(5.0, 64.0), 0.02, True),
-        (at(0.33), at(0.0), 60.0, True),
-    ],
-)
-def test_counters_alone_that_were_silent_went_on_as_far_as_it_can_drive(
-    before: Mileage, after: Mileage, gap_s: float, anew: bool
+def test_restarted(
+    before: Mileage, after: Mileage, gap_s: float, unbroken: bool, anew: bool
 ) -> None:
-    assert restarted(before, after, gap_s, unbroken=True) is anew
+    assert restarted(before, after, gap_s, unbroken=unbroken, silent=False) is anew
 
 
 @pytest.mark.parametrize(
@@ -242,44 +225,20 @@ def test_counters_alone_that_were_silent_went_on_as_far_as_it_can_drive(
         (at(0.06), at(0.03), False),  # it drove past the place where it was powered on
         (at(0.4), at(0.154), True),
         (at(0.4), at(0.156), False),  # a board that came back cannot have counted so much
-        (at(0.0, -20.0), at(0.0, 7.0), True),
-        (at(0.0, 12.7), at(0.0, 0.0), True),
-        (at(0.0, 12.5), at(0.0, 0.0), False),
-        (at(0.2, 24.0), at(0.1, 11.3), True),
-        (at(0.2, 24.0), at(0.1, 11.5), False),
+        (deg(0.0, -20.0), deg(0.0, 7.0), True),
+        (deg(0.0, 12.7), at(0.0), True),
+        (deg(0.0, 12.5), at(0.0), False),
+        (deg(0.2, 24.0), deg(0.1, 11.3), True),
+        (deg(0.2, 24.0), deg(0.1, 11.5), False),
+        (at(1.0), at(NEAR_M), True),
+        (at(1.0, 1.0), at(0.0, NEAR_RAD), True),
+        (at(0.0, 1.0), at(0.0, 0.5), False),
+        (at(STEP_M), at(0.0), False),
+        (at(0.0, STEP_RAD), at(0.0), False),
     ],
 )
 def test_after_a_silence_counters_that_are_nearer_to_zero_have_begun_anew(
     before: Mileage, after: Mileage, anew: bool
 ) -> None:
     assert restarted(before, after, 0.1, unbroken=True, silent=True) is anew
-    assert not restarted(before, after, 0.15, unbroken=True)
-
-
-def counted(distance: float, heading: float = 0.0) -> Mileage:
-    return Mileage(distance=distance, heading=heading, epoch=0)
-
-
-NEAR_M, NEAR_RAD = ZERO_M + DRIVEN_MPS * 0.1, ZERO_RAD + TURNED_RADPS * 0.1
-STEP_M, STEP_RAD = STEP_TO_ZERO + DRIVEN_MPS * 0.1, STEP_TO_ZERO + TURNED_RADPS * 0.1
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "silent", "anew"),
-    [
-        (counted(0.3), counted(ZERO_M), False, True),
-        (counted(0.3), counted(0.0, ZERO_RAD), False, True),
-        (counted(STEP_M), counted(0.0), False, False),
-        (counted(0.0, STEP_RAD), counted(0.0), False, False),
-        (counted(0.0), counted(STEP + FAST_MPS * 0.1), False, False),
-        (counted(0.0), counted(0.0, STEP + FAST_RADPS * 0.1), False, False),
-        (counted(5.0, 1.5), counted(5.0, 1.5), False, False),
-        (counted(1.0), counted(NEAR_M), True, True),
-        (counted(1.0, 1.0), counted(0.0, NEAR_RAD), True, True),
-        (counted(0.0, 1.0), counted(0.0, 0.5), True, False),
-        (counted(STEP_M), counted(0.0), True, False),
-        (counted(0.0, STEP_RAD), counted(0.0), True, False),
-    ],
-)
-def test_the_limits_of_a_restart(before: Mileage, after: Mileage, silent: bool, anew: bool) -> None:
-    assert restarted(before, after, 0.1, unbroken=True, silent=silent) is anew
+    assert not restarted(before, after, 0.15, unbroken=True, silent=False)

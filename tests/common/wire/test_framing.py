@@ -38,14 +38,10 @@ def rejected(parts: Sequence[Received | Rejected]) -> list[Reason]:
 # --- whole frames ---------------------------------------------------------------------------
 
 
-@given(commands)
-def test_every_command_comes_back(frame: Frame) -> None:
-    assert frames(read(framing.pack(frame), TO_BOARD)) == [frame]
-
-
-@given(reports)
-def test_every_report_comes_back(frame: Frame) -> None:
-    assert frames(read(framing.pack(frame), FROM_BOARD)) == [frame]
+@given(commands, reports)
+def test_every_frame_comes_back(command: Frame, report: Frame) -> None:
+    for frame, kinds in (command, TO_BOARD), (report, FROM_BOARD):
+        assert frames(read(framing.pack(frame), kinds)) == [frame]
 
 
 @given(st.lists(st.tuples(garbage, reports), max_size=6), garbage)
