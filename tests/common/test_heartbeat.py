@@ -21,7 +21,7 @@ def test_an_echo_counts_up_to_its_limit() -> None:
 
 def test_an_unknown_or_missing_echo_is_refused() -> None:
     heartbeat = START.beat(5 * NS_PER_S)
-    assert heartbeat.is_late(1000, 5 * NS_PER_S)
+    assert heartbeat.is_late(1000, 5 * NS_PER_S, NS_PER_S)
     assert heartbeat.refusal(1000, 5 * NS_PER_S) == (
         "The call echoes an unknown heartbeat of safety: look again, then repeat it."
     )
