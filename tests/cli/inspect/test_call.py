@@ -12,7 +12,7 @@ from cli.inspect import client
 from common import codec, keys
 from common import messages as m
 from common.bus.bus import Bus, Caller
-from tests.cli.inspect.tool import Tool, pretend
+from tests.cli.inspect.tool import FakeSafety, Tool, pretend
 from tests.common.bus_fixture import BusFixture
 
 CONTACT = m.Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=41)
@@ -22,17 +22,20 @@ Serve = tuple[keys.Call[Any, Any], Callable[..., None]]
 NOT_CONFIRMED = "not confirmed: safety's state does not show this reset"
 
 
-class Safety:
-    """Publishes a state whose heartbeat rises, and serves calls as configured."""
+class Safety(FakeSafety):
+    """A safety service with a latched contact, which serves calls as configured."""
 
     def __init__(self, buses: BusFixture, *serves: Serve) -> None:
-        self.heartbeat = 100
-        self.latched = True
         self.asked: list[Any] = []
         self._serves = serves
-        self.bus = pretend(buses, "safety", {keys.SAFETY: self.state}, self.declare)
+        contact: dict[str, Any] = {
+            "verdict": "brake",
+            "latched": ("contact",),
+            "causes": (CONTACT, IDLE),
+        }
+        super().__init__(buses, self.serve, **contact)
 
-    def declare(self, bus: Bus) -> None:
+    def serve(self, bus: Bus) -> None:
         for call, answer in self._serves:
             bus.serve(call, partial(self.take, answer))
 
@@ -40,18 +43,10 @@ class Safety:
         self.asked.append(request)
         answer(self, caller)
 
-    def state(self) -> m.SafetyState:
-        self.heartbeat += 1
-        causes = (CONTACT, IDLE) if self.latched else (IDLE,)
-        return m.SafetyState(
-            verdict="brake", latched=("contact",) * self.latched, causes=causes, source=None,
-            heartbeat=self.heartbeat, text="", limits=m.Limits(forward=0, backward=0, angular=0),
-        )  # fmt: skip
-
 
 def obey(safety: Safety, caller: Caller[m.ResetDone]) -> None:
     """Clear the causes, and answer with them."""
-    safety.latched = False
+    safety.fields = {"causes": (IDLE,)}
     done = m.ResetDone(
         text="Reset.", boot=safety.bus.boot, heartbeat=safety.heartbeat + 1, cleared=(41,)
     )

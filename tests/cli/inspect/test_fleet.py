@@ -10,37 +10,18 @@ from cli.inspect import estop, robots
 from cli.inspect.client import SafetyClient
 from common import client as machine
 from common import keys
-from common.bus.bus import Bus
 from common.cli_args import EXIT_LINK
-from common.messages import Limits, SafetyState, Velocity
-from tests.cli.inspect.tool import Tool, pretend
+from common.messages import Velocity
+from tests.cli.inspect.tool import FakeSafety, Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import router_process
 from verification.harness.ports import free_port
 
 Join = Callable[[str], BusFixture]
-LIMITS = Limits(forward=0.0, backward=0.0, angular=0.0)
 
 
-class Robot:
-    """Safety of one robot; it latches on an emergency stop if ``obeys``."""
-
-    def __init__(self, buses: BusFixture, obeys: bool = True) -> None:
-        self.stops: list[int] = []
-        self._obeys = obeys
-        pretend(buses, "safety", {keys.SAFETY: self.state}, self.declare)
-
-    def declare(self, bus: Bus) -> None:
-        bus.on_any(keys.estop_key(bus.robot), self.stops.append)
-        bus.on_any(keys.DRIVE.on(bus.robot, source="web"), lambda _: None)
-
-    def state(self) -> SafetyState:
-        latched = bool(self.stops) and self._obeys
-        return SafetyState(
-            verdict="brake" if latched else "run", latched=("estop",) if latched else (),
-            causes=(), source=None if latched else "web", limits=LIMITS, heartbeat=1,
-            text="Emergency stop." if latched else "Drives.",
-        )  # fmt: skip
+def robot(buses: BusFixture, obeys: bool = True) -> FakeSafety:
+    return FakeSafety(buses, obeys=obeys, source="web", text="Drives.")
 
 
 @pytest.fixture
@@ -66,20 +47,20 @@ def t2(shared_router: str, capsys: pytest.CaptureFixture[str]) -> Tool:
 
 
 def test_stop_of_one_site(join: Join, t2: Tool) -> None:
-    berlin = [Robot(join(name)) for name in ("berlin-001", "berlin-002")]
-    others = [Robot(join(name)) for name in ("munich-001", "berlinale-001", "001")]
+    berlin = [robot(join(name)) for name in ("berlin-001", "berlin-002")]
+    others = [robot(join(name)) for name in ("munich-001", "berlinale-001", "001")]
     result = t2("estop", "--site", "berlin")
     assert (result.code, result.err) == (0, "")
     assert [line.split()[1] for line in result.out.splitlines()] == ["berlin-001", "berlin-002"]
-    assert all(robot.stops for robot in berlin)
-    assert not any(robot.stops for robot in others)
+    assert all(each.stops for each in berlin)
+    assert not any(each.stops for each in others)
 
 
 def test_unconfirmed_robots_are_named(
     join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    Robot(join("berlin-001"))
-    Robot(join("berlin-002"), obeys=False)
+    robot(join("berlin-001"))
+    robot(join("berlin-002"), obeys=False)
     pretend(join("berlin-003"), "bridge", {})  # its safety has died
     pretend(join("berlin-004"), "dashboard", {})  # a laptop
     monkeypatch.setattr(machine, "ESTOP_TICKS", 20)
@@ -97,13 +78,13 @@ def test_a_driver_of_some_robots_stops_them_by_name(
     join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Access rules allow the keys of its own robots, but not a key expression."""
-    robot = Robot(join("berlin-001"))
+    stopped = robot(join("berlin-001"))
     order = SafetyClient.order_stop
     monkeypatch.setattr(
         SafetyClient, "order_stop", lambda self, to: None if "*" in to else order(self, to)
     )
     assert t2("estop", "--all").code == 0
-    assert robot.stops
+    assert stopped.stops
 
 
 def test_stop_of_an_empty_site(t2: Tool) -> None:
@@ -158,9 +139,9 @@ def test_invalid_arguments(words: tuple[str, ...], phrase: str, t2: Tool) -> Non
 
 def test_list_of_robots(join: Join, t2: Tool) -> None:
     one = join("berlin-001")
-    Robot(one)
+    robot(one)
     pretend(one, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
-    Robot(join("munich-001"))
+    robot(join("munich-001"))
     result = t2("robots")
     assert (result.code, result.err) == (0, "")
     first, second = result.lines

@@ -11,8 +11,9 @@ from cli.__main__ import main
 from common import keys
 from common.bus.bus import Bus
 from common.keys import Topic
-from common.messages import Health, Message
+from common.messages import Health, Message, SafetyState
 from tests.common.bus_fixture import BusFixture
+from tests.factories import safety_state
 
 
 @dataclass(frozen=True)
@@ -82,3 +83,34 @@ def pretend(
     bus = buses.bus(everything)
     buses.loop.post(lambda: buses.loop.every(1 / hz, put))
     return bus
+
+
+class FakeSafety:
+    """A safety service with these fields of its state, whose heartbeat rises.
+
+    It latches an emergency stop if it ``obeys``.
+    """
+
+    def __init__(
+        self,
+        buses: BusFixture,
+        declare: Callable[[Bus], object] = lambda _: None,
+        obeys: bool = True,
+        **fields: Any,
+    ) -> None:
+        self.stops: list[int] = []
+        self.heartbeat = 100
+        self.fields = fields
+        self._obeys = obeys
+
+        def everything(bus: Bus) -> None:
+            bus.on_any(keys.estop_key(bus.robot), self.stops.append)
+            bus.on_any(keys.DRIVE.on(bus.robot, source="web"), lambda _: None)
+            declare(bus)
+
+        self.bus = pretend(buses, "safety", {keys.SAFETY: self.state}, everything)
+
+    def state(self) -> SafetyState:
+        self.heartbeat += 1
+        stopped = {"latched": ("estop",)} if self.stops and self._obeys else {}
+        return safety_state(heartbeat=self.heartbeat, **self.fields | stopped)

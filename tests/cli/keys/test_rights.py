@@ -137,21 +137,14 @@ def test_read(sessions: Mapping[str, zenoh.Session], role: str) -> None:
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_ask(sessions: Mapping[str, zenoh.Session], role: str) -> None:
-    served = [sessions["on board"].declare_queryable(key, answer) for key in PLAIN]
-    expected = granted(role, "ask", PLAIN)
-    wait_until(lambda: asked(sessions[role], PLAIN) >= expected, "all that may be asked")
-    assert asked(sessions[role], PLAIN) == expected
-    for one in served:
-        one.undeclare()
-
-
-@pytest.mark.parametrize("role", ROLES)
-def test_serve(sessions: Mapping[str, zenoh.Session], role: str) -> None:
-    served = [sessions[role].declare_queryable(key, answer) for key in PLAIN]
-    expected = granted(role, "serve", PLAIN)
-    wait_until(lambda: asked(sessions["on board"], PLAIN) >= expected, "all that may be served")
-    assert asked(sessions["on board"], PLAIN) == expected
+@pytest.mark.parametrize("verb", ["ask", "serve"])
+def test_calls(sessions: Mapping[str, zenoh.Session], role: str, verb: Verb) -> None:
+    onboard, mine = sessions["on board"], sessions[role]
+    client, server = (mine, onboard) if verb == "ask" else (onboard, mine)
+    served = [server.declare_queryable(key, answer) for key in PLAIN]
+    expected = granted(role, verb, PLAIN)
+    wait_until(lambda: asked(client, PLAIN) >= expected, "all that is allowed")
+    assert asked(client, PLAIN) == expected
     for one in served:
         one.undeclare()
 

@@ -10,31 +10,19 @@ from tests.cli.recordings import drive_fixture
 from tests.cli.recordings.drive_fixture import HIT_S, RESET_S, drive
 
 
-@pytest.fixture
-def timeline() -> Timeline:
-    """The timeline of the recorded drive."""
-    made = Timeline()
+def test_the_timeline_of_a_drive() -> None:
+    timeline = Timeline()
     for arrival in drive():
-        made.add(*arrival)
-    return made
-
-
-def test_requested_allowed_and_measured_velocity(timeline: Timeline) -> None:
+        timeline.add(*arrival)
     assert set(timeline.linear.requested) == {"teleop"}
     assert set(timeline.linear.requested["teleop"].values) == {0.5}
     allowed = zip(timeline.linear.allowed.times, timeline.linear.allowed.values, strict=True)
     assert all((value == 0.0) == (HIT_S <= at_s < RESET_S) for at_s, value in allowed)
     assert set(timeline.angular.measured.values) == {0.1}
-
-
-def test_stop_with_reason_and_event(timeline: Timeline) -> None:
     (stop,) = timeline.stops
     assert (stop.begins_s, stop.ends_s) == (HIT_S, RESET_S)
     assert (list(stop.reasons), stop.over, stop.was_driving) == (["contact"], True, True)
     assert [(each.at_s, each.service) for each in timeline.events] == [(HIT_S, "safety")]
-
-
-def test_path_and_versions(timeline: Timeline) -> None:
     assert timeline.distance == pytest.approx(199 * 0.02)
     assert timeline.versions == {"bridge": "0.1.0"}
     assert timeline.lasted_s == pytest.approx(9.95)
