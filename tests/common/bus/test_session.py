@@ -211,8 +211,8 @@ def test_a_robots_router_downsamples_fast_streams_towards_laptops_and_nothing_on
     assert downsampling_rules("007", 50.0) == []
     config = router_config(settings.BusSettings(), robot="007")
     zenoh.Config.from_json5(json.dumps(config))  # refuses unknown fields
-    (egress,) = config["downsampling"]
-    assert [egress] == downsampling_rules("007", settings.BusSettings().laptop_rate)
+    (egress,) = downsampling_rules("007", settings.BusSettings().laptop_rate)
+    assert config["downsampling"] == [egress]
     assert (egress["flows"], egress["messages"]) == (["egress"], ["put"])
     assert egress["link_protocols"] == ["tls", "quic"]
     assert "downsampling" not in router_config(settings.BusSettings())
