@@ -11,7 +11,13 @@ pytestmark = pytest.mark.timed
 
 ROOT = Path(__file__).parents[2]
 UV = [str(Path(sys.executable).with_name("uv")), "--quiet"]
-ENVIRONMENT = {**os.environ, "PATH": os.defpath}  # without our own `t2`
+# The host may stall: other tests run.
+STALLS = {
+    f"T2__{service}__{name}": value
+    for service in ("BRIDGE", "SAFETY")
+    for name, value in (("STALL", "0.3"), ("UNSAFE_OVERRIDES", "stall"))
+}
+ENVIRONMENT = {**os.environ, **STALLS, "PATH": os.defpath}  # without our own `t2`
 ENVIRONMENT.pop("PYTHONPATH", None)
 PYTHON = ".venv/bin/python"
 FOREIGN = ("common", "services", "sim", "tests")
