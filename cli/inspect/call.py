@@ -22,8 +22,6 @@ from common.errors import RobotError
 from common.keys import CALLS, Call
 from common.messages import SafetyState
 
-HEAD = ("key", "request", "reply", "does")
-
 Request = dict[str, Any]
 
 
@@ -45,10 +43,10 @@ def run(options: argparse.Namespace) -> int:
     """Call and show the reply; return 2 if the request is invalid."""
     if not options.key:
         rows = [
-            (each.path, each.request.__name__, each.reply.__name__, each.what) for each in CALLS
-        ]
-        things = [dict(zip(HEAD, row, strict=True)) for row in rows]
-        output.rows(things, HEAD, lambda row: list(row.values()), as_json=options.json)
+            {"key": each.path, "request": each.request.__name__, "reply": each.reply.__name__,
+             "does": each.what} for each in CALLS
+        ]  # fmt: skip
+        output.rows(rows, as_json=options.json)
         return 0
     robot, below = chunks(options.key.strip("/"))
     options.robot = options.robot or robot  # of a whole key

@@ -16,8 +16,6 @@ from common.bus.publisher import host_id
 from common.errors import RobotError
 
 REPORT_S = 1.0
-HEAD = ("key", "Hz", "gap ms: min", "max", "lost", "kB/s", "bytes", "delay ms: p50", "p99", "max",
-        "clock")  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,29 +64,6 @@ def follow(
 def report(streams: dict[str, StreamStats], options: argparse.Namespace) -> None:
     """Print the figures of every key."""
     rows = [{"key": key, **stats.figures()} for key, stats in sorted(streams.items())]
-    output.rows(rows, HEAD, as_cells, as_json=options.json)
+    output.rows(rows, as_json=options.json)
     if not options.json:
         print(flush=True)
-
-
-def as_cells(row: output.Row) -> list[str]:
-    """Return one key as table cells: times in ms, sizes in bytes, bandwidth in kB/s."""
-    delay, gap = row["delay"], row["gap"]
-    return [
-        row["key"],
-        number(row["hz"]),
-        number(gap["min"], 1000),
-        number(gap["max"], 1000),
-        str(row["lost"]),
-        number(row["bytes_per_s"], 0.001),
-        number(row["bytes"]),
-        number(delay["p50"], 1000),
-        number(delay["p99"], 1000),
-        number(delay["max"], 1000),
-        row["clock"] or "-",
-    ]
-
-
-def number(value: float | None, factor: float = 1.0) -> str:
-    """Return a figure in another unit as text."""
-    return "-" if value is None else f"{value * factor:.2f}"

@@ -28,7 +28,6 @@ from common.errors import RobotError
 from common.text import printable
 
 LISTEN_S = 2.0  # two periods of the slowest streams
-HEAD = ("key", "type", "Hz", "of", "publishers", "readers")
 ROLES = {"publisher": "publishes", "subscriber": "reads", "queryable": "answers"}
 ZENOH_OWN = "@adv"  # declarations of Zenoh itself below a key
 # The router of a robot that connects to a site's router is a peer there.
@@ -83,27 +82,13 @@ def list_keys(session: BusSession, options: argparse.Namespace) -> int:
             "publishers": [each.name for each in found if declares(each.publishes, key)],
             "readers": [each.name for each in found if declares(each.reads, key)],
         })  # fmt: skip
-    output.rows(rows, HEAD, as_cells, as_json=options.json)
+    output.rows(rows, as_json=options.json)
     return 0
 
 
 def declares(declared: set[str], key: str) -> bool:
     """Return whether a key is among these keys, which may have wildcards."""
     return any(intersects(one, key) for one in declared)
-
-
-def as_cells(row: output.Row) -> list[str]:
-    """Return one stream as table cells; a topic without a rate is published on change."""
-    hz, expected_hz = row["hz"], row["expected_hz"]
-    none = "?" if row["key"].startswith("@") else "-"  # the router does not list these keys
-    return [
-        row["key"],
-        row["type"] or "?",
-        "-" if hz is None else f"{hz:.1f}",
-        "" if expected_hz is None else f"{expected_hz:g}" if expected_hz else "change",
-        ", ".join(row["publishers"]) or "?",
-        ", ".join(row["readers"]) or none,
-    ]
 
 
 # --- sessions -------------------------------------------------------------------------------------

@@ -4,14 +4,12 @@ Every table, value and JSON line of the inspection commands is printed here.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import msgspec
 
 from common.text import printable
-
-Row = Mapping[str, Any]
 
 
 def line(thing: object) -> None:
@@ -30,19 +28,23 @@ def value(thing: Any, *, as_json: bool) -> None:
     line(thing) if as_json else print(printable(fields(thing), "\n"), flush=True)
 
 
-def rows(
-    things: Iterable[Row],
-    head: Sequence[str],
-    cells: Callable[[Row], Sequence[str]],
-    *,
-    as_json: bool,
-) -> None:
-    """Print one JSON line per row, or a table whose cells ``cells`` returns."""
+def rows(things: Sequence[Mapping[str, Any]], *, as_json: bool) -> None:
+    """Print one JSON line per row, or a table with a column for each field."""
     if as_json:
         for each in things:
             line(each)
     else:
-        print(table(head, [cells(each) for each in things]), flush=True)
+        print(table(list(things[0]), [list(map(cell, each.values())) for each in things]))
+        sys.stdout.flush()
+
+
+def cell(thing: Any) -> str:
+    """Return a value as a table cell; "-" is none."""
+    if isinstance(thing, list):
+        return ", ".join(thing) or "-"
+    if isinstance(thing, float):
+        return f"{round(thing, 4):.6g}"
+    return str(thing) if thing not in (None, "") else "-"
 
 
 def json(thing: object) -> str:

@@ -19,7 +19,6 @@ from common.errors import RobotError
 from common.messages import SafetyState, Velocity
 
 LISTEN_S = 1.5  # at most; over a thin uplink a stream may have 1 Hz
-HEAD = ("robot", "services", "verdict", "m/s", "driver", "")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     if not found:
         raise RobotError("no robot found; try `t2 doctor`")
     rows = [row(name, found[name], newest) for name in sorted(found)]
-    output.rows(rows, HEAD, as_cells, as_json=options.json)
+    output.rows(rows, as_json=options.json)
     return 1 if {"silent", "no safety"} & {each["verdict"] for each in rows} else 0
 
 
@@ -77,10 +76,3 @@ def row(name: str, services: set[str], newest: Mapping[str, Sample]) -> dict[str
         "linear": velocity.linear if velocity else None,
         "text": state.text if state else "",
     }
-
-
-def as_cells(row: output.Row) -> list[str]:
-    """Return one robot as table cells."""
-    speed = "" if row["linear"] is None else f"{row['linear']:.2f}"
-    services = " ".join(row["services"])
-    return [row["robot"], services, row["verdict"], speed, row["source"] or "-", row["text"]]

@@ -59,13 +59,14 @@ class StreamStats:
         delays, span_s = sorted(self._delays_s), self._span_s()
         return {
             "hz": self.rate_hz(),
-            "gap": {"min": min(gaps, default=None), "max": max(gaps, default=None)},
+            "gap_min": min(gaps, default=None),
+            "gap_max": max(gaps, default=None),
             "lost": self.lost,
             # The first sample only starts the interval.
             "bytes_per_s": sum(sizes[1:]) / span_s if span_s else None,
             "bytes": fmean(sizes) if sizes else None,
             # With wall clocks it includes their offset.
-            "delay": {name: quantile(delays, part) for name, part in PARTS.items()},
+            **{f"delay_{name}": quantile(delays, part) for name, part in PARTS.items()},
             "clock": self.clock or None,
         }
 
