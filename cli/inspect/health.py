@@ -12,7 +12,7 @@ import msgspec
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks, decode
-from cli.inspect.diagnosis import LATE_S, NEEDED
+from cli.inspect.diagnosis import NEEDED
 from cli.inspect.session import BusSession, add_options, open_session, services
 from common import keys
 from common.errors import MessageError
@@ -20,7 +20,17 @@ from common.messages import Health
 
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
 LISTEN_S = 2.5  # two periods of the health messages, and a margin
-HEAD = ("robot", "service", "", "version", "up", "late ms", "fifo", "MB", "messages/s", "counters")
+SHOWN = (
+    "robot",
+    "service",
+    "state",
+    "version",
+    "uptime",
+    "lateness",
+    "priority",
+    "rss",
+    "counters",
+)
 REASONS = {
     "hangs": "is present and publishes no health: it hangs",
     "missing": "is not running",
@@ -51,11 +61,12 @@ def run(options: argparse.Namespace) -> int:
             rows = [Row(session.robot, ROUTER, "ok", None)]
         else:
             rows = listen(session, options.service)
+    things = list(map(as_json, rows))
     if options.json:
-        for row in rows:
-            output.line(as_json(row))
+        output.rows(things, as_json=True)
     else:
-        print(output.table(HEAD, list(map(as_cells, rows))), *notes(rows), sep="\n", flush=True)
+        output.rows([{name: each.get(name) for name in SHOWN} for each in things], as_json=False)
+        print(*notes(rows), sep="", end="", flush=True)
     unhealthy = [row for row in rows if row.state != "ok"]
     for row in unhealthy:
         output.warn(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}")
@@ -87,28 +98,7 @@ def listen(session: BusSession, service: str | None) -> list[Row]:
 def as_json(row: Row) -> dict[str, Any]:
     """Return one service as a JSON object."""
     fields = msgspec.to_builtins(row.health) if row.health else {}
-    alive, has_health = row.state in ("ok", "hangs"), row.health is not None
-    return {"robot": row.robot, "service": row.name, "alive": alive, "told": has_health} | fields
-
-
-def as_cells(row: Row) -> list[str]:
-    """Return one service as table cells."""
-    health = row.health
-    if not health:
-        return [row.robot, row.name, row.state, *[""] * 7]
-    counters = " ".join(f"{name}={count}" for name, count in sorted(health.counters.items()))
-    return [
-        row.robot,
-        row.name,
-        "stalls" if health.lateness > LATE_S else row.state,
-        health.version,
-        duration(health.uptime),
-        f"{health.lateness * 1000:.1f}",
-        str(health.priority or "-"),
-        f"{health.rss / 1e6:.0f}",
-        f"{sum(health.rates.values()):.0f}",
-        counters or "-",
-    ]
+    return {"robot": row.robot, "service": row.name, "state": row.state} | fields
 
 
 def notes(rows: list[Row]) -> Iterator[str]:
@@ -118,12 +108,5 @@ def notes(rows: list[Row]) -> Iterator[str]:
             if any(each.counts):
                 yield (
                     f"{row.name} of robot {row.robot}: {name} measured {sum(each.counts)} times, "
-                    f"worst {1e3 * each.worst:.2f} ms"
+                    f"worst {1e3 * each.worst:.2f} ms\n"
                 )
-
-
-def duration(seconds: float) -> str:
-    """Return a duration as text."""
-    minutes, rest = divmod(int(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}h{minutes:02d}m" if hours else f"{minutes}m{rest:02d}s"

@@ -157,7 +157,7 @@ def laptop_connects(stack: Stack) -> str:
     """Query safety from the laptop's container; zenohd's rules and the dashboard are closed."""
     own = {"T2_KEYS": f"{stack.keys}/viewer.anna", "T2_ROUTER": "tls/router:7447"}
     words = ("run", "--rm", "-T", "laptop", "health", "safety", "--json")
-    assert json.loads(stack.compose(*words, T2_USER="0:0", **own))["told"]
+    assert json.loads(stack.compose(*words, T2_USER="0:0", **own))["state"] == "ok"
     printed = stack["safety"].run("python", "-c", "print(open('/run/t2/router.json5').read())")
     assert json.loads(printed)["access_control"]["default_permission"] == "deny"
     page = "import urllib.request; urllib.request.urlopen('http://127.0.0.1:8080')"
