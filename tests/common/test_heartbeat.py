@@ -31,13 +31,6 @@ def test_an_unknown_or_missing_echo_is_refused() -> None:
     )
 
 
-def test_a_receiver_notes_the_numbers_that_it_saw() -> None:
-    heartbeat = Heartbeat().noted(70, NS_PER_S).noted(72, 2 * NS_PER_S)
-    assert heartbeat.number == 72
-    assert not heartbeat.is_late(70, NS_PER_S, NS_PER_S)
-    assert heartbeat.is_late(71, NS_PER_S, NS_PER_S)
-
-
 def test_heartbeats_rise_and_are_forgotten_in_the_end() -> None:
     beat = Heartbeat(1000)
     assert beat.is_late(1000, 0, 10)
