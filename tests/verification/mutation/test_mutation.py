@@ -58,11 +58,11 @@ def test_a_mark_needs_a_reason() -> None:
 @pytest.mark.campaign
 @pytest.mark.timeout(600)
 def test_a_run_finds_the_mutants_that_no_test_kills(tmp_path: Path) -> None:
-    file = "services/ros2/attachment.py"
+    file = "common/motion.py"
     count, surviving = run(file, cores()[file], tmp_path / "all")
     assert count > 10
     assert surviving == []
-    weak = "tests/ros2/test_attachment.py::test_an_attachment_has_33_bytes"
+    weak = "tests/common/test_motion.py::test_clamp"
     count, surviving = run(file, [weak], tmp_path / "weak")
     assert 0 < len(surviving) < count
     assert Path.cwd() == ROOT
