@@ -35,11 +35,8 @@ def test_every_shipped_world_can_be_started_in(name: str) -> None:
     assert load_plan(name, VEHICLE).title
 
 
-def test_the_office_has_odometry_s_coordinates() -> None:
+def test_the_office_has_odometry_s_coordinates_and_a_world_may_be_a_file(tmp_path: Path) -> None:
     assert load_plan("office", VEHICLE).start.pose == Pose(0.0, 0.0, 0.0)
-
-
-def test_a_world_may_be_a_file_anywhere(tmp_path: Path) -> None:
     assert load_plan(written(tmp_path, 'title = "mine"'), VEHICLE).title == "mine"
 
 

@@ -15,7 +15,7 @@ from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, model, room
 STEP_AHEAD = room({"name": "step", "x": 2.0, "y": 0.0, "length": 0.4, "width": 0.4, "low": True})
 
 
-def test_counters_are_what_was_really_driven() -> None:
+def test_counters_are_what_was_really_driven_and_the_distance_has_no_sign() -> None:
     sim = SimFixture()
     sim.run(1.0, 0.5)
     sim.after(10.0)
@@ -27,19 +27,12 @@ def test_counters_are_what_was_really_driven() -> None:
         r.DistanceReport(round(truth.distance * 1000), round(heading * 10))
     ]
     assert abs(truth.heading) > math.pi
-
-
-def test_the_distance_driven_has_no_sign() -> None:
-    sim = SimFixture()
-    for linear in (1.0, -1.0):
-        sim.run(linear)
-        sim.after(3.0)
-    sim.stop()
-    sim.after(2.0)
-    assert sim.truth.distance > 4.0
+    sim.run(-1.0)
+    sim.after(3.0)
+    assert sim.truth.distance > truth.distance + 2.0
     (counted,) = sim.say(c.DistanceQuery())
     assert isinstance(counted, r.DistanceReport)
-    assert counted.distance_mm < sim.truth.distance * 1000 - 1000
+    assert counted.distance_mm < truth.distance * 1000 - 2000
 
 
 def test_a_wall_holds_it_and_presses_the_bumper() -> None:
@@ -52,27 +45,20 @@ def test_a_wall_holds_it_and_presses_the_bumper() -> None:
     assert sim.say(c.BumperQuery()) == [r.BumperReport(True)]
 
 
-def test_a_low_box_gives_no_echo_but_presses_the_bumper() -> None:
+def test_a_low_box_gives_no_echo_presses_the_bumper_and_is_backed_off() -> None:
     sim = SimFixture(STEP_AHEAD)
+    sim.say(c.BumperBrakeSet(True))
     sim.run(0.5)
     sim.after(4.0)
     (ranges,) = sim.say(c.UltrasonicQuery())
     assert isinstance(ranges, r.UltrasonicReport)
     assert set(ranges.ranges_mm) == {5000}
-    assert (sim.truth.contact, sim.truth.clearance) == (True, None)
-    assert sim.truth.x == pytest.approx(1.8 - 0.55, abs=1e-3)
-
-
-def test_it_backs_off_a_step_with_its_bumper_brake_on() -> None:
-    sim = SimFixture(STEP_AHEAD)
-    sim.say(c.BumperBrakeSet(True))
-    sim.run(0.5)
-    sim.after(4.0)
-    assert sim.truth.braking
-    touching = sim.truth.x
+    touching = sim.truth
+    assert (touching.contact, touching.braking, touching.clearance) == (True, True, None)
+    assert touching.x == pytest.approx(1.8 - 0.55, abs=6e-3)  # the travel of the strip
     sim.run(-0.1)
     sim.after(1.0)
-    assert sim.truth.x < touching - 0.05
+    assert sim.truth.x < touching.x - 0.05
     assert (sim.truth.contact, sim.truth.braking) == (False, False)
 
 

@@ -21,19 +21,20 @@ def test_walls_are_lines_through_points() -> None:
     assert [(s.ax, s.ay, s.bx, s.by) for s in world.visible] == [(0, 0, 1, 0), (1, 0, 1, 2)]
 
 
-def test_a_box_blocks_from_its_edge_on() -> None:
-    world = World.of(room(BOX))
-    assert not world.blocks(BODY, at(1.49))
-    assert world.blocks(BODY, at(1.51))
+POST = {"name": "post", "x": 0.2, "y": 0.1, "length": 0.02, "width": 0.02}
 
 
-def test_a_small_body_inside_a_large_box_is_blocked() -> None:
-    assert World.of(room(BOX)).blocks(Rectangle(0.1, 0.1), at(3.0))
-
-
-def test_a_large_body_around_a_small_box_is_blocked() -> None:
-    small = {"name": "post", "x": 0.2, "y": 0.1, "length": 0.02, "width": 0.02}
-    assert World.of(room(small)).blocks(BODY, at(0.0))
+@pytest.mark.parametrize(
+    ("box", "body", "x", "blocked"),
+    [
+        (BOX, BODY, 1.49, False),
+        (BOX, BODY, 1.51, True),
+        (BOX, Rectangle(0.1, 0.1), 3.0, True),  # a small body inside a large box
+        (POST, BODY, 0.0, True),  # a large body around a small box
+    ],
+)
+def test_a_box_blocks_a_body(box: dict[str, Any], body: Rectangle, x: float, blocked: bool) -> None:
+    assert World.of(room(box)).blocks(body, at(x)) is blocked
 
 
 @pytest.mark.parametrize("low", [False, True])
@@ -43,16 +44,20 @@ def test_a_low_box_is_solid_but_not_seen(low: bool) -> None:
     assert world.clearance(BODY, at(0.0)) == (math.inf if low else pytest.approx(1.5))
 
 
-def test_contact_begins_with_the_travel_of_the_strip() -> None:
-    world = World.of(room(BOX))
-    assert world.contact(BODY, at(1.5 - BUMPER_TRAVEL + 1e-6))
-    assert not world.contact(BODY, at(1.5 - BUMPER_TRAVEL - 1e-6))
-
-
-@pytest.mark.parametrize("heading", [0.0, math.pi / 2, math.pi, -math.pi / 2])
-def test_the_strip_goes_all_around(heading: float) -> None:
-    reach = 2.0 - (0.5 if abs(math.cos(heading)) > 0.5 else 0.25)
-    assert World.of(room(BOX)).contact(BODY, at(reach - 0.001, heading=heading))
+@pytest.mark.parametrize(
+    ("x", "heading", "contact"),
+    [
+        (1.5 - BUMPER_TRAVEL + 1e-6, 0.0, True),
+        (1.5 - BUMPER_TRAVEL - 1e-6, 0.0, False),
+        (1.5 - 0.001, math.pi, True),  # the strip goes all around
+        (1.75 - 0.001, math.pi / 2, True),
+        (1.75 - 0.001, -math.pi / 2, True),
+    ],
+)
+def test_contact_begins_with_the_travel_of_the_strip(
+    x: float, heading: float, contact: bool
+) -> None:
+    assert World.of(room(BOX)).contact(BODY, at(x, heading=heading)) is contact
 
 
 @pytest.mark.parametrize(
