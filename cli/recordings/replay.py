@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Self
 
-from cli.inspect.addressing import chunks, topic_of
+from cli.inspect.addressing import EVERY_ROBOT, chunks, expression, parse_key, topic_of
 from cli.inspect.session import (
     BusSession,
     add_options,
@@ -26,7 +26,7 @@ from cli.inspect.session import (
 )
 from cli.recordings.info import open_recording
 from common import keys
-from common.bus.probe import intersects, valid
+from common.bus.probe import intersects
 from common.cli_args import sources
 from common.codec import Sample
 from common.config import load
@@ -43,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument("file", metavar="FILE", type=Path)
     parser.add_argument(
-        "--only", metavar="KEY", action="append", default=[], type=key_expression,
-        help="these keys, such as tel/odom/odometry or 'tel/**'; may be repeated",
+        "--only", metavar="KEY", action="append", default=[], type=parse_key,
+        help="these keys, such as odometry or 'tel/**'; may be repeated",
     )  # fmt: skip
     parser.add_argument(
         "--rate", "-r", type=positive, default=1.0, help="playback speed, 2 is twice as fast"
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
         with until_interrupt():
             for each in reader:
                 path = chunks(each.key)[1]
-                if target.takes(path) and is_selected(path, tuple(options.only)):
+                if target.takes(path) and is_selected(each.key, tuple(options.only)):
                     pacer.wait(each.log_ns)
                     played += target.play(path, each.sample)
     if reader.cut:
@@ -74,9 +74,9 @@ def run(options: argparse.Namespace) -> int:
 
 
 @cache
-def is_selected(path: str, only: tuple[str, ...]) -> bool:
+def is_selected(key: str, only: tuple[str, ...]) -> bool:
     """Return whether one of these key expressions matches; without any, all keys match."""
-    return not only or any(intersects(each, path) for each in only)
+    return not only or any(intersects(expression(each, EVERY_ROBOT), key) for each in only)
 
 
 @contextmanager
@@ -197,13 +197,3 @@ def is_played(path: str, alive: Collection[str]) -> bool:
     moves = path == keys.ESTOP_PATH or any(part.startswith("@") for part in (kind, *others))
     published = kind in ("tel", "evt") and others[:1] and others[0] in alive
     return not moves and not published
-
-
-def key_expression(word: str) -> str:
-    """Parse a key or key expression below the robot."""
-    path = word.strip("/")
-    if not path or not valid(path):
-        raise argparse.ArgumentTypeError(
-            f"{word!r} is not a key; `t2 info FILE` lists the keys of a recording"
-        )
-    return path

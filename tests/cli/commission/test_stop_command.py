@@ -105,34 +105,24 @@ def test_a_stop_in_two_recordings_counts_once(
     assert "Left out: 10 in two recordings.\n" in printed
 
 
-def refused(capsys: pytest.CaptureFixture[str], *words: object, code: int = 1) -> str:
-    assert main(["checkout", *map(str, words)]) == code
-    return capsys.readouterr().err
-
-
-def test_recordings_without_a_stop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_it_cannot_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text, none = tmp_path / "a.txt", tmp_path / "none.mcap"
+    text.write_text("no recording")
     slow = record(tmp_path / "slow.mcap", driven(0.05))
-    error = refused(capsys, "stop", slow)
-    assert "no stop to measure: a STOP or BRAKE from a steady speed" in error
-    assert "(2 slower than 0.1 m/s)" in error
     still = driven(0.5)
     still.motions = [motion for motion in still.motions if motion.command == "stop"]
-    error = refused(capsys, "stop", record(tmp_path / "still.mcap", still))
-    assert "(no RUN with speed ends)" in error
-
-
-def test_unsuitable_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = tmp_path / "a.txt"
-    text.write_text("no recording")
-    assert "is not an MCAP file" in refused(capsys, "stop", text)
-    assert "cannot be read" in refused(capsys, "stop", tmp_path / "none.mcap")
-    error = refused(capsys, "stop", record(tmp_path / "robots.mcap", driven(0.5), "002"))
-    assert "has several robots (001, 002): record one" in error
-
-
-def test_options_of_another_part(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    error = refused(capsys, "stop", code=EXIT_CONFIG)
-    assert "name at least one recording: start `t2 record` on the robot" in error
-    for words in (("--only", "link"), ("--report", "x.md")):
-        error = refused(capsys, "stop", path, *words, code=EXIT_CONFIG)
-        assert "has no steps and no report" in error
+    stands = record(tmp_path / "still.mcap", still)
+    robots = record(tmp_path / "robots.mcap", driven(0.5), "002")
+    for words, code, error in (
+        ((slow,), 1, "no stop to measure: a STOP or BRAKE from a steady speed, until standstill "),
+        ((slow,), 1, "(2 slower than 0.1 m/s)"),
+        ((stands,), 1, "(no RUN with speed ends)"),
+        ((text,), 1, "is not an MCAP file"),
+        ((none,), 1, "cannot be read"),
+        ((robots,), 1, "has several robots (001, 002): record one"),
+        ((), EXIT_CONFIG, "name at least one recording: start `t2 record` on the robot"),
+        ((slow, "--only", "link"), EXIT_CONFIG, "has no steps and no report"),
+        ((slow, "--report", "x.md"), EXIT_CONFIG, "has no steps and no report"),
+    ):
+        assert main(["checkout", "stop", *map(str, words)]) == code
+        assert error in capsys.readouterr().err

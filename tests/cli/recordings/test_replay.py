@@ -93,7 +93,7 @@ def test_replay_publishes_the_original_bytes_without_actuation(
     ("words", "played"),
     [
         (["--only", "@cmd/**"], 0),
-        (["--only", "tel/bridge/**", "--only", "tel/mine"], 6),
+        (["--only", "velocity", "--only", "tel/mine"], 6),
     ],
 )
 def test_selection_options(path: Path, tool: Tool, words: list[str], played: int) -> None:
