@@ -6,7 +6,7 @@ import json
 from cli.inspect import output
 from common import settings
 from common.cli_args import add_sources, sources
-from common.config import Loaded, load
+from common.config import load
 from services.bridge.config import Bridge
 from services.dashboard.config import Dashboard
 from services.metrics.config import Metrics
@@ -37,30 +37,14 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("--json", action="store_true", help="one JSON object")
     add_sources(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print every setting with its value and source."""
-    loaded = load(Everything, sources(options))
-    print(as_json(loaded) if options.json else as_table(loaded))
-    return 0
-
-
-def as_json(loaded: Loaded[Everything]) -> str:
-    """Return value and source of each setting, by path."""
-    table = {
-        path: {"value": setting.value, "origin": setting.origin}
-        for path, setting in loaded.settings.items()
-    }
-    return json.dumps(table, ensure_ascii=False)
-
-
-def as_table(loaded: Loaded[Everything]) -> str:
-    """Return one line per setting: path, value, source."""
     first, *others = (
         (path, json.dumps(setting.value, ensure_ascii=False), setting.origin)
-        for path, setting in loaded.settings.items()
+        for path, setting in load(Everything, sources(options)).settings.items()
     )
-    return output.table(first, others)
+    print(output.table(first, others))
+    return 0

@@ -5,7 +5,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import EVERYTHING, expression
-from cli.inspect.session import add_end, add_options, open_session, until_interrupt
+from cli.inspect.session import add_options, open_session, until_interrupt
 from common.cli_args import needs_extra, sources
 from common.config import load
 from common.errors import LinkError
@@ -25,12 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--host", default="127.0.0.1", help="address to listen on; 0.0.0.0 for the whole network"
     )
     parser.add_argument("--port", type=int, default=PORT, help=f"port, {PORT} by default")
-    add_end(parser)
     add_options(parser, every=False)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve until the end; raise ``LinkError`` if the port is not available."""
+    """Serve until Ctrl-C; raise ``LinkError`` if the port is not available."""
     with needs_extra("foxglove", "the server"):
         import foxglove
     encoder = Encoder(load(RecorderConfig, sources(options)).config.vehicle)
@@ -45,15 +44,12 @@ def run(options: argparse.Namespace) -> int:
         print(f"connect Foxglove or Lichtblick to ws://{options.host}:{server.port}", flush=True)
         for word in EVERYTHING:
             session.probe.listen(expression(word, session.robot))
-        sent, channel_of = 0, cache(partial(create_channel, context))
+        channel_of = cache(partial(create_channel, context))
         try:
             with until_interrupt():
-                for sample in session.probe.samples(options.duration):
+                for sample in session.probe.samples():
                     for entry in encoder.entries(sample, sample.wall_ns):
                         channel_of(entry.channel).log(entry.data, log_time=entry.log_ns)
-                    sent += 1
-                    if sent == options.count:
-                        break
         finally:
             server.stop()
     return 0
