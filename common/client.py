@@ -21,8 +21,9 @@ no subscriber of safety either. A client is denied after ``DENIED_AFTER`` states
 **Overruled.** A client is overruled after ``OVERRULED_TICKS`` of requests while another source
 drives.
 
-**Emergency stop.** It is repeated on every tick until safety reports ``estop`` as latched. After
-``ESTOP_TICKS`` it counts as not confirmed.
+**Emergency stop.** It is repeated on every tick until safety reports ``estop`` as latched. A latch
+that may be an earlier one has to last for ``KEPT_TICKS``: its reset may be under way. After
+``ESTOP_TICKS`` the stop counts as not confirmed.
 
 **Reset.** Any program on the bus may answer the call. Only safety's own state shows the effect:
 
@@ -47,6 +48,7 @@ ZEROS = 3  # requests after a drive: one may be lost
 DENIED_AFTER = 10  # states of safety; a router needs a moment to announce its subscribers
 OVERRULED_TICKS = 10  # 0.5 s: the client's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
+KEPT_TICKS = 10
 
 
 def request(linear: float = 0.0, angular: float = 0.0, release: ReleaseRequest = "none") -> Drive:
@@ -144,24 +146,29 @@ class EstopRepetition(Struct):
     """An emergency stop that is repeated until safety has latched it."""
 
     ticks: int = 0  # left; 0 when no stop is pending
+    unsure: int = 0  # ticks left that the latch must still last
 
     @property
     def is_pending(self) -> bool:
         """Whether the stop is still repeated."""
         return self.ticks > 0
 
-    def start(self) -> None:
-        """Start, or start again, after the first stop was sent."""
+    def start(self, state: SafetyState | None) -> None:
+        """Start, or start again, after the first stop was sent; ``state`` is the newest one."""
         self.ticks = ESTOP_TICKS
+        self.unsure = 1 if state is not None and "estop" not in state.latched else KEPT_TICKS
 
     def tick(self, state: SafetyState | None) -> EstopStep:
         """Return the action of this tick; ``state`` is None without a fresh state of safety."""
         if not self.ticks:
             return EstopStep.NONE
-        if state is not None and "estop" in state.latched:
-            self.ticks = 0
+        if state is None or "estop" not in state.latched:
+            self.unsure = KEPT_TICKS if state is None else 1
+        else:
+            self.unsure -= 1
+        self.ticks = self.ticks - 1 if self.unsure else 0
+        if not self.unsure:
             return EstopStep.NONE
-        self.ticks -= 1
         return EstopStep.REPEAT if self.ticks else EstopStep.LAST
 
 

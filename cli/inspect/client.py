@@ -96,10 +96,10 @@ class SafetyClient:
 
     def stop(self, robots: Iterable[str]) -> set[str]:
         """Repeat an emergency stop until all have latched it; return the robots that have."""
-        self.states.clear()  # only a state from now on confirms it
+        self.states.clear()  # only a state from now on counts
         self._stops = {robot: EstopRepetition() for robot in robots}
         for stop in self._stops.values():
-            stop.start()
+            stop.start(None)
         while any(stop.is_pending for stop in self._stops.values()):
             if "*" in self.robot:  # for robots that are not known here
                 self.order_stop(self.robot)

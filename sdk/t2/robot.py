@@ -124,7 +124,7 @@ class Robot:
         """Stop the robot and latch it; repeated until safety confirms. Raises ``NotConfirmed``."""
         self.put_estop()  # before anything else
         begin_s, repetition = time.monotonic(), EstopRepetition()
-        repetition.start()
+        repetition.start(None)
         self.safety.open()
         while repetition.is_pending:
             time.sleep(PERIOD_S)

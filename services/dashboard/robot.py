@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from common import keys
+from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.client import (
@@ -120,7 +120,7 @@ class Robot:
         self.bus.estop()
         if not self._estop.is_pending:  # a page repeats its requests
             self._log.warning("emergency stop", requested_by=requested_by)
-        self._estop.start()
+        self._estop.start(self.telemetry.newest(keys.SAFETY, clock.now_ns()))
 
     def keep_alive(self, viewer: str, answered: int, now_ns: int) -> None:
         """Keep the emergency stop alive for a page that answers this heartbeat."""

@@ -18,7 +18,7 @@ from common import log
 from common.cli_args import add_setting, add_sources, needs_extra, run_program, sources
 from common.config import Loaded, load
 from common.errors import RobotError
-from common.service import STOP_TIMEOUT_S, Node
+from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
 from services.teleop.gamepad import find
@@ -26,6 +26,7 @@ from services.teleop.view import EventLog
 
 EXIT_HANGUP = 128 + signal.SIGHUP
 TERMINAL_POLL_S = 0.2
+END_TIMEOUT_S = 5.0  # for the final zeros, and an emergency stop that is repeated for 3 s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,10 +81,12 @@ class TeleopProcess:
             ).run()
         finally:
             self._leave()
-            self._thread.join(STOP_TIMEOUT_S)
+            self._thread.join(END_TIMEOUT_S)
             log.configure(self._settings.log, "teleop")
         if self._error:
             raise self._error
+        if text := self._controller.unconfirmed:
+            raise RobotError(text)
         return 0
 
     def _serve(self) -> None:

@@ -23,9 +23,9 @@ from services.teleop import panels
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from services.teleop.core.hold import Press
-from services.teleop.core.round_trip import NUMBERS, PROBE_S
+from services.teleop.core.round_trip import PROBE_S, place
 
-QUERY = "\x1b7\x1b[2;{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
+QUERY = "\x1b7\x1b[{row};{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
 MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
 REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay the keys
 
@@ -113,16 +113,16 @@ class TeleopApp(App[None]):
         self._hints.show(panels.hints(view, self._hold.hold_first, self._hold.hold))
 
     def probe(self) -> None:
-        """Query the cursor position, at a column that equals the query's number."""
+        """Query the cursor position, at a place that identifies the query."""
         if self._leaving:
             return  # the shell would read the answer as input
         self._queries += 1
         if self._unanswered >= MAX_UNANSWERED and self._queries % MAX_UNANSWERED:
             return  # a terminal that does not read: its queue must not fill
         self._unanswered += 1
-        number, now_ns = self._queries % max(1, min(NUMBERS, self.size.width)), self._clock()
-        self._post(lambda: self._controller.terminal.sent(number, now_ns))
-        self.query_terminal(QUERY.format(column=number + 1))
+        where, now_ns = place(self._queries, *self.size), self._clock()
+        self._post(lambda: self._controller.terminal.sent(where, now_ns))
+        self.query_terminal(QUERY.format(column=where[0] + 1, row=where[1] + 1))
 
     def query_terminal(self, query: str) -> None:
         """Write a query to the terminal, after the pending output."""
@@ -132,8 +132,8 @@ class TeleopApp(App[None]):
     def on_cursor_position(self, event: events.CursorPosition) -> None:
         """Post an answer of the terminal to the controller."""
         self._unanswered = 0
-        number, at_ns = event.x, self._received_ns(event)
-        self._post(lambda: self._controller.terminal.answered(number, at_ns))
+        where, at_ns = (event.x, event.y), self._received_ns(event)
+        self._post(lambda: self._controller.terminal.answered(where, at_ns))
 
     def on_key(self, event: events.Key) -> None:
         """Post a key to the controller; CapsLock and shift make no difference."""

@@ -17,7 +17,7 @@ from common.messages import Drive, Event, ResetDone, SafetyState
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
-from services.teleop.core.controls import MAX_PRESS_AGE_S, Action, Controls, Stick
+from services.teleop.core.controls import ESTOP, MAX_PRESS_AGE_S, Action, Controls, Stick
 from services.teleop.core.hold import Press
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.gamepad import Gamepad
@@ -84,7 +84,7 @@ class Controller:
 
     def press(self, press: Press, now_ns: int) -> None:
         """Process a key press or its repeat."""
-        if self._leaving:
+        if self._leaving and press.key != ESTOP:
             return
         action = self._controls.press(press, now_ns)
         if action is Action.ESTOP:
@@ -102,7 +102,7 @@ class Controller:
         self._controls.enforce("unfocused", now_ns)
 
     def leave(self) -> None:
-        """Send the final zeros, then stop the loop."""
+        """Stop the loop after the final zeros, and after a pending emergency stop."""
         if not self._leaving:
             self._leaving = True
             self._controls.stop(clock.now_ns())
@@ -111,7 +111,7 @@ class Controller:
 
     def tick(self, now_ns: int) -> None:
         """Send the requests of this tick and renew the view."""
-        if self._leaving and self._controls.is_silent:
+        if self._leaving and self._controls.is_silent and not self._estop.is_pending:
             self._node.loop.stop()
             return
         state = self._state(now_ns)
@@ -180,7 +180,7 @@ class Controller:
         """Stop; a key that repeats, or a press during the stop, is no further event."""
         is_known = self._estop.is_pending or (state is not None and "estop" in state.latched)
         self._bus.estop()
-        self._estop.start()
+        self._estop.start(state)
         if not is_known:
             self._node.event("estop", "warning", "emergency stop requested by the operator")
 
@@ -194,11 +194,14 @@ class Controller:
             self._unconfirmed = True
             denied = self._source.denied
             self._node.event(
-                "estop_denied" if denied else "estop_unconfirmed", "error", self._no_estop
+                "estop_denied" if denied else "estop_unconfirmed", "error", self.unconfirmed
             )
 
     @property
-    def _no_estop(self) -> str:
+    def unconfirmed(self) -> str:
+        """What safety has not confirmed, for the operator; empty for nothing."""
+        if not self._unconfirmed:
+            return ""
         # A certificate that may not drive can rarely stop; the router reports neither.
         denied = ", probably not allowed" if self._source.denied else ""
         return f"EMERGENCY STOP NOT CONFIRMED{denied}: use the vehicle's own switch"
@@ -268,7 +271,7 @@ class Controller:
     def _alarm(self) -> str:
         """Return what the operator must know before anything else; empty for nothing."""
         if self._unconfirmed:
-            return self._no_estop
+            return self.unconfirmed
         if self._source.denied:
             return "VIEW ONLY: this certificate may not drive"
         if self._overruled_by:

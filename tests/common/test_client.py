@@ -7,6 +7,7 @@ from msgspec import structs
 
 from common.client import (
     ESTOP_TICKS,
+    KEPT_TICKS,
     NEUTRAL,
     OVERRULED_TICKS,
     ZEROS,
@@ -157,27 +158,41 @@ def test_without_a_stop_nothing_is_repeated() -> None:
 @pytest.mark.parametrize("state", [None, AFTER], ids=["no state", "not latched"])
 def test_a_stop_is_repeated_for_a_limited_time(state: SafetyState | None) -> None:
     estop = EstopRepetition()
-    estop.start()
+    estop.start(state)
     steps = [estop.tick(state) for _ in range(61)]
     assert steps == [EstopStep.REPEAT] * 59 + [EstopStep.LAST, EstopStep.NONE]
     assert not estop.is_pending
 
 
-def test_a_latched_stop_is_not_repeated() -> None:
+@pytest.mark.parametrize(
+    ("at_start", "states", "repeated"),
+    [
+        (AFTER, [AFTER, SEEN], 1),
+        (AFTER, [SEEN], 0),
+        # the latch of an earlier stop, whose reset may be under way
+        (SEEN, [SEEN] * 20, KEPT_TICKS - 1),
+        (None, [SEEN] * 20, KEPT_TICKS - 1),
+        (SEEN, [*[SEEN] * 5, AFTER, SEEN], 6),  # it was reset, and latched anew
+        (AFTER, [None, *[SEEN] * 20], KEPT_TICKS),  # what happened meanwhile is unknown
+    ],
+)
+def test_a_latched_stop_is_not_repeated(
+    at_start: SafetyState | None, states: list[SafetyState | None], repeated: int
+) -> None:
     estop = EstopRepetition()
-    estop.start()
-    assert estop.tick(AFTER) is EstopStep.REPEAT
-    assert estop.tick(SEEN) is EstopStep.NONE
+    estop.start(at_start)
+    steps = [estop.tick(state) for state in states]
+    assert steps == [EstopStep.REPEAT] * repeated + [EstopStep.NONE] * (len(steps) - repeated)
     assert not estop.is_pending
     assert estop.tick(AFTER) is EstopStep.NONE
 
 
 def test_a_second_stop_starts_the_time_again() -> None:
     estop = EstopRepetition()
-    estop.start()
+    estop.start(AFTER)
     estop.tick(None)
-    estop.start()
-    assert estop.ticks == ESTOP_TICKS == 60
+    estop.start(SEEN)
+    assert (estop.ticks, estop.unsure) == (ESTOP_TICKS, KEPT_TICKS) == (60, 10)
     assert len({step.value for step in EstopStep}) == len(EstopStep) == 3
 
 

@@ -9,8 +9,8 @@ PERIOD_NS = NS_PER_S // 20
 
 def answer(terminal: RoundTrip, now_ns: int, took_s: float = 0.001) -> None:
     """Simulate a terminal that answers now."""
-    terminal.sent(0, now_ns - round(took_s * NS_PER_S))
-    terminal.answered(0, now_ns)
+    terminal.sent((0, 1), now_ns - round(took_s * NS_PER_S))
+    terminal.answered((0, 1), now_ns)
 
 
 def stick(linear: float = 1.0, *, deadman: bool = True, events: int = 0) -> Stick:

@@ -15,6 +15,7 @@ from common.messages import Drive, Event, Health
 from services.teleop import __main__ as teleop
 from tests.teleop.terminal import STRICT, TELEOP, Terminal, terminal
 from verification.harness.bus import bus_on, running
+from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 REPEAT_S = 0.033
@@ -83,6 +84,17 @@ def hold(it: Terminal, seconds: float, done: Callable[[], bool] = lambda: False)
         it.type("w")
         time.sleep(REPEAT_S)
     return clock.now_ns()
+
+
+def test_an_emergency_stop_without_a_router_is_reported_after_quitting() -> None:
+    with terminal(f"tcp/127.0.0.1:{free_port()}") as it:
+        wait_until(lambda: it.shows(b"ESTOP"), "the screen")
+        it.type("e")
+        it.type("q")
+        wait_until(it.ends, "its end")
+        assert it.process.returncode == 1
+        it.read()
+        assert b"EMERGENCY STOP NOT CONFIRMED" in it.shown
 
 
 def drive_off(it: Terminal, listener: Listener) -> None:

@@ -128,8 +128,8 @@ class Operator(Source):
 
     def _press(self, key: str, now_ns: int) -> None:
         """Press a key of a terminal that answers at once."""
-        self._controls.terminal.sent(0, now_ns)
-        self._controls.terminal.answered(0, now_ns)
+        self._controls.terminal.sent((0, 1), now_ns)
+        self._controls.terminal.answered((0, 1), now_ns)
         self._controls.press(Press(key, now_ns), now_ns)
 
     def _let_go(self, now_ns: int, pause_s: float) -> None:

@@ -5,6 +5,9 @@ queries the terminal's cursor position periodically. Answers and keys come in on
 a key that follows an answer was typed after that query was sent. A key is at most as old as the
 newest query that was answered before it.
 
+Each query moves the cursor to another place, which identifies its answer. Places repeat after
+minutes (80 x 24: 3 minutes), so a slow answer is not taken for that of a later query.
+
 Keys that move the vehicle or reset a latch are accepted in the last row only:
 
 ============================= ======================= ==================================
@@ -28,9 +31,17 @@ from common.freshness import NS_PER_S
 
 PROBE_S = 0.1  # period of the queries
 RECOVER_S = 1.0  # that the terminal must be fast before its keys count again
-NUMBERS = 64  # distinct numbers of open queries: 6.4 s
+ANSWERS = 64  # stored: 6.4 s
 ADVICE = "use `t2 drive` on a machine near the robot, or the dashboard"
 UNKNOWN = "terminal delay unknown: no answer yet"
+
+Place = tuple[int, int]  # of the cursor: column and row, from 0
+
+
+def place(query: int, width: int, height: int) -> Place:
+    """Return the place of a query; not in the top row, whose answers look like an F3 key."""
+    row, column = divmod(query, max(1, width))
+    return column, 1 + row % max(1, height - 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,16 +62,16 @@ class RoundTrip:
 
     def __init__(self, limit_s: float) -> None:
         self._limit_ns = round(limit_s * NS_PER_S)
-        self._sent_ns: dict[int, int] = {}  # by number
-        self._answers: deque[Answer] = deque(maxlen=NUMBERS)
+        self._sent_ns: dict[Place, int] = {}
+        self._answers: deque[Answer] = deque(maxlen=ANSWERS)
 
-    def sent(self, number: int, now_ns: int) -> None:
+    def sent(self, where: Place, now_ns: int) -> None:
         """Note that a query was sent."""
-        self._sent_ns[number] = now_ns
+        self._sent_ns[where] = now_ns
 
-    def answered(self, number: int, now_ns: int) -> None:
+    def answered(self, where: Place, now_ns: int) -> None:
         """Note the answer to a query; an unknown one is ignored."""
-        sent_ns = self._sent_ns.get(number)
+        sent_ns = self._sent_ns.get(where)
         if sent_ns is not None:
             self._sent_ns = {one: at for one, at in self._sent_ns.items() if at > sent_ns}
             self._answers.append(Answer(sent_ns, now_ns))

@@ -76,8 +76,8 @@ class Hold(RuleBasedStateMachine):
 
     @rule(key=st.sampled_from("wasdzc"))
     def press(self, key: str) -> None:
-        self.controls.terminal.sent(0, self.now_ns)
-        self.controls.terminal.answered(0, self.now_ns)
+        self.controls.terminal.sent((0, 1), self.now_ns)
+        self.controls.terminal.answered((0, 1), self.now_ns)
         self.controls.press(Press(key, self.now_ns), self.now_ns)
         if self.now_ns < self.counts_ns:
             self.counts_ns = self.now_ns + at(self.settings.hold_first)

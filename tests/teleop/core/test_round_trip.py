@@ -8,11 +8,12 @@ from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
 from services.teleop.core.round_trip import (
-    NUMBERS,
+    ANSWERS,
     PROBE_S,
     RECOVER_S,
     UNKNOWN,
     RoundTrip,
+    place,
 )
 
 LIMIT_S = 0.15
@@ -28,8 +29,8 @@ def trip() -> RoundTrip:
 
 
 def probe(trip: RoundTrip, number: int, sent_s: float, took_s: float) -> None:
-    trip.sent(number, at(sent_s))
-    trip.answered(number, at(sent_s + took_s))
+    trip.sent((number, 1), at(sent_s))
+    trip.answered((number, 1), at(sent_s + took_s))
 
 
 SLOW_ONCE = [(10.0, 0.5), *((10.5 + number * PROBE_S, 0.01) for number in range(2, 30))]
@@ -53,7 +54,7 @@ SLOW_ONCE = [(10.0, 0.5), *((10.5 + number * PROBE_S, 0.01) for number in range(
 def test_a_key_is_refused_by_the_answers_before_it(
     trip: RoundTrip, answers: list[tuple[float, float]], at_s: float, refusal: str
 ) -> None:
-    trip.sent(0, at(9.9))  # without an answer
+    trip.sent((0, 1), at(9.9))  # without an answer
     for number, (sent_s, took_s) in enumerate(answers, 1):
         probe(trip, number, sent_s, took_s)
     assert refusal in trip.refusal(at(at_s))
@@ -62,15 +63,15 @@ def test_a_key_is_refused_by_the_answers_before_it(
 
 def test_answers_out_of_order_and_unknown_ones_are_ignored(trip: RoundTrip) -> None:
     for number in (1, 2, 3):
-        trip.sent(number, at(10 + number / 10))
-    trip.answered(9, at(10.31))
+        trip.sent((number, 1), at(10 + number / 10))
+    trip.answered((9, 1), at(10.31))
     assert trip.refusal(at(10.31)) == UNKNOWN
-    trip.answered(2, at(10.32))
-    trip.answered(1, at(10.33))  # older than one that was answered: a stream has an order
+    trip.answered((2, 1), at(10.32))
+    trip.answered((1, 1), at(10.33))  # older than one that was answered: a stream has an order
     assert trip.refusal(at(10.33)) == ""
-    trip.answered(2, at(12))  # twice
+    trip.answered((2, 1), at(12))  # twice
     assert "too slow" in trip.refusal(at(12))
-    trip.answered(3, at(12))
+    trip.answered((3, 1), at(12))
     assert "1.70 s" in trip.refusal(at(12))
 
 
@@ -85,19 +86,41 @@ def test_no_key_that_counts_is_older_than_the_limit_allows(
     trip, answers = RoundTrip(LIMIT_S), [(0.0, 0.0)]  # typed, received
     for number, (down_s, up_s) in enumerate(zip(there, back, strict=False)):
         sent_s = 10 + number * PROBE_S
-        trip.sent(number, at(sent_s))
+        trip.sent((number, 1), at(sent_s))
         typed_s = max(answers[-1][0], sent_s + down_s)
         answers.append((typed_s, max(answers[-1][1], typed_s + up_s)))
     for number, ((typed_s, _), (next_s, received_s)) in enumerate(pairwise(answers)):
         # A key that was typed between two answers, and came with the second one.
         age_s = received_s - (typed_s + way * (next_s - typed_s))
         refused_before = trip.refusal(at(received_s) - 1)
-        trip.answered(number, at(received_s))
+        trip.answered((number, 1), at(received_s))
         if age_s > LIMIT_S + 2 * PROBE_S + 0.001:
             assert refused_before
 
 
 def test_stored_answers_are_bounded(trip: RoundTrip) -> None:
-    for number in range(3 * NUMBERS):
+    for number in range(3 * ANSWERS):
         probe(trip, number, 10 + number, 0.01)
-    assert len(trip._answers) == NUMBERS
+    assert len(trip._answers) == ANSWERS
+
+
+@pytest.mark.parametrize(("width", "height"), [(40, 20), (80, 24), (20, 5)])
+@pytest.mark.parametrize("behind", [0, 1])
+def test_no_slow_answer_is_taken_for_that_of_a_later_query(
+    trip: RoundTrip, width: int, height: int, behind: int
+) -> None:
+    """A steady delay of the time in which a row, or 64 queries, pass by."""
+    for late in (width + behind, 64 + behind):
+        for query in range(1, 3 * late):
+            trip.sent(place(query, width, height), at(query * PROBE_S))
+            if query > late:
+                trip.answered(place(query - late, width, height), at(query * PROBE_S + 0.05))
+                assert "too slow" in trip.refusal(at(query * PROBE_S + 0.06))
+
+
+def test_the_places_of_queries() -> None:
+    assert [place(query, 3, 3) for query in range(7)] == [
+        (0, 1), (1, 1), (2, 1), (0, 2), (1, 2), (2, 2), (0, 1),
+    ]  # fmt: skip
+    assert [place(query, 0, 1) for query in range(2)] == [(0, 1), (0, 1)]
+    assert place(5, 1, 2) == (0, 1)
