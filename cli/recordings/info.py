@@ -1,11 +1,12 @@
 """``t2 info``: the content of a recording."""
 
 import argparse
-import time
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.inspect import output
+from cli.inspect.addressing import chunks
 from cli.recordings.timeline import Timeline
 from common.cli_args import needs_extra
 from common.freshness import NS_PER_S
@@ -48,11 +49,9 @@ def timeline_of(reader: "Reader") -> Timeline:
 
 
 def as_text(reader: "Reader", timeline: Timeline) -> str:
-    """Return the summary as text."""
-    lines = [_file(reader), _source(reader), _span(timeline)]
-    if timeline.versions:
-        versions = (f"{name} {version}" for name, version in sorted(timeline.versions.items()))
-        lines.append(f"versions: {', '.join(versions)}")
+    """Return the summary, streams, stops and events as text."""
+    about = summary(timeline, reader).items()
+    lines = [f"{name}: {value}" for name, value in about if value]
     rows = [
         [
             key.removeprefix(f"{ROOT}/"),
@@ -63,7 +62,8 @@ def as_text(reader: "Reader", timeline: Timeline) -> str:
         ]
         for key, one in sorted(timeline.streams.items())
     ]
-    lines += ["", output.table(["key", "type", "messages", "Hz", "lost"], rows)]
+    lines += [*warnings(timeline, reader), ""]
+    lines.append(output.table(["key", "type", "messages", "Hz", "lost"], rows))
     stops = [
         f"{stop.begins_s:8.2f} s  {stop.verdict:9}  for {stop.lasts_s:.1f} s: "
         + " ".join(f"{name}: {printable(text)}" for name, text in stop.reasons.items())
@@ -80,20 +80,39 @@ def as_text(reader: "Reader", timeline: Timeline) -> str:
     return "\n".join(lines)
 
 
-def _file(reader: "Reader") -> str:
-    state = f"truncated, {reader.readable} bytes are readable" if reader.cut else "complete"
+def summary(timeline: Timeline, reader: "Reader") -> dict[str, str]:
+    """Return what a recording is, by name."""
+    began = datetime.fromtimestamp((timeline.began_ns or 0) / NS_PER_S, UTC)
+    robots = sorted({robot for key in timeline.streams if (robot := chunks(key)[0])})
+    versions = ", ".join(f"{name} {version}" for name, version in sorted(timeline.versions.items()))
+    while_driving = sum(stop.was_driving for stop in timeline.stops)
+    return {
+        "file": f"{reader.path}, {reader.size} bytes",
+        "robot": ", ".join(robots),
+        "start": f"{began:%Y-%m-%d %H:%M:%S} UTC" if timeline.streams else "",
+        "duration": clock(timeline.lasted_s),
+        "distance": f"{timeline.distance:.1f} m",
+        "stops": f"{len(timeline.stops)}, {while_driving} while driving",
+        "services": versions or "no health messages",
+        "messages": f"{timeline.messages} on {len(timeline.streams)} keys",
+        "recorded": ", ".join(f"{name} {value}" for name, value in sorted(reader.about.items())),
+    }
+
+
+def warnings(timeline: Timeline, reader: "Reader") -> list[str]:
+    """Return warnings about an incomplete recording."""
+    found = []
+    if reader.cut:
+        found.append("The file is truncated: its writer was killed, or is still writing.")
     if reader.damaged:
-        state += f", {reader.damaged} damaged chunks skipped"
-    return f"{reader.path}: {reader.size} bytes, {state}"
+        found.append(f"{reader.damaged} damaged chunks of the file are skipped.")
+    undecoded = sum(stream.undecoded for stream in timeline.streams.values())
+    if undecoded:
+        found.append(f"{undecoded} messages could not be decoded.")
+    return found
 
 
-def _source(reader: "Reader") -> str:
-    robot, version, why = (reader.about.get(name, "?") for name in ("robot", "version", "why"))
-    return f"robot {robot}, recorded by T2 {version}, reason: {why}"
-
-
-def _span(timeline: Timeline) -> str:
-    if timeline.began_ns is None:
-        return "no messages"
-    began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(timeline.began_ns / NS_PER_S))
-    return f"{timeline.messages} messages in {timeline.lasted_s:.1f} s, from {began}"
+def clock(seconds: float) -> str:
+    """Format a time or a duration."""
+    minutes, tenths = divmod(round(10 * seconds), 600)
+    return f"{minutes} min {tenths / 10:04.1f} s" if minutes else f"{tenths / 10:.1f} s"

@@ -5,16 +5,14 @@ rates and gaps of each stream. All content from the bus is escaped. It needs the
 """
 
 import argparse
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import chunks
-from cli.recordings.info import open_recording, timeline_of
+from cli.recordings.info import clock, open_recording, summary, timeline_of, warnings
 from cli.recordings.timeline import Timeline
 from common.cli_args import needs_extra
 from common.errors import RobotError
-from common.freshness import NS_PER_S
 from common.text import printable
 
 if TYPE_CHECKING:
@@ -81,40 +79,3 @@ def page(timeline: Timeline, reader: "Reader") -> str:
         path=figures.path(timeline) if timeline.path else "",
         speeds=figures.speeds(timeline),
     )
-
-
-def summary(timeline: Timeline, reader: "Reader") -> dict[str, str]:
-    """Return the summary at the top of the page, by name."""
-    began = datetime.fromtimestamp((timeline.began_ns or 0) / NS_PER_S, UTC)
-    robots = sorted({robot for key in timeline.streams if (robot := chunks(key)[0])})
-    versions = ", ".join(f"{name} {version}" for name, version in sorted(timeline.versions.items()))
-    while_driving = sum(stop.was_driving for stop in timeline.stops)
-    return {
-        "robot": ", ".join(robots),
-        "start": f"{began:%Y-%m-%d %H:%M:%S} UTC",
-        "duration": clock(timeline.lasted_s),
-        "distance": f"{timeline.distance:.1f} m",
-        "stops": f"{len(timeline.stops)}, {while_driving} while driving",
-        "services": versions or "no health messages",
-        "messages": f"{timeline.messages} on {len(timeline.streams)} keys",
-        "recorded": ", ".join(f"{name} {value}" for name, value in sorted(reader.about.items())),
-    }
-
-
-def warnings(timeline: Timeline, reader: "Reader") -> list[str]:
-    """Return warnings about an incomplete recording."""
-    found = []
-    if reader.cut:
-        found.append("The file is truncated: its writer was killed, or is still writing.")
-    if reader.damaged:
-        found.append(f"{reader.damaged} damaged chunks of the file are skipped.")
-    undecoded = sum(stream.undecoded for stream in timeline.streams.values())
-    if undecoded:
-        found.append(f"{undecoded} messages could not be decoded.")
-    return found
-
-
-def clock(seconds: float) -> str:
-    """Format a time or a duration."""
-    minutes, tenths = divmod(round(10 * seconds), 600)
-    return f"{minutes} min {tenths / 10:04.1f} s" if minutes else f"{tenths / 10:.1f} s"

@@ -1,6 +1,5 @@
 """``t2 info``: complete and truncated files."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -39,10 +38,12 @@ def test_the_content_of_a_recording(path: Path, capsys: pytest.CaptureFixture[st
     assert main(["info", str(path)]) == 0
     shown = capsys.readouterr().out
     for line in (
-        f"{path}: {path.stat().st_size} bytes, complete",
-        "robot 007, recorded by T2 1.2.3, reason: latch-contact",
-        "16 messages in 2.0 s, from ",
-        "versions: odom 1.2",
+        f"file: {path}, {path.stat().st_size} bytes",
+        "duration: 2.0 s",
+        "messages: 16 on 5 keys",
+        "recorded: robot 007, version 1.2.3, why latch-contact",
+        "services: odom 1.2",
+        "1 messages could not be decoded.",
         "001/tel/bridge/velocity  Velocity           11  10.0     0",
         "    1.50 s  brake      for 0.0 s: contact: The bumper was hit.",
         "    1.50 s  error      bridge: contact: hit",
@@ -60,8 +61,8 @@ def test_a_truncated_file_is_summarized_up_to_its_end(
     path.write_bytes(path.read_bytes()[: second.chunk_start_offset + second.chunk_length // 2])
     assert main(["info", str(path)]) == 1
     shown = capsys.readouterr().out
-    assert re.search(r"truncated, \d+ bytes are readable", shown)
-    assert "13 messages" in shown
+    assert "The file is truncated" in shown
+    assert "messages: 13 on" in shown
 
 
 def test_a_missing_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
