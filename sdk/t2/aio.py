@@ -1,19 +1,21 @@
 """Twins for asyncio: the same names, with ``await``, ``async for`` and ``async with``."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
+from functools import wraps
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, ParamSpec, TypeVar
 
-from t2 import messages as m
 from t2.connection import connect
 from t2.drive import Drive
-from t2.limit import SpeedLimit
+from t2.messages import Message
 from t2.robot import Robot
 from t2.stream import Stream
 
-M = TypeVar("M", bound=m.Message)
+M = TypeVar("M", bound=Message)
+P = ParamSpec("P")
+R = TypeVar("R")
 
 POLL_S = 0.01  # shorter than the period of each stream
 
@@ -49,6 +51,16 @@ def _close(opening: "asyncio.Task[Robot]") -> None:
         opening.result().close()
 
 
+def awaited(call: Callable[P, R]) -> Callable[P, Coroutine[Any, Any, R]]:
+    """Return a call as a coroutine function, which waits for it in a thread."""
+
+    @wraps(call)
+    async def run(*args: P.args, **kwargs: P.kwargs) -> R:
+        return await asyncio.to_thread(call, *args, **kwargs)
+
+    return run
+
+
 class AsyncStream(Generic[M]):
     """A ``Stream`` for asyncio; ``stream`` is the twin.
 
@@ -64,10 +76,7 @@ class AsyncStream(Generic[M]):
 
     def __init__(self, stream: Stream[M]) -> None:
         self.stream = stream
-
-    async def latest(self, timeout: float = 1.0) -> M:
-        """Return the newest message as ``Stream.latest`` does. Raises ``NoData``."""
-        return await asyncio.to_thread(self.stream.latest, timeout)
+        self.latest = awaited(stream.latest)
 
     async def __aiter__(self) -> AsyncIterator[M]:
         with self.stream.reading() as queue:
@@ -94,10 +103,11 @@ class AsyncDrive:
     def __init__(self, drive: Drive) -> None:
         self._drive = drive
         self.velocity, self.check = drive.velocity, drive.check  # they return at once
+        self.forward, self.turn = self._motion(drive.forward), self._motion(drive.turn)
 
     async def __aenter__(self) -> "AsyncDrive":
         try:
-            await self._wait(self._drive.__enter__)
+            await self._motion(self._drive.__enter__)()
         except asyncio.CancelledError:
             self._drive.end()  # at once: the task may be cancelled again
             await asyncio.to_thread(self._drive.close)
@@ -111,27 +121,25 @@ class AsyncDrive:
     async def stop(self) -> None:
         """Stop as ``Drive.stop`` does."""
         self._drive.velocity(0.0)  # at once: a thread may not be free
-        await self._wait(self._drive.stop)
+        await self._motion(self._drive.stop)()
 
-    async def forward(self, distance: float, speed: float = 0.3, patience: float = 3.0) -> None:
-        """Drive a distance in m as ``Drive.forward`` does."""
-        await self._wait(self._drive.forward, distance, speed, patience)
+    def _motion(self, motion: Callable[P, R]) -> Callable[P, Coroutine[Any, Any, R]]:
+        """Return a motion as a coroutine function that ends it when it is cancelled."""
 
-    async def turn(self, angle: float, speed: float = 0.5, patience: float = 3.0) -> None:
-        """Turn by an angle in rad as ``Drive.turn`` does."""
-        await self._wait(self._drive.turn, angle, speed, patience)
+        @wraps(motion)
+        async def run(*args: P.args, **kwargs: P.kwargs) -> R:
+            task = asyncio.create_task(asyncio.to_thread(motion, *args, **kwargs))
+            try:
+                return await asyncio.shield(task)
+            except asyncio.CancelledError:
+                self._drive.cancel()
+                while not task.done():  # however often this task is cancelled
+                    with suppress(Exception, asyncio.CancelledError):
+                        await asyncio.shield(task)
+                self._drive.uncancel()  # the motion had ended by itself
+                raise
 
-    async def _wait(self, motion: Callable[..., object], *values: float) -> None:
-        task = asyncio.create_task(asyncio.to_thread(motion, *values))
-        try:
-            await asyncio.shield(task)
-        except asyncio.CancelledError:
-            self._drive.cancel()
-            while not task.done():  # however often this task is cancelled
-                with suppress(Exception, asyncio.CancelledError):
-                    await asyncio.shield(task)
-            self._drive.uncancel()  # the motion had ended by itself
-            raise
+        return run
 
 
 class AsyncRobot:
@@ -159,6 +167,11 @@ class AsyncRobot:
         self.switches = AsyncStream(robot.switches)
         self.link = AsyncStream(robot.link)
         self.events = AsyncStream(robot.events)
+        self.limit = awaited(robot.limit)
+        self.reset = awaited(robot.reset)
+        self.release = awaited(robot.release)
+        self.set_pose = awaited(robot.set_pose)
+        self.led = awaited(robot.led)
 
     def drive(self, source: str) -> AsyncDrive:
         """Return a drive as this source, for ``async with``."""
@@ -168,33 +181,3 @@ class AsyncRobot:
         """Stop and latch as ``Robot.estop`` does; a cancelled task does not end the attempts."""
         self.robot.put_estop()  # at once: a thread may not be free
         await asyncio.to_thread(self.robot.estop)
-
-    async def limit(
-        self,
-        source: str,
-        linear: float | None = None,
-        angular: float | None = None,
-        reason: str = "",
-        *,
-        seconds: float,
-    ) -> SpeedLimit:
-        """Cap the speed in m/s and rad/s as ``Robot.limit`` does."""
-        return await asyncio.to_thread(
-            self.robot.limit, source, linear, angular, reason, seconds=seconds
-        )
-
-    async def reset(self) -> m.ResetDone:
-        """Reset as ``Robot.reset`` does."""
-        return await asyncio.to_thread(self.robot.reset)
-
-    async def release(self, direction: m.Direction, source: str, timeout: float = 5.0) -> None:
-        """Move off a pressed bumper as ``Robot.release`` does."""
-        await asyncio.to_thread(self.robot.release, direction, source, timeout)
-
-    async def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
-        """Set the pose of odometry in ``odom`` (m, m, rad) as ``Robot.set_pose`` does."""
-        await asyncio.to_thread(self.robot.set_pose, x, y, heading)
-
-    async def led(self, channel: int, mode: int, **settings: int) -> None:
-        """Set one lamp channel as ``Robot.led`` does."""
-        await asyncio.to_thread(self.robot.led, channel, mode, **settings)
