@@ -11,11 +11,9 @@ import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
 from importlib import import_module
-from typing import Any, NoReturn
+from typing import NoReturn
 
-from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
-from common.errors import ConfigError, LinkError, RobotError
-from common.text import printable
+from common.cli_args import VERSION, run_program
 
 GROUPS = {
     "Run": {
@@ -69,19 +67,17 @@ GROUPS = {
 }
 COMMANDS = {name: text for group in GROUPS.values() for name, (_, text) in group.items()}
 PLACES = {name: place for group in GROUPS.values() for name, (place, _) in group.items()}
-EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a subcommand and return its exit code."""
-    words = list(sys.argv[1:] if argv is None else argv) or ["--help"]
-    options = parsed(words)
+    name, *words = list(sys.argv[1:] if argv is None else argv) or ["--help"]
+    if name not in COMMANDS:
+        refuse(name)
+    module = import_module(PLACES[name])
     try:
-        code: int = module(options.command).run(options)
+        code = run_program(f"t2 {name}", module.add_arguments, module.run, words, COMMANDS[name])
         sys.stdout.flush()
-    except RobotError as error:
-        print(printable(f"t2 {options.command}: {error}", "\n"), file=sys.stderr)
-        return EXIT_CODES.get(type(error), 1)
     except KeyboardInterrupt:  # before or after the command's own handling of Ctrl-C
         return 128 + signal.SIGINT
     except BrokenPipeError:  # the reader has closed the pipe, as `| head` does
@@ -91,8 +87,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def parsed(words: Sequence[str]) -> argparse.Namespace:
-    """Return the parsed options; exit with usage and code 2 if they are invalid."""
+def refuse(word: str) -> NoReturn:
+    """Show help or version, or suggest a command, and exit."""
     parser = argparse.ArgumentParser(
         prog="t2",
         usage="t2 COMMAND [OPTIONS]",
@@ -101,31 +97,13 @@ def parsed(words: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"t2 {VERSION}")
-    # Listed by the overview: argparse has no groups of commands.
-    subparsers = parser.add_subparsers(
-        prog="t2", dest="command", metavar="COMMAND", help=argparse.SUPPRESS
-    )
-    named = words[0]
-    if named not in COMMANDS:
-        refuse(parser, words)
-    subparser = subparsers.add_parser(named, description=COMMANDS[named])
-    module(named).add_arguments(subparser)
-    options, unknown = parser.parse_known_args(words)
-    if unknown:
-        subparser.error(f"unrecognized arguments: {' '.join(unknown)}")
-    return options
-
-
-def refuse(parser: argparse.ArgumentParser, words: Sequence[str]) -> NoReturn:
-    """Show help or version, or suggest a command, and exit."""
-    first = words[0]
-    if first in ("-h", "--help", "--version"):
-        parser.parse_args(words[:1])
-    if first.startswith("-"):
-        parser.error(f"{first}: options follow the command, as in: t2 COMMAND {first}")
-    near = get_close_matches(first, COMMANDS, n=1)
+    if word in ("-h", "--help", "--version"):
+        parser.parse_args([word])
+    if word.startswith("-"):
+        parser.error(f"{word}: options follow the command, as in: t2 COMMAND {word}")
+    near = get_close_matches(word, COMMANDS, n=1)
     hint = f'did you mean "t2 {near[0]}"?' if near else '"t2 --help" lists the commands'
-    parser.error(f"unknown command {first!r}; {hint}")
+    parser.error(f"unknown command {word!r}; {hint}")
 
 
 def overview() -> str:
@@ -135,11 +113,6 @@ def overview() -> str:
     for title, commands in GROUPS.items():
         lines += [f"{title}:", *(f"  {name:{width}}{COMMANDS[name]}" for name in commands), ""]
     return "\n".join([*lines, '"t2 COMMAND --help" shows the options of a command.'])
-
-
-def module(name: str) -> Any:
-    """Import the module of a command."""
-    return import_module(PLACES[name])
 
 
 if __name__ == "__main__":

@@ -66,9 +66,10 @@ def run_program(
     add_arguments: Callable[[argparse.ArgumentParser], None],
     run: Callable[[argparse.Namespace], int],
     argv: Sequence[str] | None,
+    what: str | None = None,
 ) -> int:
     """Run a program with its options and return its exit code, as for every service."""
-    parser = argparse.ArgumentParser(prog=name)
+    parser = argparse.ArgumentParser(prog=name, description=what)
     add_arguments(parser)
     try:
         return run(parser.parse_args(argv))
