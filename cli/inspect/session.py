@@ -41,13 +41,8 @@ def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
         which.add_argument(
             "--all", dest="robot", action="store_const", const=EVERY_ROBOT, help="all robots"
         )
-    add_output(parser)
-    add_sources(parser)
-
-
-def add_output(parser: argparse.ArgumentParser) -> None:
-    """Add the output format option; the default is the same on a terminal and in a pipe."""
     parser.add_argument("--json", action="store_true", help="print JSON lines instead of text")
+    add_sources(parser)
 
 
 def one_robot(text: str) -> str:

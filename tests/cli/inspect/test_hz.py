@@ -3,8 +3,8 @@
 import msgspec
 import pytest
 
-from cli.inspect import stream_stats
-from cli.inspect.stream_stats import StreamStats, quantile
+from cli.inspect import hz
+from cli.inspect.hz import StreamStats, quantile
 from common.codec import Sample
 from common.freshness import NS_PER_S
 
@@ -48,9 +48,9 @@ def test_losses_are_counted_per_sender() -> None:
 
 
 def test_the_window_limits_samples_and_not_the_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stream_stats, "WINDOW", 3)
+    monkeypatch.setattr(hz, "WINDOW", 3)
     stats = measured(*(at(second) for second in (0, 10, 11, 12)))
-    assert stats.rate_hz() == pytest.approx(1.0)
+    assert stats.figures()["hz"] == pytest.approx(1.0)
     assert stats.count == 4
 
 
