@@ -444,24 +444,17 @@ def test_a_vehicle_that_goes_on_after_the_lease_is_braked(
     assert motions(bench.tick(2 * NS_PER_S)) == [MotionKind.BREAK], "not known to stand"
 
 
-@pytest.mark.parametrize("command", [STOP, BRAKE])
-def test_a_vehicle_that_brake_holds_is_held_after_the_end(bench: Bench, command: Command) -> None:
+@pytest.mark.parametrize(("command", "kind"), [(STOP, MotionKind.STOP), (BRAKE, MotionKind.BREAK)])
+def test_a_bridge_that_ends_does_not_take_a_brake_back(
+    bench: Bench, command: Command, kind: MotionKind
+) -> None:
     bench.arm()
     bench.move(command)
-    bench.carried_out(bench.core.motions.stop(bench.now_ns))
-    bench.now_ns += MS
-    bench.answer(VelocityReport(0, 0))
-    kind = MotionKind.BREAK if command is BRAKE else MotionKind.STOP
-    assert motions([bench.core.motions.on_exit(bench.now_ns)]) == [kind]
-
-
-@pytest.mark.parametrize("command", [STOP, BRAKE])
-def test_a_bridge_that_ends_does_not_take_a_brake_back(bench: Bench, command: Command) -> None:
-    bench.arm()
-    bench.move(command)
-    kind = MotionKind.BREAK if command is BRAKE else MotionKind.STOP
     assert motions(bench.carried_out(bench.core.motions.stop(bench.now_ns))) == [kind]
     assert bench.carried_out(bench.core.motions.stop(bench.now_ns)) == [], "once"
+    bench.now_ns += MS
+    bench.answer(VelocityReport(0, 0))
+    assert motions([bench.core.motions.on_exit(bench.now_ns)]) == [kind], "it holds the vehicle"
     bench.tick()
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
 
