@@ -1,4 +1,4 @@
-"""Plot of the lap: the path through the room, and the speeds over time."""
+"""Plot of the lap: the path through the room."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from cli.demo.score import Trace
-from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from sim.geometry import Pose, Rectangle
 from sim.world import Plan
@@ -22,12 +21,11 @@ def save(
     file: Path, plan: Plan, vehicle: Vehicle, trace: Trace, odometry: Sequence[Odometry]
 ) -> None:
     """Write the plot."""
-    figure = Figure(figsize=(9, 9), layout="constrained")
+    figure = Figure(figsize=(9, 7), layout="constrained")
     FigureCanvasAgg(figure)
-    room, speeds = figure.subplots(2, 1, height_ratios=[3, 1])
+    room = figure.subplots()
     _draw_room(room, plan)
     _draw_path(room, Rectangle(vehicle.length / 2, vehicle.width / 2), trace, odometry)
-    _draw_speeds(speeds, trace)
     figure.savefig(file, dpi=110)
 
 
@@ -61,13 +59,3 @@ def _draw_path(axes: Axes, body: Rectangle, trace: Trace, odometry: Sequence[Odo
         xs, ys = zip(*(pose.outward(x, y) for x, y in outline), strict=True)
         axes.plot(xs, ys, color=color, linewidth=1.2, label=label)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8)
-
-
-def _draw_speeds(axes: Axes, trace: Trace) -> None:
-    start_ns = trace.truth[0].mono_ns
-    times_s = [(x.mono_ns - start_ns) / NS_PER_S for x in trace.truth]
-    axes.plot(times_s, [x.linear for x in trace.truth], color=TRUE, linewidth=1.5)
-    for hit in (b for b in trace.bumper if b.pressed):
-        axes.axvline((hit.mono_ns - start_ns) / NS_PER_S, color=HIT, linewidth=1, linestyle=":")
-    axes.set(xlabel="time, s", ylabel="speed, m/s")
-    axes.grid(alpha=0.3)
