@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cli.commission import stop_command
-from cli.commission.operator import Step, prompt, show, sign, walk
-from cli.commission.report import Report, Row, render
+from cli.commission.operator import prompt, show
+from cli.commission.report import Report, Row, Verdict, render
 from cli.commission.session import CheckoutSession, checkout_session
-from cli.commission.steps import STEPS
+from cli.commission.steps import STEPS, Step
 from cli.inspect.diagnosis import NEEDED
 from cli.settings import Everything
 from common import keys
@@ -87,8 +87,14 @@ def guide(report: Report, steps: Sequence[Step], session: CheckoutSession) -> No
     try:
         name = prompt("Your name:")
         firmware = prompt("The firmware version, from the board's label:")
-        walk(steps, session, report.steps)
-        report.signed = sign(name, report.steps)
+        for number, step in enumerate(steps, 1):
+            show(f"\n[{number}/{len(steps)}] {step.title}\n{step.what}")
+            report.steps.append((step.title, verdict(step, session)))
+        show("")
+        for title, found in report.steps:
+            show(f"{found.outcome:8} {title}: {found.text}")
+        typed = prompt(f"To sign this off, type your name ({name}):")
+        report.signed = name if typed.casefold() == name.casefold() else ""
     except KeyboardInterrupt:
         report.aborted = "interrupted by the operator"
     except RobotError as error:
@@ -96,6 +102,19 @@ def guide(report: Report, steps: Sequence[Step], session: CheckoutSession) -> No
     report.operator = name or "unknown"
     report.facts.append(("firmware", firmware or "unknown"))
     report.ended = now()
+
+
+def verdict(step: Step, session: CheckoutSession) -> Verdict:
+    """Run a step until the operator accepts its verdict, or skip it with a reason."""
+    if reason := prompt("Press Enter to begin, or type a reason to skip:"):
+        return Verdict("skipped", reason)
+    while True:
+        found = step.run(session)
+        show(f"{found.outcome}: {found.text}")
+        if found.outcome == "passed" or prompt(
+            "Press Enter to try again, or type any word to continue:"
+        ):
+            return found
 
 
 def now() -> str:

@@ -1,12 +1,13 @@
 """Steps of the checkout on the bus, in their order, with the instructions to the operator."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 from cli.commission.latches import LatchTest, judge_latch
 from cli.commission.link import CRC_FRAMES, NONZERO_FRAMES, judge_link
 from cli.commission.motion import Run, judge_motion
-from cli.commission.operator import Step, confirm, show
+from cli.commission.operator import confirm, show
 from cli.commission.report import Verdict, failed
 from cli.commission.session import CheckoutSession
 from cli.commission.sonar import (
@@ -170,6 +171,15 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
         states=session.of(keys.SAFETY),
     )
     return judge_motion(run)
+
+
+class Step(NamedTuple):
+    """One step of a checkout; ``what`` is the instruction to the operator."""
+
+    name: str
+    title: str
+    what: str
+    run: Callable[[CheckoutSession], Verdict]
 
 
 STEPS = (
