@@ -35,6 +35,7 @@ RELAY = (
     "is the relay on, its service running, and its cable to the PC connected? board.address and "
     "board.relay_port must be the relay's (docs/relay.md); without a relay set relay_port = 0"
 )
+RELAY_COPY = "copy services/relay of this version to the relay (docs/relay.md)"
 RELAY_BRAKES = {
     "start": "it waits for a neutral command: is the bridge running?",
     "silent": "it lost the commands of the PC: check the cable and the load of both computers",
@@ -266,8 +267,7 @@ def relay(now: Relay | None, t2: str) -> Iterator[Finding]:
         yield Finding("relay", "ok", f"the relay passes commands, up for {now.uptime:.0f} s")
     if now.version not in ("", t2):
         text = f"the relay is T2 {now.version}, this laptop {t2}"
-        todo = "copy services/relay of this version to the relay (docs/relay.md)"
-        yield Finding("relay", "note", text, todo)
+        yield Finding("relay", "note", text, RELAY_COPY)
 
 
 def link(now: Link, before: Message) -> Iterator[Finding]:

@@ -158,19 +158,11 @@ def names() -> list[str]:
 
 
 def ours(host: Host) -> set[Path]:
-    """Return every file that an installation may have, except the settings.
-
-    Units of other versions are recognised by their mark.
-    """
+    """Return every file of an installation, also of another version, except the settings."""
     folder = host.at(UNITS)
     found = (path for form in ("t2*", "t2*.d/*") for path in folder.glob(form) if path.is_file())
     marked = (path for path in found if path.read_bytes().startswith(MARK.encode()))
-    return {
-        USER,
-        SLEEP,
-        *(UNITS / n for n in names()),
-        *(UNITS / p.relative_to(folder) for p in marked),
-    }
+    return {USER, SLEEP, *(UNITS / path.relative_to(folder) for path in marked)}
 
 
 def names_here(sim: bool) -> list[str]:
