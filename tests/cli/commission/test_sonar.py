@@ -29,21 +29,22 @@ def sample(**values: float | RangeStatus) -> Ultrasonic:
     return Ultrasonic(ranges=tuple(ranges), status=tuple(status))
 
 
-# --- detection ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
-    ("value", "is_near"),
-    [(0.59, True), (0.6, False), ("too_near", True), ("fault", False), ("no_echo", False)],
+    ("value", "rest", "is_near"),
+    [
+        (0.59, math.inf, True),
+        (0.6, math.inf, False),
+        ("too_near", math.inf, True),
+        ("fault", math.inf, False),
+        ("no_echo", math.inf, False),
+        (0.3, 0.5, False),
+        (0.3, 0.51, True),
+        (0.3, None, False),
+    ],
 )
-def test_distance_of_a_hand(value: float | RangeStatus, is_near: bool) -> None:
-    assert near(sample(front=value), FREE) == ({"front"} if is_near else frozenset())
-
-
-@pytest.mark.parametrize(("rest", "is_near"), [(0.5, False), (0.51, True), (None, False)])
-def test_distance_below_the_range_at_rest(rest: float | None, is_near: bool) -> None:
-    whole = (math.inf, math.inf, rest, *FREE[3:])
-    assert bool(near(sample(front=0.3), whole)) is is_near
+def test_distance_of_a_hand(value: float | RangeStatus, rest: float | None, is_near: bool) -> None:
+    resting = (math.inf, math.inf, rest, *FREE[3:])
+    assert near(sample(front=value), resting) == ({"front"} if is_near else frozenset())
 
 
 def test_range_at_rest_is_the_median() -> None:
@@ -55,19 +56,21 @@ def test_range_at_rest_is_the_median() -> None:
     rest = dict(zip(SONAR_NAMES, resting_ranges(samples), strict=True))
     assert (rest["front"], rest["rear"], rest["left"]) == (2.2, None, 1.5)
     assert rest["right"] == math.inf
-
-
-def test_a_sonar_that_is_faulty_half_the_time_is_faulty() -> None:
+    # faulty half of the time
     assert resting_ranges([sample(front="fault"), sample(front=1.0)])[2] is None
 
 
-def test_obstructions() -> None:
-    assert obstructions(FREE) == ""
-    assert obstructions((None, *FREE[1:])) == ""
-    assert obstructions((0.8, *FREE[1:])) == ""
-    assert obstructions((0.79, *FREE[1:6], 0.2, math.inf)) == (
-        "Clear 0.8 m all around: left 0.79 m, rear 0.20 m."
-    )
+@pytest.mark.parametrize(
+    ("left", "rear", "problem"),
+    [
+        (math.inf, math.inf, ""),
+        (None, math.inf, ""),
+        (0.8, math.inf, ""),
+        (0.79, 0.2, "Clear 0.8 m all around: left 0.79 m, rear 0.20 m."),
+    ],
+)
+def test_obstructions(left: float | None, rear: float, problem: str) -> None:
+    assert obstructions((left, *FREE[1:6], rear, math.inf)) == problem
 
 
 def test_a_hand_is_detected_after_a_time() -> None:
@@ -78,9 +81,6 @@ def test_a_hand_is_detected_after_a_time() -> None:
     assert not detector.settled(19 + HOLD_NS)
     assert detector.settled(20 + HOLD_NS)
     assert detector.seen == {"front"}
-
-
-# --- the verdict ----------------------------------------------------------------------------------
 
 
 def test_each_in_its_place_passes() -> None:
