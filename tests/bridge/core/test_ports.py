@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
 from common.wire.reports import BumperReport, VelocityReport
-from services.bridge.core.ports import Ports, Stream
+from services.bridge.core.ports import Ports
 
 MS = NS_PER_S // 1000
 FAILOVER = 100 * MS
@@ -14,28 +14,6 @@ FAILOVER = 100 * MS
 
 def ports(count: int = 2) -> Ports:
     return Ports(count, FAILOVER, NS_PER_S)
-
-
-@pytest.mark.parametrize("port", [0, 1])
-def test_a_kind_is_taken_from_its_first_port_until_that_is_silent(port: int) -> None:
-    made, other = ports(), 1 - port
-    assert made.takes(BumperReport, port, NS_PER_S)
-    assert made.streams == {BumperReport: Stream(port, NS_PER_S)}
-    assert not made.takes(BumperReport, other, NS_PER_S + FAILOVER)
-    assert made.takes(BumperReport, other, NS_PER_S + FAILOVER + 1)
-    assert not made.takes(BumperReport, port, NS_PER_S + FAILOVER + 2)
-
-
-def test_commands_leave_from_the_port_of_the_velocity() -> None:
-    made = ports()
-    mains = [made.main]
-    for kind, port, at_s in (
-        (BumperReport, 1, 1), (VelocityReport, 1, 1),
-        (VelocityReport, 0, 1), (VelocityReport, 0, 2),
-    ):  # fmt: skip
-        made.takes(kind, port, at_s * NS_PER_S)
-        mains.append(made.main)
-    assert mains == [0, 0, 1, 1, 0]
 
 
 @pytest.mark.parametrize(
