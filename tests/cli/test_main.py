@@ -4,7 +4,6 @@ import re
 import subprocess
 import sys
 from argparse import Namespace
-from collections.abc import Callable
 from importlib.metadata import metadata
 from pathlib import Path
 
@@ -28,64 +27,48 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert max(map(len, shown.splitlines())) <= 80
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["--version"])
-    assert end.value.code == 0
-    assert capsys.readouterr().out == f"t2 {metadata('t2')['Version']}\n"
-
-
 @pytest.mark.parametrize(
-    ("words", "printed"),
+    ("words", "code", "printed"),
     [
-        (["fly"], "unknown command 'fly'; \"t2 --help\" lists the commands"),
-        (["eco", "safety/state"], "unknown command 'eco'; did you mean \"t2 echo\"?"),
-        (["up", "--nonsense"], "t2 up: error: unrecognized arguments: --nonsense"),
-        (["keys", "list", "--nonsense"], "usage: t2 keys"),
-        (["--set", "board.port=1", "up"], "options follow the command, as in: t2 COMMAND --set"),
+        ("--version", 0, f"t2 {metadata('t2')['Version']}\n"),
+        ("fly", 2, "unknown command 'fly'; \"t2 --help\" lists the commands"),
+        ("eco safety/state", 2, "unknown command 'eco'; did you mean \"t2 echo\"?"),
+        ("up --nonsense", 2, "t2 up: error: unrecognized arguments: --nonsense"),
+        ("keys list --nonsense", 2, "usage: t2 keys"),
+        ("--set board.port=1 up", 2, "options follow the command, as in: t2 COMMAND --set"),
     ],
 )
-def test_invalid_command_lines(
-    words: list[str], printed: str, capsys: pytest.CaptureFixture[str]
+def test_command_lines(
+    words: str, code: int, printed: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
-        main(words)
-    assert end.value.code == 2
-    assert printed in capsys.readouterr().err
-
-
-def raising(error: BaseException) -> Callable[[Namespace], int]:
-    def run(_: Namespace) -> int:
-        raise error
-
-    return run
+        main(words.split())
+    assert end.value.code == code
+    assert printed in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize(
-    ("error", "code"),
+    ("error", "code", "printed"),
     [
-        (ConfigError("a setting is wrong"), EXIT_CONFIG),
-        (LinkError("a port is taken"), EXIT_LINK),
-        (RobotError("something is missing"), 1),
+        (ConfigError("a setting is wrong"), EXIT_CONFIG, "t2 config: a setting is wrong\n"),
+        (LinkError("a port is taken"), EXIT_LINK, "t2 config: a port is taken\n"),
+        (RobotError("something is missing"), 1, "t2 config: something is missing\n"),
+        (KeyboardInterrupt(), 130, ""),  # before the command handles it
     ],
 )
-def test_error_messages_and_exit_codes(
-    error: RobotError,
+def test_errors_and_exit_codes(
+    error: BaseException,
     code: int,
+    printed: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("cli.settings.run", raising(error))
+    def run(_: Namespace) -> int:
+        raise error
+
+    monkeypatch.setattr("cli.settings.run", run)
     assert main(["config"]) == code
-    assert capsys.readouterr().err == f"t2 config: {error}\n"
-
-
-def test_an_early_ctrl_c_exits_silently(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("cli.settings.run", raising(KeyboardInterrupt()))
-    assert main(["config"]) == 130
-    assert capsys.readouterr().err == ""
+    assert capsys.readouterr().err == printed
 
 
 # The robot's requirements have no extras: only commands that need one may fail, with a message.
