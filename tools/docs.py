@@ -16,7 +16,7 @@ from msgspec import Struct
 
 from common import codec, keys
 from common import messages as m
-from services.metrics.samples import FAMILIES
+from services.metrics.samples import METRICS
 from services.safety.core.causes import RULES, Clears
 from tools import rights_table, sdk, settings_file
 from tools.fields import fields_of
@@ -149,11 +149,7 @@ def causes() -> str:
 
 def metrics() -> str:
     """Return the table of Prometheus metrics."""
-    rows = [
-        (f"`{one.name}`", one.kind, ", ".join(f"`{label}`" for label in one.labels), one.help)
-        for one in FAMILIES
-    ]
-    return table(("metric", "kind", "labels", ""), rows)
+    return table(("metric", ""), [(f"`{name}`", about) for name, about in METRICS.items()])
 
 
 def _link(kind: type[Struct]) -> str:

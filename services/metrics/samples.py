@@ -35,70 +35,54 @@ OMITTED = {
     "estop", "ports", "frame_id", "child_frame_id", "pose_covariance", "twist_covariance",
     "service", "limit_sources", "estop_keepalives",
 }  # fmt: skip
-OF_SERVICE = "robot", "service"
-
-
-class Family(Struct, frozen=True):
-    """A metric; its samples differ in their labels."""
-
-    name: str
-    kind: str
-    labels: tuple[str, ...]
-    help: str
-
-
-FAMILIES = (
-    Family("t2_bus_connected", "gauge", (), "Whether the exporter is connected to a router"),
-    Family("t2_robot_up", "gauge", ("robot",), "Whether the robot is alive"),
-    Family("t2_service_up", "gauge", OF_SERVICE, "Whether the service is present and healthy"),
-    Family("t2_service_instances", "gauge", OF_SERVICE, "Processes of the service on the bus"),
-    Family("t2_events_total", "counter", (*OF_SERVICE, "event", "level"),
-           "Events received, including replayed ones"),
-)  # fmt: skip
+# Metrics that are no fields of messages.
+METRICS = {
+    "t2_bus_connected": "Whether the exporter is connected to a router",
+    "t2_robot_up": "Whether the robot is alive",
+    "t2_service_up": "Whether the service is present and healthy",
+    "t2_service_instances": "Processes of the service on the bus",
+    "t2_events_total": "Events received, including replayed ones, by `event` and `level`",
+}
 
 
 class Scrape:
     """The metric families of one scrape."""
 
     def __init__(self) -> None:
-        kinds = {"gauge": GaugeMetricFamily, "counter": CounterMetricFamily}
-        self.families: dict[str, Metric] = {
-            each.name: kinds[each.kind](each.name, each.help, labels=each.labels)
-            for each in FAMILIES
-        }
+        self.families: dict[str, Metric] = {}
 
-    def add(self, name: str, value: float, *labels: str) -> None:
-        """Add a sample."""
-        self.families[name].add_metric(labels, float(value))  # type: ignore[attr-defined]
+    def add(self, name: str, value: float, about: str = "", /, **labels: str) -> None:
+        """Add a sample; a name that ends with ``_total`` is a counter's."""
+        kind = CounterMetricFamily if name.endswith("_total") else GaugeMetricFamily
+        made = kind(name, about or METRICS[name], labels=list(labels))
+        family = self.families.setdefault(name, made)
+        family.add_metric(list(labels.values()), float(value))  # type: ignore[attr-defined]
 
-    def add_fields(self, prefix: str, part: Struct, labels: Mapping[str, str]) -> None:
+    def add_fields(self, prefix: str, part: Struct, **labels: str) -> None:
         """Add the fields of a message, also those of the structs inside."""
+        about = f"Field of {type(part).__name__}, see docs/bus.md"
         for field in part.__struct_fields__:
             value = None if field in OMITTED else getattr(part, field)
             if isinstance(value, Struct):
-                self.add_fields(f"{prefix}_{field}", value, labels)
+                self.add_fields(f"{prefix}_{field}", value, **labels)
                 continue
             name = f"{prefix}_{field}{UNITS.get(field, '')}"
-            help_text = f"Field of {type(part).__name__}, see docs/bus.md"
             for word, number in _numbers(value, WORDS.get(field)):
-                names = [*labels, *(["name"] if word else [])]
-                family = GaugeMetricFamily(name, help_text, labels=names)
-                self.families.setdefault(name, family)
-                self.add(name, number, *labels.values(), *word)
+                self.add(name, number, about, **labels, **word)
 
 
-def _numbers(value: Any, words: Sequence[str] | None) -> Iterator[tuple[tuple[str, ...], float]]:
-    """Yield the numbers of a value with their names, if they have any."""
+def _numbers(value: Any, words: Sequence[str] | None) -> Iterator[tuple[dict[str, str], float]]:
+    """Yield the numbers of a value, with the label of their name if they have any."""
     if isinstance(value, bool | int | float):
-        yield (), value
+        yield {}, value
     elif isinstance(value, str) and value:
-        yield from (((word,), word == value) for word in (words or (value,)))
+        yield from (({"name": word}, word == value) for word in (words or (value,)))
     elif isinstance(value, dict):
         for name, number in sorted(value.items()):
-            yield (name,), number.worst if isinstance(number, Durations) else number
+            yield {"name": name}, number.worst if isinstance(number, Durations) else number
     elif isinstance(value, tuple):
         names = (one if isinstance(one, str) else one.name for one in value)
-        yield from (((name,), 1) for name in dict.fromkeys(names))
+        yield from (({"name": name}, 1) for name in dict.fromkeys(names))
 
 
 def metric_families(
@@ -115,22 +99,22 @@ def metric_families(
 
 
 def _robot(scrape: Scrape, name: str, robot: RobotState, now_ns: int) -> None:
-    scrape.add("t2_robot_up", robot.is_up(now_ns), name)
+    scrape.add("t2_robot_up", robot.is_up(now_ns), robot=name)
     for stream, topic in STREAMS.items():
         message = robot.fresh(topic.path, now_ns)
         if message is not None:
-            scrape.add_fields(f"t2_{stream}", message, {"robot": name})
+            scrape.add_fields(f"t2_{stream}", message, robot=name)
     for (service, event, level), count in sorted(robot.events.items()):
-        scrape.add("t2_events_total", count, name, service, event, level)
+        labels = {"robot": name, "service": service, "event": event, "level": level}
+        scrape.add("t2_events_total", count, **labels)
 
 
 def _service(scrape: Scrape, name: str, robot: RobotState, service: str, now_ns: int) -> None:
-    scrape.add("t2_service_up", robot.is_healthy(service, now_ns), name, service)
-    scrape.add("t2_service_instances", len(robot.instances[service]), name, service)
-    health = robot.fresh(keys.HEALTH.path.format(service=service), now_ns)
-    if health is None:
-        return
-    own = f"{keys.ROOT}/{name}/"
-    rates = {key.removeprefix(own): rate for key, rate in health.rates.items()}
     labels = {"robot": name, "service": service}
-    scrape.add_fields("t2_service", replace(health, rates=rates), labels)
+    scrape.add("t2_service_up", robot.is_healthy(service, now_ns), **labels)
+    scrape.add("t2_service_instances", len(robot.instances[service]), **labels)
+    health = robot.fresh(keys.HEALTH.path.format(service=service), now_ns)
+    if health is not None:
+        own = f"{keys.ROOT}/{name}/"
+        rates = {key.removeprefix(own): rate for key, rate in health.rates.items()}
+        scrape.add_fields("t2_service", replace(health, rates=rates), **labels)
