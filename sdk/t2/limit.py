@@ -27,7 +27,7 @@ class SpeedLimit:
     def __init__(
         self, session: zenoh.Session, key: str, source: str, safety: Stream[SafetyState]
     ) -> None:
-        self._publisher: SourcePublisher[Limit] = SourcePublisher(session, key, "Limit", safety)
+        self._publisher = SourcePublisher(session, key, "Limit", safety)
         self._source = source
         self._safety = safety
         self._limit = Limit(echo=0)

@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from itertools import count
 from secrets import randbits
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 import msgspec
 import zenoh
@@ -13,8 +13,6 @@ import zenoh
 from t2.client import Access, DriveRequests
 from t2.messages import Drive, SafetyState, SourceMessage
 from t2.stream import Stream
-
-M = TypeVar("M", bound=SourceMessage)
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 # A program is one publisher at a router: safety would take the next drive of a source for a second
@@ -31,7 +29,7 @@ QOS: dict[str, Any] = {
 }
 
 
-class SourcePublisher(Generic[M]):
+class SourcePublisher:
     """Sends a source's messages with the heartbeat of safety that was received last."""
 
     def __init__(
@@ -52,7 +50,7 @@ class SourcePublisher(Generic[M]):
         """Whether safety is there, but the router does not pass our messages on to it."""
         return self._access.is_denied
 
-    def put(self, message: M) -> None:
+    def put(self, message: SourceMessage) -> None:
         """Send a message; its header and echo are filled in."""
         state = self._safety.newest
         if state is not None and state is not self._seen:
@@ -73,7 +71,7 @@ class SourcePublisher(Generic[M]):
         self._publisher.undeclare()
 
 
-class DrivePublisher(SourcePublisher[Drive]):
+class DrivePublisher(SourcePublisher):
     """Sends drive requests, each drive between zeros."""
 
     def __init__(self, session: zenoh.Session, key: str, safety: Stream[SafetyState]) -> None:
