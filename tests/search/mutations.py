@@ -10,7 +10,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from common import keys
+from common import heartbeat, keys
 from common import messages as m
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
@@ -384,7 +384,7 @@ MUTATIONS: dict[str, Mutation] = {
         "no operator's source",
     ),
     "a late reset is obeyed": (
-        (operator_requests, "CALL_AGE_NS", 10 * NS_PER_S), (*STAND, late_reset, *GO),
+        (heartbeat, "MAX_CALL_AGE_NS", 10 * NS_PER_S), (*STAND, late_reset, *GO),
         "safety knows of contact",
     ),
     "a reset clears what it does not name": (
@@ -404,7 +404,11 @@ MUTATIONS: dict[str, Mutation] = {
         (lambda s: s.stop(700), lambda s: s.request(0.0, 700), *GO), "safety knows of estop",
     ),
     "no neutral after a return": (
-        (Arbiter, "disarmed", unchanged), (lambda s: s.freeze(400),), "was not neutral",
+        (Arbiter, "barred", unchanged), (lambda s: s.freeze(400),), "was not neutral",
+    ),
+    "a neutral request from before a reset counts": (
+        (Arbiter, "barred", lambda arbiter, now_ns: replace(arbiter, barred_ns=now_ns - NS_PER_S)),
+        (*STAND, lambda s: s.stop(700), lambda s: s.reset(), *GO), "was not neutral",
     ),
     "a reset clears what is not gone": (
         (causes, "GOOD_SAMPLES", 0),
@@ -444,7 +448,7 @@ MUTATIONS: dict[str, Mutation] = {
         PROTECTIVE_STOP, "protective stop of fleet",
     ),
     "a protective stop wants no neutral": (
-        (policy, "wants_neutral", lambda name: name != "limit_stop" and causes.wants_neutral(name)),
+        (policy, "BARRING", causes.BARRING - {"limit_stop"}),
         PROTECTIVE_STOP, "was not neutral",
     ),
     "a silent limit source drives on": (

@@ -59,6 +59,8 @@ class SafetyBook:
     operators: OperatorBook = field(default_factory=OperatorBook)
     bad_ns: int = 0  # when inputs were last seen to be bad
     neutral: dict[str, int] = field(default_factory=dict)  # source: when it asked for zero
+    barred_ns: int = 0  # when anything last wanted a neutral request
+    better_ns: dict[str, int] = field(default_factory=dict)  # source: when it was last overruled
     let_go: set[str] = field(default_factory=set)  # sources whose next release may begin
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     estop_session_was_up: bool = False
@@ -144,7 +146,7 @@ class SafetyBook:
     def _on_bumper(self, message: m.Bumper, now_ns: int) -> None:
         before = self.bumpers[-1] if self.bumpers else message
         if before.boot != message.boot:
-            self.bad_ns = now_ns
+            self.bad_ns = self.barred_ns = now_ns
             self.neutral.clear()
         is_new = before.seq != message.seq or not self.bumpers or before.boot != message.boot
         if self.operators.on_bumper(message, is_new, now_ns):
@@ -164,14 +166,17 @@ class SafetyBook:
         if barred or set(tripped) - {"contact"}:  # a key that is held meanwhile
             self.let_go -= {name for name, one in self.requests.items() if one.release != "none"}
         self.let_go -= {source for source in self.let_go if self._better(source, now_ns)}
+        for source in filter(lambda one: self._better(one, now_ns), self.requests):
+            self.better_ns[source] = now_ns
+            self.neutral.pop(source, None)
         if barred or tripped:
+            self.barred_ns = now_ns
             self.neutral.clear()
             return
         for source, request in self.requests.items():
-            if request.is_neutral and request.is_fresh(now_ns):
+            due_ns = max(self.barred_ns, self.better_ns.get(source, 0))
+            if request.is_neutral and request.is_fresh(now_ns) and request.at_ns > due_ns:
                 self.neutral[source] = request.at_ns
-        for source in [source for source in self.neutral if self._better(source, now_ns)]:
-            del self.neutral[source]  # overruled
 
     def _better(self, source: str, now_ns: int) -> list[str]:
         """Return the sources above this one that hold the wheel."""

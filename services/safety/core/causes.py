@@ -86,8 +86,8 @@ RULES = (
     # by third parties
     Rule("limit_stop", "stop", Clears.NEUTRAL, "A limit source stops the vehicle."),
     Rule("limit_silent", "stop", Clears.NEUTRAL, "A limit source is silent."),
+    Rule("two_publishers", "stop", Clears.NEUTRAL, "Two publishers use one source."),
     # transient
-    Rule("two_publishers", "stop", Clears.AT_ONCE, "Two publishers use one source."),
     Rule(
         "neutral", "stop", Clears.AT_ONCE,
         "Waiting for a neutral request: release the controls, then drive.",
@@ -110,14 +110,8 @@ def clears(name: str) -> Clears:
     return BY_NAME[name].clears
 
 
-def wants_neutral(name: str) -> bool:
-    """Return whether a neutral request is required once the cause has cleared."""
-    return clears(name) is not Clears.AT_ONCE
-
-
-BARRING = frozenset(  # causes that forbid every motion
-    rule.name for rule in RULES if wants_neutral(rule.name) or rule.name == "two_publishers"
-)
+# Causes that forbid every motion; once all have cleared, a neutral request is due.
+BARRING = frozenset(rule.name for rule in RULES if rule.clears is not Clears.AT_ONCE)
 
 
 Token = tuple[int, int]  # boot and seq of a sample; (0, time) without a sample

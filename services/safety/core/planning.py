@@ -17,7 +17,7 @@ from msgspec import Struct
 from common.motion import RUN, STILL, Twist, clamp
 from common.settings import Vehicle
 from services.safety.config import Safety
-from services.safety.core.causes import Latches, Observation, wants_neutral
+from services.safety.core.causes import BARRING, Latches, Observation
 from services.safety.core.release import stopping_distance, sweep
 from services.safety.core.sonars import Axis, axes
 from services.safety.core.state import State
@@ -217,6 +217,6 @@ def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:
     """Return whether a neutral request is due; other causes must clear first."""
     if requested is None or requested.is_release:
         return False
-    if any(wants_neutral(name) for name in state.latches):
+    if not BARRING.isdisjoint(state.latches):
         return False
-    return not state.arbiter.channels[requested.source].neutral
+    return not state.arbiter.is_neutral(requested.source)

@@ -7,8 +7,7 @@ arrives with it:
 2. sense     update sonars, runaway, standstill and the travel of a release
 3. observe   observe every cause that does not depend on a request (``conditions.py``)
 4. handle    carry out a reset (``operator_requests.py``)
-5. arm       arm the sources that are neutral, disarm those that are overruled; begin, continue or
-             end a release
+5. arm       note which sources are overruled; begin, continue or end a release
 6. conclude  plan the requested motion (``planning.py``), then apply the worst action
              (``causes.py``)
 
@@ -36,7 +35,6 @@ from services.safety.core.causes import (
     latched,
     observe,
     ordered,
-    wants_neutral,
 )
 from services.safety.core.conditions import observe_inputs
 from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, LimitRequest, Reset
@@ -157,15 +155,14 @@ class Policy:
                 state.latches.get("contact"), held["contact"], state.leg, now_ns
             )
             release = replace(release, unknown=release.unknown or "predecessor" in held)
-        return replace(state, latches=held, fault_budget=budget, release=release)
+        arbiter = state.arbiter if BARRING.isdisjoint(held) else state.arbiter.barred(now_ns)
+        return replace(state, latches=held, fault_budget=budget, release=release, arbiter=arbiter)
 
     def _arm(self, state: State, now_ns: int) -> State:
         arbiter, overrides = state.arbiter, state.overrides
         if state.sonar_array.unseen or overrides.since:
             operators = self.settings.operators & arbiter.requesting_zero(now_ns)
             overrides = overrides.updated(state.sonar_array.unseen, operators, now_ns)
-        disarm = any(wants_neutral(name) for name in state.latches)
-        arbiter = arbiter.disarmed() if disarm else arbiter.armed(now_ns)
         return replace(state, arbiter=arbiter.overruled(now_ns), overrides=overrides)
 
     def _conclude(

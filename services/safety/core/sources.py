@@ -29,8 +29,8 @@ the source of motion then needs a neutral request: the third party sees what saf
 only a new request of an operator or a program may start the vehicle, never a stick that is still
 pushed. The silence of a source is a setting: ``stop`` stops the vehicle (``limit_silent``) from the
 start of safety until the first limit, and after each lease; ``ignore`` has no effect. Two
-publishers on one source stop the vehicle (``two_publishers`` and ``limit_stop``), for the lease of
-the source and 0.5 s at least: nobody knows which of both is right, and the other one may be slow.
+publishers on one source stop the vehicle (``two_publishers``), for the lease of the source and
+0.5 s at least: nobody knows which of both is right, and the other one may be slow.
 
 **Keepalives** of emergency stops, as a pendant with a radio link. Before the first message of a
 name the cause ``starting`` inhibits. From then on its silence latches ``estop_keepalive`` and
@@ -132,8 +132,7 @@ class DriveChannel(Channel, frozen=True, kw_only=True):
 
     requested: Twist = STILL
     release: ReleaseRequest = "none"  # instead of ``requested``, which is zero then
-    neutral: bool = False
-    neutral_ns: int | None = None  # reception of its newest neutral request
+    neutral_ns: int | None = None  # reception of its newest neutral request that counts
     overruled_by: str = ""  # the source that was in control since this one was neutral
 
     @property
@@ -147,6 +146,7 @@ class Arbiter(Struct, frozen=True):
 
     sources: Mapping[str, Source]
     channels: Mapping[str, DriveChannel] = {}
+    barred_ns: int = 0  # the last decision with a cause that wants a neutral request
 
     def accept(self, request: DriveRequest, admission: Admission) -> tuple["Arbiter", str]:
         """Check a request; return the reason of its refusal, empty when accepted."""
@@ -160,7 +160,7 @@ class Arbiter(Struct, frozen=True):
         if not refused:
             # A program that was suspended must not drive on by itself.
             if not before.is_fresh(request.received_ns, lease_s + LAPSE_S):
-                channel = replace(channel, neutral=False, neutral_ns=None)
+                channel = replace(channel, neutral_ns=None)
             channel = _requesting(channel, drive, request.received_ns)
         return replace(self, channels={**self.channels, name: channel}), refused
 
@@ -178,23 +178,18 @@ class Arbiter(Struct, frozen=True):
         leader = self.in_control(now_ns)
         return [leader] if leader and self.channels[leader].in_conflict(now_ns) else []
 
-    def disarmed(self) -> "Arbiter":
-        """Return the arbiter with a neutral request due on every source."""
-        channels = {name: replace(one, neutral=False) for name, one in self.channels.items()}
-        return replace(self, channels=channels)
+    def barred(self, now_ns: int) -> "Arbiter":
+        """Return the arbiter with a neutral request due on every source, received from now on."""
+        return replace(self, barred_ns=now_ns)
+
+    def is_neutral(self, source: str) -> bool:
+        """Return whether the source has sent the neutral request that is due before motion."""
+        neutral_ns = self.channels[source].neutral_ns
+        return neutral_ns is not None and neutral_ns > self.barred_ns
 
     def requesting_zero(self, now_ns: int) -> set[str]:
         """Return the sources that request zero now."""
         return {name for name in self._fresh(now_ns) if not self.channels[name].requests_motion}
-
-    def armed(self, now_ns: int) -> "Arbiter":
-        """Return the arbiter with the sources armed that request zero now."""
-        neutral = self.requesting_zero(now_ns)
-        channels = {
-            name: replace(one, neutral=True, overruled_by="") if name in neutral else one
-            for name, one in self.channels.items()
-        }
-        return replace(self, channels=channels)
 
     def overruled(self, now_ns: int) -> "Arbiter":
         """Return the arbiter with a neutral request due on sources below the one in control."""
@@ -203,7 +198,7 @@ class Arbiter(Struct, frozen=True):
             return self
         priority = self.sources[leader].priority
         below = {
-            name: replace(one, neutral=False, neutral_ns=None, overruled_by=leader)
+            name: replace(one, neutral_ns=None, overruled_by=leader)
             for name, one in self.channels.items()
             if self.sources[name].priority < priority
         }
@@ -221,7 +216,9 @@ def _requesting(channel: DriveChannel, drive: Drive, received_ns: int) -> DriveC
     """Return the channel with a new request."""
     twist = Twist(drive.linear, drive.angular) if drive.release == "none" else STILL
     channel = replace(channel, requested=twist, release=drive.release)
-    return channel if channel.requests_motion else replace(channel, neutral_ns=received_ns)
+    if channel.requests_motion:
+        return channel
+    return replace(channel, neutral_ns=received_ns, overruled_by="")
 
 
 class LimitChannel(Channel, frozen=True, kw_only=True):
@@ -286,7 +283,6 @@ class SpeedLimits(Struct, frozen=True):
         if not self.sources:
             return
         stopping = [f"{name}{one.because}" for name, one in self._valid(now_ns) if one.stops]
-        stopping += [f"{name}: two publishers" for name in self._in_conflict(now_ns)]
         silent = ", ".join(self._silent(now_ns))
         silent_text = f"No speed limit arrives of {silent}."
         yield Observation("limit_stop", bool(stopping), text=f"Stopped by {', '.join(stopping)}.")

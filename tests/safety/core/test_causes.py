@@ -15,7 +15,6 @@ from services.safety.core.causes import (
     Observation,
     observe,
     ordered,
-    wants_neutral,
 )
 
 SETTLE_NS = 500
@@ -41,7 +40,7 @@ TABLE: list[tuple[str, Action, Clears]] = [
     ("unarmed", "stop", SETTLED),
     ("limit_stop", "stop", NEUTRAL),
     ("limit_silent", "stop", NEUTRAL),
-    ("two_publishers", "stop", AT_ONCE),
+    ("two_publishers", "stop", NEUTRAL),
     ("neutral", "stop", AT_ONCE),
     ("blocked", "stop", AT_ONCE),
     ("no_request", "stop", AT_ONCE),
@@ -63,8 +62,7 @@ def test_order_and_groups_of_the_table() -> None:
     actions = [action for _, action, _ in TABLE]
     assert actions == sorted(actions, key=["brake", "stop", "slow"].index)
     lasting = {name for name, _, clears in TABLE if clears is not AT_ONCE}
-    assert {name for name in names if wants_neutral(name)} == lasting
-    assert lasting | {"two_publishers"} == BARRING
+    assert lasting == BARRING
 
 
 # --- held causes ----------------------------------------------------------------------------

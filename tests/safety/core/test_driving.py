@@ -46,7 +46,7 @@ def test_a_request_holds_for_its_lease_and_not_longer() -> None:
     assert fixture.request(0.5).command == "run"  # the next request drives on
 
 
-def test_two_publishers_stop_the_vehicle_until_one_is_left() -> None:
+def test_two_publishers_stop_the_vehicle_until_one_is_left_and_neutral() -> None:
     fixture = PolicyFixture().running()
     fixture.driver_boot, fixture.driver_seq = 100, 0
     assert fixture.request(0.5).refused == "second_publisher"
@@ -54,7 +54,30 @@ def test_two_publishers_stop_the_vehicle_until_one_is_left() -> None:
     assert fixture.state.latches["two_publishers"].text == "Two publishers use teleop."
     fixture.driver_boot, fixture.driver_seq = 99, 10_000
     assert fixture.drive(0.5, seconds=0.4).command == "stop"
-    assert fixture.drive(0.5, seconds=0.2).command == "run"
+    assert fixture.drive(0.5, seconds=0.2).name == "inhibited"  # the stick is still pushed
+    fixture.drive()
+    assert fixture.drive(0.5, seconds=0.1).command == "run"
+
+
+@pytest.mark.parametrize("zeros_s", [0.0, 0.1])
+def test_a_zero_from_before_a_reset_is_not_neutral(zeros_s: float) -> None:
+    fixture = PolicyFixture().running()
+    fixture.estop()
+    fixture.drive(seconds=1.0)
+    assert fixture.reset() == ""
+    fixture.drive(seconds=zeros_s)
+    fixture.drive(0.5, seconds=0.2)
+    assert fixture.verdict.name == ("run" if zeros_s else "inhibited")
+
+
+def test_a_zero_while_a_higher_source_drives_is_not_neutral() -> None:
+    fixture = PolicyFixture().running()
+    fixture.tick(13)
+    fixture.request(source="nav")
+    fixture.tick(3)  # the lease of teleop ends, that of nav does not
+    assert fixture.request(0.2, source="nav").name == "inhibited"
+    fixture.request(source="nav")
+    assert fixture.request(0.2, source="nav").name == "run"
 
 
 def test_the_higher_priority_drives_and_letting_go_hands_over_after_a_neutral_request() -> None:

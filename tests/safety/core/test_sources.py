@@ -173,7 +173,7 @@ class Publishers(RuleBasedStateMachine):
     )
     def send(self, wait_ns: int, boot: int, seq: int) -> None:
         self.now_ns += wait_ns
-        reason, before = self.expected(boot, seq), replace(self.channel, neutral=True)
+        reason, before = self.expected(boot, seq), replace(self.channel, overruled_by="web")
         goes_on = self.owner is not None and self.owner[0] == boot and seq > self.owner[1]
         message = Drive(linear=0.0, angular=0.0, echo=0, boot=boot, seq=seq)
         lease_s = TELEOP_NS / NS_PER_S
@@ -183,7 +183,7 @@ class Publishers(RuleBasedStateMachine):
             self.conflict_ns = self.now_ns
         elif not reason:
             self.owner = boot, seq, self.now_ns
-            assert self.channel.neutral is goes_on  # another publisher starts anew
+            assert self.channel.overruled_by == "web" * goes_on  # another publisher starts anew
         else:
             assert self.channel == before
 
@@ -223,34 +223,35 @@ def test_a_suspended_source_needs_a_neutral_request(gap_s: float, neutral: bool)
     at_ns = round((SOURCES["teleop"].lease + gap_s) * NS_PER_S)
     drive = Drive(linear=0.5, angular=0.0, echo=43, seq=2, boot=1)
     now = Admission(BEAT.beat(at_ns), AGE_NS, at_ns)
-    arbiter, refused = request(DRIVES)[0].armed(0).accept(DriveRequest("teleop", drive, at_ns), now)
+    arbiter, refused = request(DRIVES, 1)[0].accept(DriveRequest("teleop", drive, at_ns), now)
     assert refused == ""
-    assert arbiter.channels["teleop"].neutral is neutral
+    assert arbiter.is_neutral("teleop") is neutral
 
 
-def test_only_a_fresh_zero_arms_and_disarming_is_for_all() -> None:
-    arbiter = request(request(DRIVES)[0], source="web", linear=0.5)[0].armed(0)
-    assert arbiter.channels["teleop"].neutral
-    assert not arbiter.channels["web"].neutral
-    arbiter = arbiter.disarmed()
-    assert arbiter.channels["teleop"].neutral is False
-    assert not arbiter.armed(NS_PER_S).channels["teleop"].neutral
+def test_a_zero_counts_that_was_received_after_the_last_bar() -> None:
+    arbiter = request(request(DRIVES, 5)[0], 5, source="web", linear=0.5)[0]
+    assert not arbiter.is_neutral("web")
+    assert arbiter.is_neutral("teleop")
+    assert arbiter.barred(4).is_neutral("teleop")
+    assert not arbiter.barred(5).is_neutral("teleop")
 
 
 def test_the_source_in_control_overrules_lower_ones_only() -> None:
     arbiter, lowest = DRIVES, request(DRIVES, source="nav")[0]
     assert [one.overruled(0) is one for one in (arbiter, lowest)] == [True, True]
     for source in ("teleop", "web", "nav"):
-        arbiter, _ = request(arbiter, source=source)
-    arbiter = request(arbiter, source="demo", linear=0.3)[0].armed(0)
+        arbiter, _ = request(arbiter, 1, source=source)
+    arbiter = request(arbiter, 1, source="demo", linear=0.3)[0]
     assert arbiter.overruled(NS_PER_S).channels == arbiter.channels  # nobody holds it
     lower = {name: one for name, one in arbiter.channels.items() if name != "teleop"}
-    overruled = replace(arbiter, channels=lower).overruled(0)
-    states = {name: (one.neutral, one.overruled_by) for name, one in overruled.channels.items()}
-    assert states == {"web": (True, ""), "demo": (False, "web"), "nav": (False, "web")}
-    again = overruled.armed(0).channels
-    assert (again["nav"].neutral, again["nav"].overruled_by) == (True, "")
-    assert again["demo"].overruled_by == "web"  # it asks for motion
+    overruled = replace(arbiter, channels=lower).overruled(1)
+    states = {name: one.overruled_by for name, one in overruled.channels.items()}
+    assert states == {"web": "", "demo": "web", "nav": "web"}
+    assert [name for name in states if overruled.is_neutral(name)] == ["web"]
+    again, _ = request(overruled, 2, source="nav", seq=9)
+    assert (again.is_neutral("nav"), again.channels["nav"].overruled_by) == (True, "")
+    again, _ = request(overruled, 2, source="demo", seq=9, linear=0.3)
+    assert again.channels["demo"].overruled_by == "web"  # it asks for motion
 
 
 def test_a_release_requests_no_other_motion() -> None:
@@ -331,7 +332,6 @@ def test_a_second_limiting_publisher_stops_for_the_lease_and_half_a_second_at_le
     limits, refused = limit(limit(limits)[0], boot=2)
     assert refused == "second_publisher"
     assert limits.conflicts(until_ns - 1) == ["limit lidar"]
-    assert next(limits.observations(until_ns - 1)).text == "Stopped by lidar: two publishers."
     assert limits.conflicts(until_ns) == []
 
 
