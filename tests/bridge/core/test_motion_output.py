@@ -117,32 +117,6 @@ def test_before_the_first_lease_the_coast_limit_counts() -> None:
     assert made.tick(NOW + NS_PER_S + 40 * MS) == [BRAKE]
 
 
-@pytest.mark.parametrize(("distance", "left"), [(0.05, False), (0.0501, True), (-0.0501, True)])
-def test_away_by_the_counters(stood: Output, distance: float, left: bool) -> None:
-    stood.counts(3.0, END)
-    stood.counts(3.0 + distance, END + 40 * MS)
-    stood.counts(9.0, END + 40 * MS, epoch=1)  # a restart of the board is no motion
-    stood.moves(0.0, END + 40 * MS)
-    assert stood.tick(END + 40 * MS) == [BRAKE if left else STOP]
-    assert stood.events == [UNCOMMANDED] * left
-    assert stood.tick(END + 80 * MS) == [BRAKE if left else STOP]
-    assert stood.events == [UNCOMMANDED] * left, "once"
-
-
-def test_what_it_did_before_it_stood_does_not_count(output: Output) -> None:
-    output.moves(1.0, NOW)
-    output.counts(0.0, NOW)
-    output.tick(END)
-    for number in range(10):
-        output.moves(1.0, END + number * 20 * MS)
-        output.counts(0.1 * number, END + number * 20 * MS)
-    output.moves(0.0, END + 200 * MS)
-    output.counts(5.0, END + 200 * MS)
-    output.moves(0.1, END + 220 * MS)
-    output.tick(END + 220 * MS)
-    assert output.events == []
-
-
 def test_while_the_lease_is_valid_safety_supervises_it(stood: Output) -> None:
     stood.counts(0.0, END)
     stood.renew(END)
