@@ -63,10 +63,9 @@ def run(options: argparse.Namespace) -> int:
         played = 0
         with until_interrupt():
             for each in reader:
-                path = chunks(each.key)[1]
-                if target.takes(path) and is_selected(each.key, tuple(options.only)):
+                if is_selected(each.key, tuple(options.only)):
                     pacer.wait(each.log_ns)
-                    played += target.play(path, each.sample)
+                    played += target.play(chunks(each.key)[1], each.sample)
     if reader.cut:
         print("t2 replay: the recording is truncated; played what is readable", file=sys.stderr)
     print(f"played {played} messages", file=sys.stderr)
@@ -109,13 +108,9 @@ class BusTarget:
             )
         return alive
 
-    def takes(self, path: str) -> bool:
-        """Return whether a key may be played beside the services that run."""
-        return is_played(path, self._alive)
-
     def play(self, path: str, sample: Sample) -> bool:
-        """Publish the original bytes; return whether anything was sent."""
-        if sample.deleted:
+        """Publish the original bytes, if allowed; return whether anything was sent."""
+        if sample.deleted or not is_played(path, self._alive):
             return False
         key = f"{keys.ROOT}/{self._robot}/{path}"
         topic = topic_of(key)
@@ -150,10 +145,6 @@ class BoardTarget:
 
     def check(self) -> None:
         """Do nothing: no condition can change."""
-
-    def takes(self, path: str) -> bool:
-        """Return True: the frames of all keys are played."""
-        return True
 
     def play(self, path: str, sample: Sample) -> bool:
         """Send the raw frame attached to a message; return whether there is one."""
