@@ -9,7 +9,7 @@ id for a name. The admin space omits keys that begin with ``@`` (eclipse-zenoh 1
 import argparse
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -131,45 +131,36 @@ def warn_if_closed(found: Sequence[Member]) -> None:
 
 
 def discover(probe: Probe, robot: str) -> list[Member]:
-    """Return the services by name, then the other sessions."""
-    declared = {
-        each.key: read(each.payload, each.encoding).value
-        for each in probe.query(ADMIN.format(robot=robot))
-        if not each.refusal
-    }
-    return members(probe.alive(keys.live_key(robot, "*", "*")), declared, probe.zid)
-
-
-def members(tokens: Sequence[str], declared: Mapping[str, Any], own: str) -> list[Member]:
-    """Return the members of liveliness tokens and of the admin space, without ``own``."""
+    """Return the services by name, then the other sessions except this one."""
     named = {}
-    for token in tokens:
-        robot, path = chunks(token)
+    for token in probe.alive(keys.live_key(robot, "*", "*")):
+        owner, path = chunks(token)
         name, _, instance = path.removeprefix("live/").partition("/")
-        named[token] = Member(name, robot, instance)
+        named[token] = Member(name, owner, instance)
+    entries = list(declarations(probe, robot))
     by_zid: dict[str, Member] = {}
-    entries = [_entry(key, value) for key, value in declared.items()]
     for role, key, zids in entries:
         if role == "token" and key in named:
             by_zid |= dict.fromkeys(zids, named[key])
     for role, key, zids in entries:
         if role in ROLES and ZENOH_OWN not in key:
-            for zid in zids - {own}:
+            for zid in zids - {probe.zid}:
                 member = by_zid.setdefault(zid, Member(zid[:8]))
                 getattr(member, ROLES[role]).add(key)
     found = [*named.values(), *(each for each in by_zid.values() if not each.instance)]
     return sorted(found, key=lambda each: (not each.instance, each.robot, each.name, each.instance))
 
 
-def _entry(key: str, value: Any) -> tuple[str, str, set[str]]:
-    """Return role, key and session ids of one entry ``@/ZID/MODE/ROLE/KEY``.
+def declarations(probe: Probe, robot: str) -> Iterator[tuple[str, str, set[str]]]:
+    """Yield role, key and sessions of each declaration.
 
     All sessions are clients; other entries are routers that declare on behalf of their clients.
     """
-    parts = key.split("/", 4)
-    if len(parts) < 5 or not isinstance(value, dict):
-        return "", "", set()
-    return parts[3], parts[4], set(value.get("clients") or ())
+    for each in probe.query(ADMIN.format(robot=robot)):
+        value = read(each.payload, each.encoding).value
+        if not each.refusal and isinstance(value, dict):
+            _, _, _, role, key = each.key.split("/", 4)
+            yield role, key, {*(value.get("clients") or ())}
 
 
 def as_json(member: Member, robot: str) -> dict[str, Any]:
