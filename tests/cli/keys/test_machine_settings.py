@@ -19,22 +19,12 @@ ANNA = profile("driver", "anna", ("001",), ())
 FILES = {"ca": "ca.pem", "certificate": "certificate.pem", "private_key": "private.key"}
 
 
-def test_a_robots_router_listens_on_socket_and_tls() -> None:
-    assert tomllib.loads(bus_toml(ROBOT, [OTHER])) == {
-        "robot": {"id": "001"},
-        "bus": {"listen": [SOCKET, "tls/0.0.0.0:7447"], "members": "members.json", **FILES},
-    }
-
-
-def test_a_robots_router_connects_to_its_sites() -> None:
-    bus = tomllib.loads(bus_toml(ROBOT, [OTHER, SITE]))["bus"]
-    assert bus["uplink"] == ["tls/site.example:7447"]
-
-
-def test_a_site_has_no_robot_id() -> None:
-    table = tomllib.loads(bus_toml(SITE, [ROBOT]))
-    assert "robot" not in table
-    assert "uplink" not in table["bus"]
+def test_a_router_listens_on_socket_and_tls() -> None:
+    bus = {"listen": [SOCKET, "tls/0.0.0.0:7447"], "members": "members.json", **FILES}
+    assert tomllib.loads(bus_toml(ROBOT, [OTHER])) == {"robot": {"id": "001"}, "bus": bus}
+    assert tomllib.loads(bus_toml(SITE, [ROBOT])) == {"bus": bus}  # without a robot's id
+    uplink = {"uplink": ["tls/site.example:7447"]}
+    assert tomllib.loads(bus_toml(ROBOT, [OTHER, SITE]))["bus"] == bus | uplink
 
 
 @pytest.mark.parametrize(
