@@ -114,7 +114,7 @@ class Node(Generic[C]):
             bus.answer_queries()
 
     def _report(self, now_ns: int) -> None:
-        counts = Counter(self.bus.counts)
+        counts = sum((bus.counts for bus in self.buses), Counter[str]())
         past_s = (now_ns - self._reported_ns) / NS_PER_S
         rates = {key: (n - self._counted[key]) / past_s for key, n in sorted(counts.items())}
         self._counted, self._reported_ns = counts, now_ns
@@ -124,7 +124,7 @@ class Node(Generic[C]):
                 version=VERSION,
                 uptime=(now_ns - self._started_ns) / NS_PER_S,
                 rates=rates,
-                counters=dict(self.bus.counters + self.counters),
+                counters=dict(sum((bus.counters for bus in self.buses), self.counters)),
                 lateness=self.loop.take_lateness_s(),
                 rss=resident_bytes(),
                 priority=realtime.priority(),

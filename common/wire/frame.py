@@ -32,7 +32,7 @@ from common.errors import WireError
 MAGIC = b"GS"
 OPENING = Struct("<2sHH")  # magic, size, id
 HEADER = Struct("<6sH")  # opening, CRC
-CRC_OFFSET, PAYLOAD_OFFSET = 6, 8
+PAYLOAD_OFFSET = 8
 
 SIGN_BIT = 0x8000
 MAGNITUDE_MAX = 0x7FFF
@@ -45,6 +45,14 @@ class Field(msgspec.Struct, frozen=True):
     lowest: int = 0
     highest: int = 0xFF
     meaning: Mapping[int, Any] = {}  # by the number on the wire
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise ``WireError`` for a value that the wire cannot carry."""
+        if self.meaning:
+            if value not in self.meaning.values():
+                raise refusal(name, value, ", ".join(map(str, self.meaning)))
+        elif not self.lowest <= value <= self.highest:
+            raise refusal(name, value, f"{self.lowest}..{self.highest}")
 
     def decode(self, name: str, number: int) -> Any:
         """Return the value of the field of this name; raise ``WireError`` for an unknown one."""
@@ -99,9 +107,7 @@ class Frame(msgspec.Struct, frozen=True, gc=False):
     def __post_init__(self) -> None:
         # 3 equivalent mutants: there is a row for each attribute.
         for name, field in zip(self.__struct_fields__, self.FIELDS, strict=True):
-            value = getattr(self, name)
-            if not (field.meaning or field.lowest <= value <= field.highest):
-                raise refusal(name, value, f"{field.lowest}..{field.highest}")
+            field.check(name, getattr(self, name))
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""

@@ -37,7 +37,8 @@ def main() -> int:
     if DESCRIPTORS_ENV not in os.environ:
         print("bridge: start it by `python -m services.bridge`", file=sys.stderr)  # noqa: T201
         return 2
-    # systemd sends these to guard and bridge alike; the guard passes them on.
+    # Supervisors send these to guard and bridge alike. The guard passes on SIGHUP, and its death by
+    # SIGQUIT stops the vehicle.
     for number in (signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     *sockets, pipe = map(int, os.environ[DESCRIPTORS_ENV].split(","))

@@ -57,7 +57,7 @@ class Host:
         for number in (signal.SIGINT, signal.SIGTERM):
             # The server handles the signal and raises it again when it has ended.
             signal.signal(number, lambda *_: None)
-        self._node.bus.open()
+        self._node.open()
         self._thread.start()
         self._log_address()
         try:
@@ -81,8 +81,7 @@ class Host:
             self._error = error
             self._server.should_exit = True
         self._fleet.close()
-        self._node.bus.close()
-        self._node.loop.close()
+        self._node.close()
         self._node.log.info("stopped")
 
     def _log_address(self) -> None:

@@ -73,7 +73,7 @@ class TeleopProcess:
         post = self._node.loop.post
         _on_signal(self._leave, signal.SIGINT, signal.SIGTERM)
         _on_signal(self._hang_up, signal.SIGHUP)
-        self._node.bus.open()
+        self._node.open()
         self._thread.start()
         try:
             self._screen(
@@ -94,8 +94,7 @@ class TeleopProcess:
             self._node.loop.run()
         except BaseException as error:  # raised again in the main thread, once the screen is down
             self._error = error
-        self._node.bus.close()
-        self._node.loop.close()
+        self._node.close()
         if self._lost:
             os._exit(EXIT_HANGUP)
 

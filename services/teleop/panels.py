@@ -22,7 +22,7 @@ from services.teleop.view import Line, View
 Part = tuple[str, str]  # text and its style
 
 GOOD, WARN, BAD, DIM = "green", "bold yellow", "bold red", "grey58"
-NO_DATA, MOVE_STICK = ("no data", DIM), ("no event: MOVE THE STICK", WARN)
+NO_DATA = ("no data", DIM)
 KEY = "bold black on cyan"
 HELD = "bold black on yellow"
 DIRECTIONS: dict[Direction, tuple[str, Direction]] = {  # key and opposite direction

@@ -47,7 +47,6 @@ class MotionOutput:
         self.port = 0
         self._boot = boot
         self._translator = translator
-        self._packed = {order: framing.pack(translator.command(order)) for order in (STOP, BRAKE)}
         self._counters = counters
         self._velocity: Latest[Twist] | None = None
         # 2 equivalent mutants: it is read after a hit only.
@@ -161,10 +160,7 @@ class MotionOutput:
 
     def order(self, order: Command, motion: Motion | None = None) -> Send:
         """Return the frame of an order, from the command port."""
-        # 2 equivalent mutants: without it they are packed each time.
-        datagram = self._packed.get(order)
-        if datagram is None:
-            datagram = framing.pack(self._translator.command(order, motion))
+        datagram = framing.pack(self._translator.command(order, motion))
         return Send(datagram, self.port, order)
 
     def _is_at_standstill(self, now_ns: int) -> bool:

@@ -10,8 +10,8 @@ Each of these rules releases controls that are still held down (``RULES``):
 ============== ============================================ ================== ==================
 rule           condition                                    keys count again   deadman counts
 ============== ============================================ ================== ==================
-stop           space, E, quit, or F and B, which exclude    with the next      again after it was
-               driving                                      press              up
+stop           space, E, quit                               with the next      after it was up
+                                                            press
 unfocused      the terminal lost the focus, and with it     with the next      after it was up
                the repeats                                  press
 terminal_slow  ``round_trip`` refuses a key                 after a pause      not released

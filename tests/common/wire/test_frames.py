@@ -113,6 +113,8 @@ REFUSED: list[tuple[Callable[[], Frame], str]] = [
         for value in (-1, 256)
     ),
     (partial(lamp, 2, 11), "on_lightness is 11, allowed is 0..10"),
+    (partial(c.MotionCommand, 9), "kind is 9, allowed is 0, 1, 2"),  # type: ignore[arg-type]
+    (partial(c.BumperBrakeSet, 2), "on is 2, allowed is 0, 1"),  # type: ignore[arg-type]
     *(
         (partial(r.DistanceReport, mm, 0), f"distance_mm is {mm}, allowed is -2147483648..21474836")
         for mm in (2**31, -(2**31) - 1)
