@@ -1,4 +1,4 @@
-"""The simulator's UDP sockets: the board's, and the control socket with its client.
+"""The simulator's UDP sockets: the board's, and the control socket.
 
 On the control socket, one JSON request in a datagram gets one JSON reply in another. It is for
 tests and demonstrations on this host, and off unless ``sim.control_port`` is set. Requests are
@@ -11,19 +11,17 @@ from collections.abc import Iterator
 
 import msgspec
 
-from common.errors import LinkError, MessageError
+from common.errors import LinkError
 from common.settings import Board
 from sim.faults import Datagram
-from sim.requests import Asked, GetTruth
+from sim.requests import Asked
 from sim.simulation import Reply, Simulation
-from sim.trace import Truth
 
 HOST = "127.0.0.1"  # of the control socket
 LARGEST = 65536
 BURST = 256  # datagrams per round, so that a flood does not stall the simulation
 
 _requests = msgspec.json.Decoder(Asked)
-_replies = msgspec.json.Decoder(Reply)
 
 
 class BoardSocket:
@@ -77,38 +75,6 @@ class ControlSocket:
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             return Reply(ok=False, error=str(error))
         return self._simulation.handle(request, now_ns)
-
-
-class Control:
-    """A client of the control socket."""
-
-    def __init__(self, port: int, timeout_s: float = 5.0) -> None:
-        self._port = port
-        self._timeout_s = timeout_s
-
-    def do(self, request: Asked) -> Reply:
-        """Send a request; ``MessageError`` when it is refused, ``LinkError`` when none answers."""
-        try:
-            reply = _replies.decode(self._exchange(msgspec.json.encode(request)))
-        except OSError as error:  # includes timeouts
-            raise LinkError(f"the simulator's control socket: {error}") from None
-        if not reply.ok:
-            raise MessageError(reply.error)
-        return reply
-
-    def truth(self) -> Truth:
-        """Return the true state; errors as in ``do``."""
-        truth = self.do(GetTruth()).truth
-        assert truth is not None
-        return truth
-
-    def _exchange(self, payload: bytes) -> bytes:
-        # A socket for each request: a late reply to an earlier one must not be taken for its own.
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-            sock.settimeout(self._timeout_s)
-            sock.connect((HOST, self._port))
-            sock.send(payload)
-            return sock.recv(LARGEST)
 
 
 def bound(address: str, port: int, setting: str) -> socket.socket:

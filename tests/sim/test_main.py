@@ -20,10 +20,10 @@ from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
 from sim.__main__ import main
 from sim.requests import Bumper, Place, PowerCycle
-from sim.sockets import Control
 from sim.trace import read
 from tests.common.rights import needs_right
 from verification.harness.ports import free_port
+from verification.harness.stack import Control
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 

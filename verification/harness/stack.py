@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import msgspec
+
 from cli.demo import host_stalls
 from cli.demo.score import Trace, read
 from cli.run.up import commands
@@ -18,7 +20,11 @@ from cli.settings import Everything
 from common import clock
 from common.cli_args import source_words
 from common.config import Sources, load
-from sim.sockets import Control
+from common.errors import LinkError, MessageError
+from sim.requests import Asked, GetTruth
+from sim.simulation import Reply
+from sim.sockets import HOST, LARGEST
+from sim.trace import Truth
 from verification.harness.bus import set_options
 from verification.harness.ports import free_port, udp_ports
 from verification.harness.waiting import wait_until
@@ -26,6 +32,38 @@ from verification.harness.waiting import wait_until
 BESIDE_OTHERS_S = 0.3  # stalls to expect while other tests run
 UP_S = 60.0  # on a shared host
 SETTINGS_FILE = "stack.toml"  # read by all processes when it is in the folder of the stack
+
+
+class Control:
+    """A client of the simulator's control socket."""
+
+    def __init__(self, port: int, timeout_s: float = 5.0) -> None:
+        self._port = port
+        self._timeout_s = timeout_s
+
+    def do(self, request: Asked) -> Reply:
+        """Send a request; ``MessageError`` when it is refused, ``LinkError`` when none answers."""
+        try:
+            reply = msgspec.json.decode(self._exchange(msgspec.json.encode(request)), type=Reply)
+        except OSError as error:  # includes timeouts
+            raise LinkError(f"the simulator's control socket: {error}") from None
+        if not reply.ok:
+            raise MessageError(reply.error)
+        return reply
+
+    def truth(self) -> Truth:
+        """Return the true state; errors as in ``do``."""
+        truth = self.do(GetTruth()).truth
+        assert truth is not None
+        return truth
+
+    def _exchange(self, payload: bytes) -> bytes:
+        # A socket for each request: a late reply to an earlier one must not be taken for its own.
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+            sock.settimeout(self._timeout_s)
+            sock.connect((HOST, self._port))
+            sock.send(payload)
+            return sock.recv(LARGEST)
 
 
 @dataclass

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import t2
-from sim.sockets import Control
 from sim.trace import Truth
 from verification.harness.network_hosts import in_network
+from verification.harness.stack import Control
 from verification.harness.waiting import becomes_true, wait_until
 
 ROOT = Path(__file__).parents[2]
