@@ -22,15 +22,13 @@ import msgspec
 
 from common import child_process, realtime
 from common import log as logs
-from common.bus.session import RUNTIME_ENV, answers, router_at
+from common.bus.session import ONE_POOL, RUNTIME_ENV, answers, router_at
 from common.child_process import Backoff
 from common.settings import BusSettings, Log
 
 MISSES = 2  # in a row: a hang; a single one may be a stall
 STALL_S = 0.5  # beyond the deadline of an attempt: the host stalled the probe and the router
 ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # they reach the group; the parent decides
-# One thread pool for the probe: further threads only cost wake-ups.
-POOL = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app))"
 
 
 class Setup(msgspec.Struct, frozen=True):
@@ -76,7 +74,9 @@ class RouterProbe:
 
     def _follow(self, on_answer: Callable[[], None]) -> None:
         with subprocess.Popen(
-            self._command, stdout=subprocess.PIPE, env=child_process.environ() | {RUNTIME_ENV: POOL}
+            self._command,
+            stdout=subprocess.PIPE,
+            env=child_process.environ() | {RUNTIME_ENV: ONE_POOL.format(links=2)},
         ) as self._probe:
             if self._stopped.is_set():  # stopped while the probe started
                 self._probe.kill()
