@@ -23,13 +23,13 @@ from common.keys import Topic
 from common.messages import Message, ResetDone
 from common.motion import Twist
 from common.settings import Shared
+from common.wire.frame import PAYLOAD_OFFSET
 
 SOURCE = "checkout"  # as in safety's settings
 STACK_S = 10.0
 READY_S = 8.0  # wait for safety to grant motion; a cause that clears by itself needs 0.5 s
 REST_S = 3.0  # wait for standstill after the release
 ZEROS_S = 0.15  # three requests
-PAYLOAD_OFFSET = 8  # of a frame
 TOPICS = (keys.LINK, keys.MOTION, keys.VELOCITY, keys.MILEAGE, keys.ULTRASONIC, keys.BUMPER,
           keys.SWITCHES, keys.DRIVER, keys.HEALTH)  # fmt: skip
 

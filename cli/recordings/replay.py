@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Self
 
 from cli.inspect.addressing import EVERY_ROBOT, chunks, expression, parse_key, topic_of
+from cli.inspect.estop import MOVES
 from cli.inspect.session import (
     BusSession,
     add_options,
@@ -36,7 +37,6 @@ from common.settings import Board
 from services.bridge.config import BridgeConfig
 
 CHECK_S = 1.0  # between two checks of the target
-DECIDING = ("bridge", "safety")  # services that act, and on whose messages others act
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -101,7 +101,7 @@ class BusTarget:
     def check(self) -> set[str]:
         """Return the running services; raise ``RobotError`` if bridge or safety is among them."""
         alive = {service for _, service in services(self._probe, self._robot)}
-        if running := " and ".join(name for name in DECIDING if name in alive):
+        if running := " and ".join(name for name in MOVES if name in alive):
             raise RobotError(
                 f"robot {self._robot} has a running {running}: others would take replayed messages "
                 "for the real ones. Stop it, or replay as another robot: --robot replay"
