@@ -51,18 +51,6 @@ def test_it_passes_both_ways_port_by_port_byte_for_byte(relay: RunningRelay) -> 
             assert wait_for(relay.pc[port], datagram) == (PC_SIDE, relay.board_port)
 
 
-def test_a_silent_pc_is_braked_for_until_it_is_neutral(relay: RunningRelay) -> None:
-    pass_commands(relay)
-    relay.to_board(RUN)
-    wait_for(relay.board, RUN)
-    assert relay.wait_for("silent")["counters"]["silent"] >= 1
-    relay.to_board(RUN)
-    after = received(relay.board, 0.5)
-    assert set(after) == {wire.BRAKE}
-    assert len(after) > 5
-    pass_commands(relay)
-
-
 def test_it_brakes_for_a_hit_by_itself(relay: RunningRelay) -> None:
     pass_commands(relay)
     drain(relay.board)
