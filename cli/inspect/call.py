@@ -5,7 +5,6 @@ fills it in, and the causes of a reset. A reset succeeds when safety's state con
 """
 
 import argparse
-import json
 from typing import Any
 
 import msgspec
@@ -110,9 +109,8 @@ def filled(call: Call[Any, Any], request: Request, seen: SafetyState) -> Request
 def json_object(text: str) -> Request:
     """Parse the request."""
     try:
-        message = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is not JSON: {error}") from None
-    if not isinstance(message, dict):
-        raise argparse.ArgumentTypeError(f"""{text!r} is not an object, such as '{{"x": 1}}'""")
-    return message
+        return msgspec.json.decode(text, type=Request)
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise argparse.ArgumentTypeError(
+            f"""{text!r} is not a JSON object, such as '{{"x": 1}}': {error}"""
+        ) from None

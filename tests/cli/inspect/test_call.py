@@ -150,7 +150,8 @@ def test_replies_and_refusals(buses: BusFixture, tool: Tool) -> None:
         (("mine/x",), 1, "no call mine/x; `t2 call` lists the calls"),
         (("reset",), 1, "reset is ambiguous: safety/reset, odom/reset"),
         (("bridge/led", '{"chanel": 1}'), 2, "not a LedRequest"),
-        (("safety/reset", "{"), 2, "is not JSON"),
+        (("safety/reset", "{"), 2, "is not a JSON object"),
+        (("safety/reset", "[1]"), 2, "is not a JSON object"),
         (("safety/*",), 2, "matches several keys"),
     ],
 )  # fmt: skip
