@@ -5,11 +5,19 @@ from collections.abc import Iterator
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.messages import SONAR_NAMES, Cause, Direction, Level, Limits, Release, SafetyState
+from common.messages import (
+    SONAR_NAMES,
+    Cause,
+    Direction,
+    Level,
+    Limits,
+    Release,
+    ResetRequest,
+    SafetyState,
+)
 from common.motion import RUN, Twist
 from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched, ordered
 from services.safety.core.inputs import Event as Trigger
-from services.safety.core.inputs import Reset
 from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, spent
 from services.safety.core.policy import Policy
 from services.safety.core.sonars import Sonar
@@ -181,7 +189,7 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         what = "Creeping off the bumper." if began else "No longer creeping off the bumper."
         yield Transition("release" if began else "release_end", "warning", what, {})
     yield from _release_events(before.release.refusal, after.release.refusal)
-    if isinstance(trigger, Reset) and (reply := new.reply) is not None:
+    if isinstance(trigger, ResetRequest) and (reply := new.reply) is not None:
         if reply.done:
             yield Transition("reset", "info", reply.text, {})
         else:

@@ -31,7 +31,6 @@ from services.safety.core.inputs import (
     Inputs,
     KeepaliveRequest,
     LimitRequest,
-    Reset,
 )
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, State
@@ -153,7 +152,7 @@ class SafetyService:
                 ResetDone(text=reply.text, boot=boot, heartbeat=heartbeat, cleared=reply.cleared)
             )
 
-        self._decide(Reset(request.echo, request.causes), answer)
+        self._decide(request, answer)
 
     def _decide(
         self, event: Event | None = None, answer: Callable[[Reply], None] | None = None

@@ -5,9 +5,9 @@ from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
 from common.codec import decode, encode
-from common.messages import MAX_REASON, MAX_TEXT, Limits, SafetyState
+from common.messages import MAX_REASON, MAX_TEXT, Limits, ResetRequest, SafetyState
 from services.safety.config import LimitSource, Safety, Source
-from services.safety.core.inputs import Estop, Event, Reset
+from services.safety.core.inputs import Estop, Event
 from services.safety.core.operator_requests import BUMPER_FREE
 from services.safety.report import (
     sentence,
@@ -114,15 +114,15 @@ def test_transitions_are_reported_once() -> None:
     fixture.left_bits = 3
     assert ticked(fixture) == ["driver_fault"]
     assert noted(fixture, Estop()) == ["estop"]
-    assert noted(fixture, Reset()) == ["reset_refused"]
+    assert noted(fixture, ResetRequest()) == ["reset_refused"]
     fixture.pressed, fixture.left_bits = False, 0
     fixture.tick(30)
     fixture.pressed = True
     assert ticked(fixture) == ["contact"]  # another press, although the first is still latched
     fixture.pressed = False
     fixture.tick(30)
-    assert noted(fixture, Reset(fixture.echo, fixture.latched())) == ["reset"]
-    assert noted(fixture, Reset(fixture.echo, (1,))) == ["reset_refused"]
+    assert noted(fixture, ResetRequest(echo=fixture.echo, causes=fixture.latched())) == ["reset"]
+    assert noted(fixture, ResetRequest(echo=fixture.echo, causes=(1,))) == ["reset_refused"]
 
 
 def test_a_change_of_source_is_reported() -> None:

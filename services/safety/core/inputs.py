@@ -14,6 +14,7 @@ from common.messages import (
     Limit,
     Link,
     Mileage,
+    ResetRequest,
     SafetyState,
     SourceMessage,
     Switches,
@@ -49,14 +50,7 @@ class Estop(Struct, frozen=True):
     """A PUT or DELETE on the estop key."""
 
 
-class Reset(Struct, frozen=True):
-    """An operator's call to clear the causes with these identities."""
-
-    echo: int | None = None
-    causes: tuple[int, ...] = ()
-
-
-Event = DriveRequest | LimitRequest | KeepaliveRequest | Estop | Reset
+Event = DriveRequest | LimitRequest | KeepaliveRequest | Estop | ResetRequest
 
 
 class Inputs(Struct, frozen=True):

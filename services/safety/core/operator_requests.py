@@ -8,6 +8,7 @@ and the release that frees it needs the reset. Causes that the reset does not na
 
 from msgspec.structs import replace
 
+from common.messages import ResetRequest
 from services.safety.config import Safety
 from services.safety.core.causes import (
     BARRING,
@@ -19,7 +20,7 @@ from services.safety.core.causes import (
     reset,
     still_present,
 )
-from services.safety.core.inputs import Inputs, Reset
+from services.safety.core.inputs import Inputs
 from services.safety.core.release import SIGN, Release, stopping_distance
 from services.safety.core.sources import DriveChannel
 from services.safety.core.state import Reply, State
@@ -36,7 +37,7 @@ def room(state: State, settings: Safety) -> float:
 
 
 def carry_out(
-    call: Reset, state: State, inputs: Inputs, settings: Safety, now_ns: int
+    call: ResetRequest, state: State, inputs: Inputs, settings: Safety, now_ns: int
 ) -> tuple[State, Reply]:
     """Carry out a reset, or return the reason of its refusal."""
     reason = (
@@ -59,7 +60,7 @@ def carry_out(
     return after, Reply(True, text, cleared)
 
 
-def _not_named(state: State, call: Reset) -> str:
+def _not_named(state: State, call: ResetRequest) -> str:
     """Return why these identities are refused; empty when each names a latched cause."""
     held = latched(state.latches)
     if not held:
@@ -72,7 +73,7 @@ def _not_named(state: State, call: Reset) -> str:
     return ""
 
 
-def _no_reset(state: State, inputs: Inputs, call: Reset, settings: Safety) -> str:
+def _no_reset(state: State, inputs: Inputs, call: ResetRequest, settings: Safety) -> str:
     """Return which cause forbids this reset; empty when it may clear something."""
     new = begun(state.latches, state.decision)
     if new:  # a trip in the same decision wins: the operator has not seen it

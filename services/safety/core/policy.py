@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Motion
+from common.messages import Motion, ResetRequest
 from common.messages import Verdict as VerdictName
 from common.motion import BRAKE, RUN, STILL, STOP, Command
 from common.settings import Vehicle
@@ -37,7 +37,7 @@ from services.safety.core.causes import (
     ordered,
 )
 from services.safety.core.conditions import observe_inputs
-from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, LimitRequest, Reset
+from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, LimitRequest
 from services.safety.core.motion_watch import Supervisor
 from services.safety.core.operator_requests import answered, carry_out
 from services.safety.core.planning import Plan, Planner, observations
@@ -83,7 +83,7 @@ class Policy:
         state = self._observe(state, inputs, now_ns)
         # 1 equivalent mutant: an empty text is as false as None.
         reply = None
-        if isinstance(inputs.event, Reset):
+        if isinstance(inputs.event, ResetRequest):
             state, reply = carry_out(inputs.event, state, inputs, self.settings, now_ns)
         state = self._arm(state, now_ns)
         state = replace(state, release=answered(state, inputs, self.settings, now_ns))

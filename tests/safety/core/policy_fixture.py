@@ -20,6 +20,7 @@ from common.messages import (
     Motion,
     RangeStatus,
     ReleaseRequest,
+    ResetRequest,
     SafetyState,
     Switches,
     Ultrasonic,
@@ -35,7 +36,6 @@ from services.safety.core.inputs import (
     Inputs,
     KeepaliveRequest,
     LimitRequest,
-    Reset,
 )
 from services.safety.core.policy import Policy
 from services.safety.core.state import Verdict
@@ -225,7 +225,9 @@ class PolicyFixture:
 
     def reset(self, *causes: int, echo: int | None = None) -> str:
         """Reset these causes, all by default; return the reason of a refusal."""
-        reply = self.decide(Reset(echo or self.echo, causes or self.latched())).reply
+        reply = self.decide(
+            ResetRequest(echo=echo or self.echo, causes=causes or self.latched())
+        ).reply
         assert reply
         return "" if reply.done else reply.text
 
