@@ -159,17 +159,12 @@ def test_list_of_robots(join: Join, t2: Tool) -> None:
 
 def test_silent_robots_are_listed(join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robots, "LISTEN_S", 0.3)
-    pretend(join("a"), "safety", {})
-    pretend(join("b"), "bridge", {})
-    pretend(join("c"), "dashboard", {})
+    for name, service in (("a", "safety"), ("b", "bridge"), ("c", "dashboard")):
+        pretend(join(name), service, {})
     result = t2("robots")
     assert result.code == 1
-    assert {line["robot"]: line["verdict"] for line in result.lines} == {
-        "a": "silent", "b": "no safety", "c": "-",
-    }  # fmt: skip
-
-
-def test_no_robots(t2: Tool) -> None:
+    verdicts = {line["robot"]: line["verdict"] for line in result.lines}
+    assert verdicts == {"a": "silent", "b": "no safety", "c": "-"}
     result = t2("robots", "--site", "nowhere")
     assert (result.code, result.out) == (1, "")
     assert "no robot found" in result.err

@@ -12,7 +12,8 @@ from tests.cli.inspect.tool import Tool, health, pretend
 from tests.common.bus_fixture import BusFixture
 
 
-def test_health(buses: BusFixture, tool: Tool) -> None:
+def test_health(buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(command, "LISTEN_S", 1.0)
     reactions = {
         "reflex": Durations(bounds=(0.001, 0.01), counts=(98, 1, 1), worst=0.5),
         "judged_stop": Durations(bounds=(0.001, 0.01), counts=(0, 0, 0), worst=0.0),
