@@ -4,7 +4,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -20,23 +20,25 @@ from verification.harness.waiting import wait_until
 SLEEP = ["sleep", "1000"]
 
 
+Supervise = Callable[..., Supervisor]
+
+
 @pytest.fixture
-def supervised() -> Iterator[list[Supervisor]]:
-    """Collects supervisors and kills their processes at the end."""
+def supervise() -> Iterator[Supervise]:
+    """Supervises commands by name, and kills their processes at the end."""
     made: list[Supervisor] = []
-    yield made
+
+    def start(**commands: Sequence[str]) -> Supervisor:
+        made.append(Supervisor(commands))
+        return made[-1]
+
+    yield start
     for supervisor in made:
         for child in supervisor.children:
             if child.process is not None:
                 child.process.kill()
                 child.process.wait()
         supervisor.end()
-
-
-def one(supervised: list[Supervisor], *command: str) -> tuple[Supervisor, Child]:
-    supervisor = Supervisor({"it": command})
-    supervised.append(supervisor)
-    return supervisor, supervisor.children[0]
 
 
 def kill(child: Child) -> None:
@@ -50,8 +52,9 @@ def kill(child: Child) -> None:
 # --- restarts ---------------------------------------------------------------------------------
 
 
-def test_restarts_follow_the_backoff(supervised: list[Supervisor]) -> None:
-    supervisor, child = one(supervised, *SLEEP)
+def test_restarts_follow_the_backoff(supervise: Supervise) -> None:
+    supervisor = supervise(it=SLEEP)
+    (child,) = supervisor.children
     now_s = 100.0
     for wait_s in (*BACKOFF_S, BACKOFF_S[-1]):
         assert supervisor.look(now_s) == 0
@@ -65,10 +68,9 @@ def test_restarts_follow_the_backoff(supervised: list[Supervisor]) -> None:
         now_s += wait_s
 
 
-def test_a_hopeless_process_stops_all_with_its_code(supervised: list[Supervisor]) -> None:
+def test_a_hopeless_process_stops_all_with_its_code(supervise: Supervise) -> None:
     code = EXIT_CONFIG
-    supervisor = Supervisor({"calm": SLEEP, "hopeless": ["sh", "-c", f"exit {code}"]})
-    supervised.append(supervisor)
+    supervisor = supervise(calm=SLEEP, hopeless=["sh", "-c", f"exit {code}"])
     assert supervisor.run() == code
     calm, hopeless = (child.process for child in supervisor.children)
     assert calm is not None
@@ -78,7 +80,7 @@ def test_a_hopeless_process_stops_all_with_its_code(supervised: list[Supervisor]
 
 
 def test_a_safety_that_hangs_is_killed_and_restarted(
-    supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
+    supervise: Supervise, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As systemd does by WatchdogSec; one that has never notified is left alone."""
     monkeypatch.setenv("WATCHDOG_PID", "1")  # of a unit that runs the supervisor
@@ -86,8 +88,7 @@ def test_a_safety_that_hangs_is_killed_and_restarted(
         "import time; from common.systemd import Systemd\n"
         "Systemd().beat(0); time.sleep(1000)"  # none, if it believes to be another process
     )
-    supervisor = Supervisor({"safety": [sys.executable, "-c", notify], "odom": SLEEP})
-    supervised.append(supervisor)
+    supervisor = supervise(safety=[sys.executable, "-c", notify], odom=SLEEP)
     supervisor.look(0.0)
     safety, odom = supervisor.children
     pids = [child.process.pid for child in (safety, odom) if child.process]
@@ -117,14 +118,12 @@ def reporter(name: str, file: Path, on_term: str = "exit 0") -> list[str]:
 
 
 def test_processes_stop_in_reverse_order_and_are_killed_at_last(
-    tmp_path: Path, supervised: list[Supervisor], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, supervise: Supervise, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "PATIENCE_S", 2.0)
     file = tmp_path / "order"
-    supervisor = Supervisor({
-        "a": reporter("a", file), "b": reporter("b", file, on_term=":"), "c": reporter("c", file),
-    })  # fmt: skip
-    supervised.append(supervisor)
+    deaf = reporter("b", file, on_term=":")
+    supervisor = supervise(a=reporter("a", file), b=deaf, c=reporter("c", file))
     supervisor.look(0.0)
     wait_until(lambda: file.exists() and len(file.read_text().split()) == 3, "three starts")
     # Ctrl-C goes to the terminal's process group and must not reach the bridge directly.
