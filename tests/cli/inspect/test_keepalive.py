@@ -64,14 +64,17 @@ def test_it_echoes_the_heartbeat_and_ends_with_a_warning(
 
 
 def test_enter_is_an_emergency_stop(pendant: "subprocess.Popen[str]", safety: Safety) -> None:
+    def more() -> int:
+        """Return the number of stops after more signs of life, which pause during a stop."""
+        count = len(safety.received)
+        wait_until(lambda: len(safety.received) > count + 3, "more signs of life")
+        return len(safety.stops)
+
     assert pendant.stdin is not None
     pendant.stdin.write("\n")
-    pendant.stdin.flush()
-    wait_until(lambda: safety.stops, "the emergency stop")
-    stops, count = len(safety.stops), len(safety.received)
     pendant.stdin.close()  # the end of its input is no key
-    wait_until(lambda: len(safety.received) > count + 3, "more signs of life")
-    assert len(safety.stops) == stops
+    wait_until(lambda: safety.stops, "the emergency stop")
+    assert more() == more()
 
 
 def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
