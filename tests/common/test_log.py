@@ -146,9 +146,9 @@ def pipe() -> Iterator[tuple[int, TextIO]]:
 
 def test_a_file_that_nobody_reads_delays_no_caller(pipe: tuple[int, TextIO]) -> None:
     done = threading.Event()
+    output = log.Output(pipe[1], logging.Formatter())
 
     def log_much() -> None:
-        output = log.Output(pipe[1], logging.Formatter())
         for _ in range(10 * log.QUEUE_MAX):
             output.handle(record(logging.INFO, "x" * 100))
         assert output._lines.qsize() <= log.QUEUE_MAX
@@ -157,6 +157,8 @@ def test_a_file_that_nobody_reads_delays_no_caller(pipe: tuple[int, TextIO]) -> 
 
     threading.Thread(target=log_much, daemon=True).start()
     wait_until(done.is_set, "the end, though the pipe is full")
+    os.close(pipe[0])
+    output.flush()  # before its file is closed
 
 
 def test_a_file_that_is_gone_loses_lines_only(pipe: tuple[int, TextIO]) -> None:
