@@ -277,13 +277,6 @@ def test_a_parked_vehicle_makes_no_sonar_suspect() -> None:
     assert doubts(drive(20 * 60, Twist(-0.019, 0.049), front=1.0, left=0.8)) == ""
 
 
-def test_an_unknown_speed_is_no_motion() -> None:
-    array = SonarArray()
-    for seq in range(1, 30):
-        array = FILTER.update(array, sample(seq, 2.0), None, seq * STEP_NS)
-    assert doubts(array) == ""
-
-
 # --- greatest range of the sensors ------------------------------------------------------------
 
 SHARED = (3.0, 0.5, 3.001, 0.0)
@@ -351,10 +344,3 @@ def test_a_neutral_request_counts_once_the_fault_was_shown_for_a_second() -> Non
     assert overrides.acknowledged_by("teleop") == {2}
     assert overrides.acknowledged_by("web") == overrides.acknowledged_by(None) == frozenset()
     assert SHOWN_NS == NS_PER_S
-
-
-def test_it_is_known_until_the_sonar_is_back() -> None:
-    known = SonarOverrides().updated({2}, set(), 0).updated({2}, {"web"}, 2 * NS_PER_S)
-    assert known.updated({2}, set(), 60 * NS_PER_S).acknowledged_by("web") == {2}
-    again = known.updated(set(), set(), 3 * NS_PER_S).updated({2}, {"web"}, 4 * NS_PER_S)
-    assert again.acknowledged_by("web") == frozenset()
