@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
+.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check timed cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -51,7 +51,6 @@ FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/search
-WITHOUT_SEARCH = --ignore=$(SEARCH)
 
 # Failed tests run a second time, alone: docs/decisions.md#second-run.
 TESTS = $(BIN)/python -m tools.run_tests
@@ -59,10 +58,15 @@ SECOND_RUN = out/second-run.txt
 # Each worker imports each file that it is given: the timed tests get theirs only.
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
-test: $(STAMP) ## all tests except search and campaigns
+# The timed tests mostly wait. Meanwhile the tests of the cores take the rest of the CPU.
+test: $(STAMP) ## all tests except search and campaigns, with the coverage of the cores
 	@rm -f $(SECOND_RUN)
+	@$(MAKE) --no-print-directory -j2 --output-sync=line timed cover
+	$(TESTS) --ignore=$(SEARCH) $$($(CORE_TESTS) | sed 's/[^ ]*/--ignore=&/g') $(MANY) \
+	  -m "not timed and not campaign"
+
+timed: $(STAMP)
 	$(TESTS) $(TIMED) -m "timed and not campaign"
-	$(TESTS) $(WITHOUT_SEARCH) $(addprefix --ignore=,$(SKIP)) $(MANY) -m "not timed and not campaign"
 
 campaigns: $(STAMP) ## short runs of all campaigns and benchmarks, the tour, the programs of docs/integrate.md
 	$(BIN)/pytest tests -m campaign
@@ -95,11 +99,10 @@ ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz and older versions o
 	$(BIN)/python -m verification.ros2
 
 # The tests that needed a second run are named last, also when a check fails.
-check: $(STAMP) ## what CI runs: lint, types, tests, coverage of the cores, search, mutants of changed cores
+check: $(STAMP) ## what CI runs: lint, types, test, search, mutants of changed cores
 	@rm -f $(SECOND_RUN)
 	@$(MAKE) --no-print-directory -j2 --output-sync lint types
-	@$(MAKE) --no-print-directory cover && \
-	  $(MAKE) --no-print-directory test SKIP="$$($(CORE_TESTS))" && \
+	@$(MAKE) --no-print-directory test && \
 	  $(MAKE) --no-print-directory search mutants CHANGED=1; code=$$?; \
 	  cat $(SECOND_RUN) 2> /dev/null; exit $$code
 
@@ -114,12 +117,13 @@ lint: $(STAMP)
 search: $(STAMP)
 	$(BIN)/pytest -n 2 --dist worksteal $(SEARCH)
 
+IDLE = $(shell command -v chrt > /dev/null && echo chrt --idle 0)
 CORE_TESTS = $(BIN)/python -m verification.mutation --tests
 
-# Not a branch of a core is untested. `make check` runs these tests here only.
+# Not a branch of a core is untested. These tests yield to all others: they measure no times.
 cover: $(STAMP)
 	$(BIN)/coverage erase
-	$(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
+	$(IDLE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
 	$(BIN)/coverage report
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
