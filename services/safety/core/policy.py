@@ -188,7 +188,6 @@ class Policy:
         return replace(state, latches=held), Verdict(
             name=_name(worst, held),
             command=command,
-            # 1 equivalent mutant: a plan that does not run has no twist.
             twist=plan.twist if command is RUN else STILL,
             source=source,
             control=source if source and BARRING.isdisjoint(held) else None,
