@@ -46,7 +46,7 @@ up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder
 	$(BIN)/t2 up
 
 # Most tests wait for other processes most of the time. Of the tests that measure times two run at once.
-MANY = -n 6 --dist worksteal
+MANY = -n 4 --dist worksteal
 FEW = -n 2 --dist worksteal
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.

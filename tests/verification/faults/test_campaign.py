@@ -21,8 +21,8 @@ from verification.harness.waiting import wait_until
 pytestmark = pytest.mark.timed
 
 BY_NAME = {fault.name: fault for fault in FAULTS}
-ROWS = "contact in one sample", "estop", "bridge SIGKILL", "safety SIGKILL"
-MORE_ROWS = ("safety hangs, then contact",)
+ROWS = "contact in one sample", "safety SIGKILL"
+MORE_ROWS = "estop", "bridge SIGKILL", "safety hangs, then contact"
 WITH_NAMESPACES = (
     "driver's network cut for 3 s, then the burst", "robot's clock stepped by +1 h",
     "disk full, then contact", "relay: contact", "site: estop of all",
