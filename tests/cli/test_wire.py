@@ -23,7 +23,7 @@ from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
 from common.wire.framing import Rejected
-from verification.harness.frame_strategies import COMMANDS, REPORTS
+from verification.harness.frame_examples import COMMANDS, REPORTS
 
 RUN = framing.pack(c.MotionCommand(c.MotionKind.RUN, 500, 300))
 QUERY = framing.pack(c.DistanceQuery())

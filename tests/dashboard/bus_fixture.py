@@ -8,8 +8,8 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from common.messages import Cause, Drive, EstopKeepalive, KeepaliveState, Release
+from tests.dashboard.viewer import Client
 from tests.factories import safety_state
-from verification.harness.dashboard import Client
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 HOLD = {"x": 1.0, "y": 0.0}

@@ -13,8 +13,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from tests.dashboard.bus_fixture import Peer
+from tests.dashboard.viewer import Client, connected, half_open
 from verification.harness.certificates import Site
-from verification.harness.dashboard import Client, Server, connected, dashboard, half_open
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.waiting import wait_until
 
 ESTOP_S = 0.5  # from the request to the bus, at worst

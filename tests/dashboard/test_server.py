@@ -13,7 +13,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from common import clock
 from common.freshness import NS_PER_S
 from tests.dashboard.bus_fixture import HOLD, Peer, drive, echo_of
-from verification.harness.dashboard import Client, Server, connected, dashboard
+from tests.dashboard.viewer import Client, connected
+from verification.harness.dashboard import Server, dashboard
 from verification.harness.waiting import wait_until
 
 

@@ -18,7 +18,7 @@ from common.config import DEFAULT_FILE
 from common.wire import framing
 from common.wire.frame import Frame
 from verification.fuzz.targets import KINDS, SEPARATOR
-from verification.harness.frame_strategies import COMMANDS, REPORTS
+from verification.harness.frame_examples import COMMANDS, REPORTS
 
 CORPUS = Path(__file__).parent / "corpus"
 CAPTURED = Path(__file__).parents[2] / "tests/common/wire/frames.json"

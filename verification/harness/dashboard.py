@@ -1,8 +1,6 @@
-"""The dashboard as a separate process, and WebSocket clients in place of browsers."""
+"""The dashboard as a separate process, and a flood of requests to it."""
 
 import contextlib
-import json
-import socket
 import ssl
 import subprocess
 import sys
@@ -13,10 +11,9 @@ import urllib.request
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from websockets.exceptions import WebSocketException
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from verification.harness.bus import set_options
@@ -88,48 +85,6 @@ def dashboard(
         server.end()
 
 
-class Client:
-    """A viewer: stores the newest message of each kind."""
-
-    def __init__(self, socket: ClientConnection) -> None:
-        self.socket = socket
-        self.received: dict[str, Any] = {}
-
-    def send(self, k: str, **fields: object) -> None:
-        self.socket.send(json.dumps({"k": k, **fields}))
-
-    def next_snapshot(self) -> dict[str, Any]:
-        """Wait for the next fast snapshot."""
-        while True:
-            message = json.loads(self.socket.recv(timeout=PATIENCE_S))
-            self.received[message["k"]] = message
-            if message["k"] == "fast":
-                return dict(message)
-
-    def wait_for(self, kind: str) -> Any:
-        """Wait for a new message of this kind."""
-        self.received.pop(kind, None)
-        while kind not in self.received:
-            self.next_snapshot()
-        return self.received[kind]
-
-    def take_control(self, force: bool = False) -> None:
-        """Take the driver lock and wait until it is granted."""
-        self.send("take", force=force)
-        while self.next_snapshot()["driver"]["id"] != self.received["hello"]["id"]:
-            pass
-
-
-@contextlib.contextmanager
-def connected(server: Server, robot: str = "001") -> Iterator[Client]:
-    """Show a robot while the context lasts."""
-    address = f"ws://127.0.0.1:{server.port}/live?robot={robot}"
-    with connect(address, origin=Origin(server.url.rstrip("/"))) as socket:
-        it = Client(socket)
-        it.wait_for("hello")
-        yield it
-
-
 @contextlib.contextmanager
 def flooded(server: Server) -> Iterator[None]:
     """Send requests to the server at ``PER_SECOND`` while the context lasts."""
@@ -159,18 +114,3 @@ def _flood(server: Server, stop: threading.Event) -> None:
             viewer.socket.sendall(FREE * BATCH)
             sent += BATCH
             time.sleep(max(0.0, began + sent / PER_SECOND - time.monotonic()))
-
-
-@contextlib.contextmanager
-def half_open(server: Server, count: int) -> Iterator[list[socket.socket]]:
-    """Open this many connections, each with a request whose header never ends."""
-    with contextlib.ExitStack() as stack:
-        opened = []
-        for _ in range(count):
-            it = stack.enter_context(
-                socket.create_connection(("127.0.0.1", server.port), timeout=5)
-            )
-            with contextlib.suppress(OSError):  # it may be closed at once
-                it.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ")
-            opened.append(it)
-        yield opened

@@ -14,7 +14,8 @@ from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import OCTET, VELOCITY, Frame, Side
 from common.wire.framing import Received
-from verification.harness.frame_strategies import COMMANDS, REPORTS, made, read_all
+from tests.common.wire.frame_strategies import made, read_all
+from verification.harness.frame_examples import COMMANDS, REPORTS
 
 # As the public driver of this vehicle sends them.
 GOLDEN = json.loads((Path(__file__).parent / "frames.json").read_text(encoding="utf-8"))

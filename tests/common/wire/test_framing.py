@@ -11,7 +11,8 @@ from common.wire.commands import TO_BOARD, DistanceQuery, DriverQuery, MotionCom
 from common.wire.frame import HEADER, MAGIC, OPENING, Frame, Kinds, Side
 from common.wire.framing import Reason, Received, Rejected
 from common.wire.reports import FROM_BOARD, LedReport
-from verification.harness.frame_strategies import COMMANDS, REPORTS, commands, read_all, reports
+from tests.common.wire.frame_strategies import commands, read_all, reports
+from verification.harness.frame_examples import COMMANDS, REPORTS
 
 BOTH: list[tuple[Kinds, tuple[Frame, ...]]] = [(TO_BOARD, COMMANDS), (FROM_BOARD, REPORTS)]
 EACH = [(kinds, frame) for kinds, frames in BOTH for frame in frames]
