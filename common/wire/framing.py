@@ -20,7 +20,7 @@ from common.wire.frame import HEADER, MAGIC, OPENING, PAYLOAD_OFFSET, Frame, Kin
 # Bound here: the attribute lookup takes as long as the call itself.
 pack_header, unpack_header = HEADER.pack, HEADER.unpack_from
 
-# CRC-16/ARC; it covers the payload alone, so the header is not protected (``robot/wire.md``).
+# CRC-16/ARC, over the payload alone (from a public driver): the header is not protected.
 checksum: Callable[[bytes], int] = crcmod.predefined.mkCrcFun("crc-16")
 
 
