@@ -117,13 +117,12 @@ lint: $(STAMP)
 search: $(STAMP)
 	$(BIN)/pytest -n 2 --dist worksteal $(SEARCH)
 
-IDLE = $(shell command -v chrt > /dev/null && echo chrt --idle 0)
 CORE_TESTS = $(BIN)/python -m verification.mutation --tests
 
 # Not a branch of a core is untested. These tests yield to all others: they measure no times.
 cover: $(STAMP)
 	$(BIN)/coverage erase
-	$(IDLE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
+	nice -n 19 $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
 	$(BIN)/coverage report
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
