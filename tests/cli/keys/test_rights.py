@@ -151,6 +151,7 @@ def test_calls(sessions: Mapping[str, zenoh.Session], role: str, verb: Verb) -> 
 
 @pytest.mark.parametrize("role", ROLES)
 def test_live(sessions: Mapping[str, zenoh.Session], role: str) -> None:
+    wait_until(lambda: not alive(sessions["on board"]), "the end of other tests' tokens")
     tokens = [sessions[role].liveliness().declare_token(key) for key in PLAIN]
     expected = granted(role, "live", PLAIN)
     wait_until(lambda: alive(sessions["on board"]) >= expected, "all that may live")
