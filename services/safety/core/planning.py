@@ -71,6 +71,7 @@ class Zones(Struct, frozen=True):
             if speed <= MEASURED_CREEP_MPS:
                 continue
             allowed = self.allowed(distances[sonar])
+            # 1 equivalent mutant: a measured speed, at the limit or above it.
             if not allowed or speed > allowed + MEASURED_EXCESS_MPS:
                 return sonar
         return None
@@ -152,8 +153,7 @@ class Planner:
         sent = state.verdict
         current = sent.twist if sent.command is RUN else ramp_start(measured, target)
         ramped = ramp(current, target, self._up, self._down, step_s)
-        # On the ramp the curve differs from the requested one.
-        here = SonarLimit(1.0) if ramped == target else self.zones.limit(ramped, distances)
+        here = self.zones.limit(ramped, distances)  # the curve on the ramp is another one
         for tightest in (limit, here):
             if tightest.factor == 0:
                 return Plan(blocked_by=tightest.sonar)
@@ -180,6 +180,7 @@ def _step(current: float, target: float, up: float, down: float) -> float:
     """Return one component after a step; a change of direction stops at zero first."""
     if current * target < 0:
         target = 0.0
+    # 1 equivalent mutant: between equal values there is no step.
     return current + clamp(target - current, up if abs(target) > abs(current) else down)
 
 
@@ -191,8 +192,10 @@ def ramp_start(measured: Twist, target: Twist) -> Twist:
 
 
 def _overlap(measured: float, target: float) -> float:
+    # 1 equivalent mutant: with a zero the smaller of both is zero, too.
     if measured * target <= 0:
         return 0.0
+    # 1 equivalent mutant: of two equal values either is the smaller.
     return measured if abs(measured) < abs(target) else target
 
 

@@ -13,6 +13,7 @@ from services.safety.core.causes import (
     Held,
     Latches,
     Observation,
+    begun,
     observe,
     ordered,
 )
@@ -108,3 +109,16 @@ def test_the_fault_budget_drains_faster_than_it_refills() -> None:
     assert budget.updated(99 * NS_PER_S, failed=False, good=False).is_spent
     assert budget.updated(6 * NS_PER_S, failed=False, good=True).remaining == pytest.approx(0.1)
     assert FaultBudget().updated(99 * NS_PER_S, failed=False, good=True).remaining == FAILURES
+
+
+def test_a_cause_that_began_in_this_decision() -> None:
+    held = observe({}, [Observation("estop", True)], 5)
+    assert held["estop"].id == [rule.name for rule in RULES].index("estop")
+    assert observe({}, [Observation("link", True)], 5, decision=2).keys() == {"link"}
+    both = observe(held, [Observation("driver_left", True)], 6, decision=2)
+    assert (begun(both, 0), begun(both, 1), begun(both, 2)) == (("estop",), (), ("driver_left",))
+
+
+def test_without_a_time_to_settle_a_cause_clears_at_once() -> None:
+    held = observe({}, [Observation("link", True)], 5)
+    assert observe(held, [Observation("link", False)], 5) == {}

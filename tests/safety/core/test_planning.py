@@ -8,12 +8,25 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from common.messages import SONAR_NAMES
-from common.motion import Twist
+from common.motion import RUN, STILL, Twist
 from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
-from services.safety.core.planning import GRAZING_MPS, Zones, ramp, ramp_start, zones
+from services.safety.core.causes import Held
+from services.safety.core.planning import (
+    GRAZING_MPS,
+    Planner,
+    RequestedTwist,
+    Zones,
+    ramp,
+    ramp_start,
+    zones,
+)
+from services.safety.core.policy import Policy
+from services.safety.core.sonars import Sonar, SonarArray
+from services.safety.core.state import State, Verdict
 
 ALLOWED_AT_1M = math.sqrt(0.15**2 + 2 * 0.6 * 0.8) - 0.15
+ALLOWED_AT_03 = math.sqrt(0.15**2 + 2 * 0.6 * 0.1) - 0.15
 
 distances = st.tuples(*[st.floats(0.0, 6.0) | st.just(math.inf)] * 8)
 twists = st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
@@ -151,3 +164,46 @@ def test_a_ramp_begins_with_what_is_wanted_of_the_motion(
     measured: float, target: float, begin: float
 ) -> None:
     assert ramp_start(Twist(measured, measured), Twist(target, target)) == Twist(begin, begin)
+
+
+# --- a plan ---------------------------------------------------------------------------------
+
+PLANNER = Planner(Safety(), Vehicle())
+
+
+def under_way(sent: Twist, seen: tuple[float, ...]) -> State:
+    """Return a state in which a twist was sent, and the sonars see these distances."""
+    sonars = tuple(Sonar(distance=one, fault="") for one in seen)
+    state = Policy(Safety(), Vehicle()).start()
+    verdict = Verdict(command=RUN, twist=sent)
+    return replace(state, verdict=verdict, sonar_array=SonarArray(sonars))
+
+
+@pytest.mark.parametrize(
+    ("front", "linear", "blocked"),
+    [(math.inf, 0.49, False), (0.3, ALLOWED_AT_03, False), (0.1, 0.0, True)],
+)
+def test_the_motion_that_is_left_on_the_ramp_obeys_the_sonars(
+    front: float, linear: float, blocked: bool
+) -> None:
+    """A turn on the spot is requested, which approaches nothing in front."""
+    state = under_way(Twist(0.5, 0.5), only("front", front))
+    turn = RequestedTwist("teleop", Twist(0.0, 0.5))
+    plan = PLANNER.plan(state, STILL, turn, 0.01 / 0.6)
+    assert plan.twist.linear == pytest.approx(linear, abs=1e-9)
+    assert (plan.blocked_by is not None) is blocked
+
+
+def test_a_turn_slows_down_at_its_own_deceleration() -> None:
+    state = under_way(Twist(0.0, 0.5), only("front", math.inf))
+    plan = PLANNER.plan(state, STILL, RequestedTwist("teleop", STILL), 0.1)
+    assert (plan.twist.linear, plan.twist.angular) == pytest.approx((0.0, 0.4))
+
+
+@pytest.mark.parametrize(
+    ("asked", "given"), [(0.5, 0.15), (0.15, 0.15), (0.05, 0.05), (0.0, 0.0), (-0.5, -0.15)]
+)
+def test_lost_bumper_polls_limit_a_twist_to_the_creep_speed(asked: float, given: float) -> None:
+    limited = PLANNER.limited(Twist(asked), {"bumper_lossy": Held(0, 0, 0, (0, 0), "")})
+    assert (limited.linear, limited.angular) == pytest.approx((given, 0.0))
+    assert PLANNER.limited(Twist(asked), {}) == Twist(asked)
