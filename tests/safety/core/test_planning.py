@@ -168,7 +168,9 @@ def test_a_ramp_begins_with_what_is_wanted_of_the_motion(
 
 # --- a plan ---------------------------------------------------------------------------------
 
-PLANNER = Planner(Safety(), Vehicle())
+
+def planner() -> Planner:
+    return Planner(Safety(), Vehicle())
 
 
 def under_way(sent: Twist, seen: tuple[float, ...]) -> State:
@@ -189,14 +191,14 @@ def test_the_motion_that_is_left_on_the_ramp_obeys_the_sonars(
     """A turn on the spot is requested, which approaches nothing in front."""
     state = under_way(Twist(0.5, 0.5), only("front", front))
     turn = RequestedTwist("teleop", Twist(0.0, 0.5))
-    plan = PLANNER.plan(state, STILL, turn, 0.01 / 0.6)
+    plan = planner().plan(state, STILL, turn, 0.01 / 0.6)
     assert plan.twist.linear == pytest.approx(linear, abs=1e-9)
     assert (plan.blocked_by is not None) is blocked
 
 
 def test_a_turn_slows_down_at_its_own_deceleration() -> None:
     state = under_way(Twist(0.0, 0.5), only("front", math.inf))
-    plan = PLANNER.plan(state, STILL, RequestedTwist("teleop", STILL), 0.1)
+    plan = planner().plan(state, STILL, RequestedTwist("teleop", STILL), 0.1)
     assert (plan.twist.linear, plan.twist.angular) == pytest.approx((0.0, 0.4))
 
 
@@ -204,6 +206,6 @@ def test_a_turn_slows_down_at_its_own_deceleration() -> None:
     ("asked", "given"), [(0.5, 0.15), (0.15, 0.15), (0.05, 0.05), (0.0, 0.0), (-0.5, -0.15)]
 )
 def test_lost_bumper_polls_limit_a_twist_to_the_creep_speed(asked: float, given: float) -> None:
-    limited = PLANNER.limited(Twist(asked), {"bumper_lossy": Held(0, 0, 0, (0, 0), "")})
+    limited = planner().limited(Twist(asked), {"bumper_lossy": Held(0, 0, 0, (0, 0), "")})
     assert (limited.linear, limited.angular) == pytest.approx((given, 0.0))
-    assert PLANNER.limited(Twist(asked), {}) == Twist(asked)
+    assert planner().limited(Twist(asked), {}) == Twist(asked)
