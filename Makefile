@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check timed cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
+.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check others cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -58,15 +58,15 @@ SECOND_RUN = out/second-run.txt
 # Each worker imports each file that it is given: the timed tests get theirs only.
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
-# The timed tests mostly wait. Meanwhile the tests of the cores take the rest of the CPU.
+# The other tests mostly wait. Meanwhile those of the cores take the rest of the CPU.
 test: $(STAMP) ## all tests except search and campaigns, with the coverage of the cores
 	@rm -f $(SECOND_RUN)
-	@$(MAKE) --no-print-directory -j2 --output-sync=line timed cover
+	$(TESTS) $(TIMED) -m "timed and not campaign"
+	@$(MAKE) --no-print-directory -j2 --output-sync=line others cover
+
+others: $(STAMP)
 	$(TESTS) --ignore=$(SEARCH) $$($(CORE_TESTS) | sed 's/[^ ]*/--ignore=&/g') $(MANY) \
 	  -m "not timed and not campaign"
-
-timed: $(STAMP)
-	$(TESTS) $(TIMED) -m "timed and not campaign"
 
 campaigns: $(STAMP) ## short runs of all campaigns and benchmarks, the tour, the programs of docs/integrate.md
 	$(BIN)/pytest tests -m campaign
@@ -119,7 +119,7 @@ search: $(STAMP)
 
 CORE_TESTS = $(BIN)/python -m verification.mutation --tests
 
-# Not a branch of a core is untested. These tests yield to all others: they measure no times.
+# Not a branch of a core is untested. These tests yield to the others: they measure no times.
 cover: $(STAMP)
 	$(BIN)/coverage erase
 	nice -n 19 $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))

@@ -141,7 +141,7 @@ def test_the_supervisor_learns_that_it_is_ready_that_it_lives_and_that_it_stops(
     made: Board, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The child ignores the signal that is passed on, and is killed."""
-    monkeypatch.setattr(guard_module, "HANG_BRAKES_MAX", 10)
+    monkeypatch.setattr(guard_module, "HANG_BRAKES_MAX", 100)
     monkeypatch.setattr(guard_module, "STOP_TIMEOUT_S", 0.1)
     monkeypatch.setattr(guard_module, "EXIT_BRAKES_MAX", 3)
     code = """
