@@ -161,8 +161,11 @@ class Policy:
     def _arm(self, state: State, now_ns: int) -> State:
         arbiter, overrides = state.arbiter, state.overrides
         if state.sonar_array.unseen or overrides.since:
-            operators = self.settings.operators & arbiter.requesting_zero(now_ns)
-            overrides = overrides.updated(state.sonar_array.unseen, operators, now_ns)
+            neutral = {
+                name: arbiter.channels[name].neutral_ns or 0
+                for name in self.settings.operators & arbiter.requesting_zero(now_ns)
+            }
+            overrides = overrides.updated(state.sonar_array.unseen, neutral, now_ns)
         return replace(state, arbiter=arbiter.overruled(now_ns), overrides=overrides)
 
     def _conclude(

@@ -231,13 +231,16 @@ class SonarOverrides(Struct, frozen=True):
     acknowledged: Mapping[str, frozenset[int]] = {}  # source: sonars that its operator overrides
 
     def updated(
-        self, unseen: Collection[int], neutral: Collection[str], now_ns: int
+        self, unseen: Collection[int], neutral: Mapping[str, int], now_ns: int
     ) -> "SonarOverrides":
-        """Return the state now; ``neutral``: the operators' sources that request zero now."""
+        """Return the state now; ``neutral``: when operators' sources that request zero did so."""
         since = {sonar: self.since.get(sonar, now_ns) for sonar in unseen}
-        shown = frozenset(sonar for sonar, at_ns in since.items() if now_ns - at_ns >= SHOWN_NS)
         acknowledged = {name: sonars & since.keys() for name, sonars in self.acknowledged.items()}
-        return SonarOverrides(since, acknowledged | dict.fromkeys(neutral, shown))
+        for name, neutral_ns in neutral.items():
+            acknowledged[name] = frozenset(
+                sonar for sonar, at_ns in since.items() if neutral_ns - at_ns >= SHOWN_NS
+            )
+        return SonarOverrides(since, acknowledged)
 
     def acknowledged_by(self, source: str | None) -> frozenset[int]:
         """Return the sonars toward which this source may creep without a reading."""

@@ -334,13 +334,13 @@ def test_each_sample_counts_once_and_a_silence_keeps_the_saturation() -> None:
 
 
 def test_a_neutral_request_counts_once_the_fault_was_shown_for_a_second() -> None:
-    overrides = SonarOverrides().updated({2}, {"teleop"}, 5)
+    overrides = SonarOverrides().updated({2}, {"teleop": 5}, 5)
     assert overrides.acknowledged_by("teleop") == frozenset()
     assert (
-        overrides.updated({2}, {"teleop"}, 5 + SHOWN_NS - 1).acknowledged_by("teleop")
+        overrides.updated({2}, {"teleop": 4 + SHOWN_NS}, 5 + SHOWN_NS).acknowledged_by("teleop")
         == frozenset()
     )
-    overrides = overrides.updated({2}, {"teleop"}, 5 + SHOWN_NS)
+    overrides = overrides.updated({2}, {"teleop": 5 + SHOWN_NS}, 6 + SHOWN_NS)
     assert overrides.acknowledged_by("teleop") == {2}
     assert overrides.acknowledged_by("web") == overrides.acknowledged_by(None) == frozenset()
     assert SHOWN_NS == NS_PER_S
