@@ -49,7 +49,7 @@ ZEROS = 3  # requests after a drive: one may be lost
 DENIED_AFTER = 10  # states of safety; a router needs a moment to announce its subscribers
 OVERRULED_TICKS = 10  # 0.5 s: the client's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
-KEPT_TICKS = 10
+KEPT_TICKS = 10  # 0.5 s: a reset that was sent before has arrived
 
 
 def request(linear: float = 0.0, angular: float = 0.0, release: ReleaseRequest = "none") -> Drive:

@@ -5,7 +5,8 @@ arrives with it:
 
 1. accept    accept or refuse a message of a source (``sources.py``)
 2. sense     update sonars, runaway, standstill and the travel of a release
-3. observe   observe every cause that does not depend on a request (``conditions.py``)
+3. observe   observe every cause that does not depend on a request (``conditions.py``); while one
+             bars motion, a neutral request is due (``Arbiter.barred``)
 4. handle    carry out a reset (``operator_requests.py``)
 5. arm       note which sources are overruled; begin, continue or end a release
 6. conclude  plan the requested motion (``planning.py``), then apply the worst action
