@@ -5,17 +5,17 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
 from bench import fleet, link, load, reaction
+from bench.figures import Column, Figures, Limits, columns, compared
 from bench.processes import MissingError
 from bench.reaction import PACKAGE, is_granted
-from bench.series import Column, Limits, Measured, Series, columns, compared
 from verification.harness.host import StallRecorder, description
 from verification.harness.results import table
 
@@ -23,12 +23,18 @@ PAGE = Path(__file__).with_name("page.md")
 HEAD = ["question", "figure", "compared with", "ratio", "target", "verdict"]
 
 
-@dataclass(frozen=True, slots=True)
-class Benchmark:
+class Result(NamedTuple):
+    """The result of one benchmark."""
+
+    where: str  # date, machine, versions, and what was left out
+    figures: Figures
+
+
+class Benchmark(NamedTuple):
     """A section of the document: question, measurement, table and limits."""
 
     question: str
-    measure: Callable[[], list[Series]]
+    measure: Callable[[], Figures]
     heads: Sequence[str]
     columns: Sequence[Column]
     limits: Limits
@@ -73,7 +79,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     where.add_argument("--out", type=Path, metavar="FILE", help="write the document here")
     options = parser.parse_args(argv)
-    found = dict.fromkeys(BENCHMARKS, Measured(where="nothing: not measured", series=[]))
+    found = dict.fromkeys(BENCHMARKS, Result("nothing: not measured", {}))
     for name in options.only or BENCHMARKS:
         print(name, file=sys.stderr, flush=True)
         found[name] = measured(BENCHMARKS[name])
@@ -84,11 +90,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def measured(benchmark: Benchmark) -> Measured:
+def measured(benchmark: Benchmark) -> Result:
     """Measure, and record the stalls of the host meanwhile."""
     dds = version(PACKAGE) if find_spec(PACKAGE) else "not installed, its row is left out"
     granted = "granted" if is_granted() else "not granted"
-    begin_s, left_out, made = time.monotonic(), "", list[Series]()
+    begin_s, left_out = time.monotonic(), ""
+    made: Figures = {}
     with StallRecorder() as stalls:
         try:
             made = benchmark.measure()
@@ -102,17 +109,17 @@ def measured(benchmark: Benchmark) -> Measured:
         f"the host stalled a sleeping process for {stall_ms:.0f} ms at most",
         left_out,
     ]  # fmt: skip
-    return Measured(where="; ".join(filter(None, where)), series=made)
+    return Result("; ".join(filter(None, where)), made)
 
 
-def page(results: Mapping[str, Measured]) -> str:
+def page(results: Mapping[str, Result]) -> str:
     """Return the document."""
     blocks, rows = dict[str, str](), list[list[str]]()
     for name, one in results.items():
         it = BENCHMARKS[name]
         blocks[f"{name}_where"] = one.where
-        blocks[f"{name}_table"] = columns(it.heads, it.columns, one.by_name)
-        rows += compared(it.question, it.limits, one.by_name)
+        blocks[f"{name}_table"] = columns(it.heads, it.columns, one.figures)
+        rows += compared(it.question, it.limits, one.figures)
     blocks["summary"] = table(HEAD, rows)
     return PAGE.read_text(encoding="utf-8").format(**blocks)
 

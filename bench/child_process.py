@@ -34,10 +34,6 @@ class ChildProcess:
             self.process.kill()
             self.process.wait()
 
-    def begin(self) -> None:
-        """Reset the counts."""
-        self.send("begin")
-
     def end(self) -> Any:
         """Return the counts since ``begin``."""
         self.send("end")

@@ -5,7 +5,6 @@ child process: each has its own session to the site's router, a peer as a robot'
 robot's declarations, and repeats what the real robot sends. All run on this host, in plain TCP.
 """
 
-import contextlib
 import itertools
 import json
 import sys
@@ -16,7 +15,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +23,9 @@ import msgpack
 import zenoh
 
 from bench.child_process import ChildProcess, serve
+from bench.figures import CPU, MS, ONE, Column, Figures, Limits, Unit
 from bench.load import MARGIN
 from bench.processes import cpu_shares
-from bench.series import CPU, MS, ONE, Column, Limits, Series, Unit
 from common import clock, keys
 from common.bus.session import client_config
 from common.freshness import NS_PER_S
@@ -52,34 +51,29 @@ PATIENCE_NS = NS_PER_S  # a later frame is not the answer
 SAME_MPS = 0.0004  # resolution of the wire: 1 mm/s
 
 
-def measure(robots: Sequence[int] = ROBOTS, seconds: float = SECONDS) -> list[Series]:
+def measure(robots: Sequence[int] = ROBOTS, seconds: float = SECONDS) -> Figures:
     """Return the figures of each number of robots and subscription."""
     site = f"tcp/127.0.0.1:{free_port()}"
     sets = [f"robot.id={REAL}", f"bus.uplink={site}"]
-    made: list[Series] = []
+    made: dict[tuple[str, ...], Sequence[float]] = {}
     with (
         tempfile.TemporaryDirectory() as folder,
         router_process(site) as router,
         running_stack(Path(folder), sets=sets, shipped=True) as stack,
     ):
-        made += window(stack, site, router.pid, ("1", OWN_ROUTER), seconds)
+        made |= window(stack, site, router.pid, ("1", OWN_ROUTER), seconds)
         for count in robots:
-            with simulated(site, count):
+            names = [f"berlin-{number:03d}" for number in range(2, count + 1)]
+            others = ChildProcess("bench.fleet", site, *names) if names else nullcontext()
+            with others:
                 for what in CONSUMED:
-                    made += window(stack, site, router.pid, (str(count), what), seconds)
+                    made |= window(stack, site, router.pid, (str(count), what), seconds)
     return made
-
-
-def simulated(site: str, robots: int) -> AbstractContextManager[object]:
-    """Run simulated robots for the rest of this number."""
-    names = [f"berlin-{number:03d}" for number in range(2, robots + 1)]
-    words = "bench.fleet", site, *names
-    return ChildProcess(*words) if robots > 1 else contextlib.nullcontext()
 
 
 def window(
     stack: RunningStack, site: str, pid: int, name: tuple[str, str], seconds: float
-) -> list[Series]:
+) -> Figures:
     """Measure with this subscription at the site, while the real robot is driven."""
     endpoint = stack.endpoint if name[1] == OWN_ROUTER else site
     frames = TraceFollower(stack.trace_file)
@@ -91,19 +85,18 @@ def window(
     ):
         time.sleep(SETTLE_S)
         frames.follow().forget()
-        consumer.begin()
-        source.begin()
+        consumer.send("begin")
+        source.send("begin")
         shares = cpu_shares({"site": pid}, seconds)
         came, asked = consumer.end(), source.end()
         time.sleep(ANSWER_S)
     took: Sequence[int | None] = answers_ns(asked, frames.follow().commands)
-    figures: dict[str, Sequence[float]] = {
+    return {(*name, what): samples for what, samples in {
         "site": [shares["site"]],
         "memory": [stat(pid).rss], "arrived": [came["hz"]],
         "bytes": [came["bytes_per_s"] / int(name[0])], "age": came["ages_ns"],
         "request": [ns for ns in took if ns is not None], "unanswered": [took.count(None)],
-    }  # fmt: skip
-    return [Series(name=(*name, what), samples=values) for what, values in figures.items()]
+    }.items()}  # fmt: skip
 
 
 def answers_ns(
@@ -211,7 +204,7 @@ def main() -> None:
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
     recording = recorded(site)
-    with contextlib.ExitStack() as stack, ThreadPoolExecutor(AT_ONCE) as pool:
+    with ExitStack() as stack, ThreadPoolExecutor(AT_ONCE) as pool:
         sessions = list(map(stack.enter_context, pool.map(zenoh.open, [config] * len(names))))
         robots = zip(sessions, names, strict=True)
         publish([Robot(session, name, recording) for session, name in robots], recording)

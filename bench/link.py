@@ -1,4 +1,4 @@
-"""``python -m bench.link``: drive over a bad link, and lose it; prints the figures as JSON.
+"""Drive over a bad link, and lose it.
 
 The robot's host has the stack, the simulated vehicle and a router with certificates. The laptop's
 host, with its own network and clock, has a client that requests motion like teleop. A link in user
@@ -7,20 +7,20 @@ space (``verification.faults.remote_host``) drops, delays and queues packets, on
 
 import contextlib
 import io
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
 
 import msgspec
 
 from bench.child_process import ChildProcess
-from bench.processes import MissingError, module
-from bench.series import MS, ONE, Column, Limits, Series, Unit
+from bench.figures import MS, ONE, Column, Figures, Limits, Unit
+from bench.processes import MissingError
 from common import clock, keys
 from common.freshness import NS_PER_S
 from common.loop import Loop
@@ -51,7 +51,6 @@ OUTAGES_S = {
     "down for 0.2 s": 0.2, "down for 1 s": 1.0, "down for 5 s": 5.0, "another address": 0.0,
 }  # fmt: skip
 ANOTHER = 3  # the last number of the laptop's address
-UNAVAILABLE = 3  # exit code when this host cannot simulate two
 SETTLE_S, SECONDS, ESTOP_S, PATIENCE_S = 1.0, 4.0, 5.0, 30.0
 SURE_NS = NS_PER_S  # of driving without a stop
 NOTICE_NS = NS_PER_S // 20  # to detect the end of a lease
@@ -63,17 +62,13 @@ FILES = ("ca", "certificate", "private_key", "members")
 class Hosts:
     """Both hosts, what the board received, and when bumper samples arrived on board."""
 
-    laptop: ChildProcess
+    laptop: ChildProcess  # the link and the client
     frames: TraceFollower
     bumper_ns: list[int]
 
-    def send(self, line: str) -> None:
-        """Send a line to the link or the client."""
-        self.laptop.send(line)
-
     def disturb(self, what: Wire | Address) -> None:
         """Set the faults of the link from now on, or the laptop's address."""
-        self.send(msgspec.json.encode(what).decode())
+        self.laptop.send(msgspec.json.encode(what).decode())
 
     def commands(self, since_ns: int) -> list[Command]:
         """Return the motion commands at the board since a time."""
@@ -89,7 +84,7 @@ class Hosts:
     def ready(self) -> None:
         """Remove the faults, and wait until the vehicle drives."""
         self.disturb(Wire())
-        self.send("go")
+        self.laptop.send("go")
         wait_until(lambda: self.drives(clock.now_ns() - 2 * SURE_NS), "a drive", PATIENCE_S)
 
     def gap_ns(self, since_ns: int) -> int:
@@ -127,16 +122,26 @@ def two_hosts(folder: Path) -> Iterator[Hosts]:
         yield Hosts(laptop, TraceFollower(stack.trace_file), bumper_ns)
 
 
-def measure_here(folder: Path) -> list[Series]:
+def measure() -> Figures:
+    """Measure in a process of its own, which enters the namespaces of the robot's host."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        return pool.submit(measure_here).result()
+
+
+def measure_here() -> Figures:
     """Return the figures of each condition and outage, times in ns."""
-    with two_hosts(folder) as hosts:
+    try:
+        enter()
+    except OSError as error:
+        raise MissingError(f"cannot simulate two hosts: {error}") from error
+    with tempfile.TemporaryDirectory() as folder, two_hosts(Path(folder)) as hosts:
         made = {name: under(hosts, faults) for name, faults in CONDITIONS.items()}
         made |= {name: outage(hosts, seconds) for name, seconds in OUTAGES_S.items()}
     made["allowed"] = {
         "stop": [round(SHIPPED.sources["teleop"].lease * NS_PER_S) + NOTICE_NS],
         "gap": [round(SHIPPED.times.bumper_age * NS_PER_S)],
     }
-    return [Series(name=(n, what), samples=v) for n, one in made.items() for what, v in one.items()]
+    return {(name, what): v for name, one in made.items() for what, v in one.items()}
 
 
 def under(hosts: Hosts, faults: Wire) -> dict[str, Sequence[float]]:
@@ -147,7 +152,7 @@ def under(hosts: Hosts, faults: Wire) -> dict[str, Sequence[float]]:
     since_ns = clock.now_ns()
     time.sleep(SECONDS)
     commands, pressed_ns = hosts.commands(since_ns), clock.now_ns()
-    hosts.send("estop")
+    hosts.laptop.send("estop")
 
     def braked() -> list[int]:
         return [c.mono_ns - pressed_ns for c in hosts.commands(pressed_ns) if c.kind == "brake"]
@@ -180,16 +185,6 @@ def outage(hosts: Hosts, seconds: float) -> dict[str, Sequence[float]]:
     }
 
 
-def measure() -> list[Series]:
-    """Measure in a process of its own, which enters the namespaces of the robot's host."""
-    done = subprocess.run(module("bench.link"), capture_output=True, text=True, check=False)
-    if done.returncode == UNAVAILABLE:
-        raise MissingError(f"cannot simulate two hosts: {done.stderr.strip()}")
-    if done.returncode:
-        raise RuntimeError(done.stderr[-4000:])
-    return msgspec.json.decode(done.stdout, type=list[Series])
-
-
 COLUMNS = (
     Column("time in motion", "driven", Unit("%", 0.01)), Column("stops", "stops", ONE),
     Column("E-STOP to BRAKE", "brake", MS), Column("STOP after", "stop", MS),
@@ -201,13 +196,3 @@ LIMITS: Limits = [
     for column in (COLUMNS[3], COLUMNS[5])
     for name in OUTAGES_S
 ]
-
-
-if __name__ == "__main__":
-    try:
-        enter()
-    except OSError as error:
-        sys.stderr.write(str(error))
-        sys.exit(UNAVAILABLE)
-    with tempfile.TemporaryDirectory() as temporary:
-        sys.stdout.write(msgspec.json.encode(measure_here(Path(temporary))).decode())

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from bench.child_process import ChildProcess
+from bench.figures import CPU, ONE, US, Column, Figures, Limits, Unit
 from bench.processes import cpu_shares, module, one_pool, running
 from bench.reaction import SEED
-from bench.series import CPU, ONE, US, Column, Limits, Series, Unit
 from common import keys
 from verification.harness.bus import router_process, set_options
 from verification.harness.ports import free_port, udp_ports
@@ -75,7 +75,7 @@ def wait_until_it_drives(trace: Path) -> None:
     time.sleep(STEADY_S)
 
 
-def cpu(turns: int = TURNS, seconds: float = TURN_S) -> list[Series]:
+def cpu(turns: int = TURNS, seconds: float = TURN_S) -> Figures:
     """Return the CPU of each process, in ns/s; the candidates take turns in random order."""
     samples, shuffler = defaultdict[tuple[str, ...], list[int]](list), random.Random(SEED)
     for _ in range(turns):
@@ -84,12 +84,12 @@ def cpu(turns: int = TURNS, seconds: float = TURN_S) -> list[Series]:
                 shares = cpu_shares(pids, seconds)
             for process, ns in {**shares, TOGETHER: sum(shares.values())}.items():
                 samples[name, process, "cpu"].append(ns)
-    return [Series(name=name, samples=some) for name, some in samples.items()]
+    return samples
 
 
-def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> list[Series]:
+def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> Figures:
     """Return CPU, delay and loss with more and more consumers of everything on board."""
-    made: list[Series] = []
+    made: dict[tuple[str, ...], Sequence[float]] = {}
     with (
         tempfile.TemporaryDirectory() as folder,
         running_stack(Path(folder), shipped=True) as it,
@@ -103,7 +103,7 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
             some += [held.enter_context(each) for each in new]
             time.sleep(SETTLE_S)
             for each in some:
-                each.begin()
+                each.send("begin")
             shares = cpu_shares(pids_of(it), seconds)
             results: list[Any] = [each.end() for each in some]
             figures: dict[str, Sequence[float]] = {
@@ -111,7 +111,7 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
                 "delay": list(chain.from_iterable(each["ages_ns"] for each in results)),
                 "lost": [max(each["lost"] for each in results)],
             }  # fmt: skip
-            made += [Series(name=(str(count), what), samples=v) for what, v in figures.items()]
+            made |= {(str(count), what): samples for what, samples in figures.items()}
     return made
 
 

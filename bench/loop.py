@@ -1,4 +1,4 @@
-"""``python -m bench.loop PORT``: one process with a loop over a socket.
+"""``python -m bench.loop board PORT ""``: one process with a loop over a socket.
 
 It knows frames and CRC, answers a bumper hit with BRAKE and everything else with STOP. The pairs
 of processes use its frames and its socket.
@@ -85,14 +85,11 @@ def run_pair(join: Join) -> None:
             send()
 
 
-def main() -> None:
-    """Answer until killed."""
-    realtime.request(realtime.BRIDGE)
-    board = BoardSocket(int(sys.argv[1]))
-    while True:
-        if board.receive_hit():
-            board.brake()
+def answer_itself(_where: str, _writes: str, _reads: str, take: Call | None) -> Call:
+    """Join no bus: the process at the board decides."""
+    assert take is not None
+    return take
 
 
 if __name__ == "__main__":
-    main()
+    run_pair(answer_itself)

@@ -12,12 +12,6 @@ from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.bridge.core.motion_output import MotionOutput
 
-
-def main() -> int:
-    """Run the bridge; return the exit code."""
-    with patch.object(MotionOutput, "on_hit", lambda *_: iter(())):
-        return run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    with patch.object(MotionOutput, "on_hit", lambda *_: iter(())):
+        sys.exit(run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE))

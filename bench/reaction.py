@@ -11,9 +11,8 @@ from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 
+from bench.figures import ONE, US, Column, Figures, Limits
 from bench.processes import Command, compiled, module, one_pool, running
-from bench.series import ONE, US, Column, Limits, Series
-from common import realtime
 from common.wire import commands, framing, reports
 from verification.harness.bus import set_options
 from verification.harness.ports import free_port, udp_ports
@@ -60,7 +59,7 @@ def pair(name: str, port: int, where: object) -> list[Command]:
 
 
 REFLEX_ROWS: Mapping[str, Start] = {
-    LOOP: lambda port, _: running(module("bench.loop", port)),
+    LOOP: lambda port, _: running(module("bench.loop", "board", port, "")),
     REFLEX: stack,
 }
 STOP_ROWS: dict[str, Start] = {
@@ -88,9 +87,9 @@ def columns(of: str) -> list[Column]:
     ]
 
 
-def measured(rows: Mapping[str, Start], blocks: int = BLOCKS, hits: int = HITS) -> list[Series]:
+def measured(rows: Mapping[str, Start], blocks: int = BLOCKS, hits: int = HITS) -> Figures:
     """Return the samples of all rows, in ns."""
-    samples: dict[tuple[str, str], list[int]] = {turn: [] for turn in product(rows, LOADS)}
+    samples: dict[tuple[str, ...], list[int]] = {turn: [] for turn in product(rows, LOADS)}
     shuffler = random.Random(SEED)
     with tempfile.TemporaryDirectory() as folder:
         program = compiled("board", Path(folder))
@@ -98,7 +97,7 @@ def measured(rows: Mapping[str, Start], blocks: int = BLOCKS, hits: int = HITS) 
             for name, load in shuffler.sample(list(samples), len(samples)):
                 with running(*[SPIN] * (BUSY_PROCESSES if load == BUSY else 0)):
                     samples[name, load] += block(program, rows[name], hits)
-    return [Series(name=name, samples=some) for name, some in samples.items()]
+    return samples
 
 
 def block(program: str, start: Start, hits: int) -> list[int]:
@@ -117,6 +116,5 @@ def block(program: str, start: Start, hits: int) -> list[int]:
 
 def is_granted() -> bool:
     """Return whether this host grants SCHED_FIFO."""
-    script = "from common import realtime as r; r.request(r.GUARD); print(r.priority())"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
-    return done.stdout.strip() == str(realtime.GUARD).encode()
+    script = "from common import realtime as r; r.request(r.GUARD); exit(r.priority() != r.GUARD)"
+    return subprocess.run([sys.executable, "-c", script], check=False).returncode == 0

@@ -7,10 +7,10 @@ import pytest
 
 from bench import __main__ as bench
 from bench import load, loop, reaction
+from bench.figures import Figures, compared
 from bench.fleet import answers_ns
 from bench.processes import MissingError
 from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, ZENOH
-from bench.series import Measured, Series, compared
 from common import motion
 from common.freshness import NS_PER_S
 from sim.trace import Command
@@ -19,11 +19,11 @@ CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 MS = 1_000_000
 
 
-def made_up(rows: Mapping[str, int]) -> list[Series]:
-    return [Series(name=(row, "quiet"), samples=[us * 1000] * 10) for row, us in rows.items()]
+def made_up(rows: Mapping[str, int]) -> Figures:
+    return {(row, "quiet"): [us * 1000] * 10 for row, us in rows.items()}
 
 
-SERIES = {
+FIGURES = {
     "reflex": made_up({LOOP: 100, REFLEX: 140}),
     "stop": made_up({JUDGED: 700, ZENOH: 1000}),
 }
@@ -31,7 +31,7 @@ SERIES = {
 
 def test_the_document_has_each_table_and_the_limits() -> None:
     results = {
-        name: Measured(where=f"a machine for {name}", series=SERIES.get(name, []))
+        name: bench.Result(f"a machine for {name}", FIGURES.get(name, {}))
         for name in bench.BENCHMARKS
     }
     text = bench.page(results)
@@ -48,7 +48,7 @@ def test_the_document_has_each_table_and_the_limits() -> None:
 def test_what_a_host_lacks_is_on_the_page(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def lacking() -> list[Series]:
+    def lacking() -> Figures:
         raise MissingError("no C compiler")
 
     it = bench.BENCHMARKS["link"]
@@ -59,8 +59,7 @@ def test_what_a_host_lacks_is_on_the_page(
 
 
 def test_a_limit_of_a_row_that_was_not_measured_is_left_out() -> None:
-    by_name = {one.name: one for one in SERIES["reflex"]}
-    rows = compared("How soon?", reaction.LIMITS, by_name)
+    rows = compared("How soon?", reaction.LIMITS, FIGURES["reflex"])
     assert [row[0] for row in rows] == ["How soon?", ""]
     assert [row[-1] for row in rows] == ["not reached", "reached"]
 
@@ -90,15 +89,15 @@ def test_each_row_answers_every_hit(
     rows: Mapping[str, reaction.Start], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reaction, "LOADS", ("quiet",))
-    for one in reaction.measured(rows, blocks=1, hits=3):
-        assert len(one.samples) == 3, one.name
-        assert all(0 < ns < NS_PER_S for ns in one.samples), one.name
+    for name, samples in reaction.measured(rows, blocks=1, hits=3).items():
+        assert len(samples) == 3, name
+        assert all(0 < ns < NS_PER_S for ns in samples), name
 
 
 @pytest.mark.campaign
 @pytest.mark.timed
 def test_consumers_receive_everything() -> None:
-    by_name = {one.name: one for one in load.consumers((1, 2), seconds=1.0)}
+    figures = load.consumers((1, 2), seconds=1.0)
     for count in ("1", "2"):
-        assert by_name[count, "delay"].samples
-        assert by_name[count, "lost"].samples == [0.0]
+        assert figures[count, "delay"]
+        assert figures[count, "lost"] == [0.0]

@@ -1,0 +1,80 @@
+"""Figures of a benchmark: their samples, tables with percentiles, and targets."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from verification.harness.results import percentile, table
+
+Share = Literal["p50", "p99", "max"]
+# Samples by the parts of a row's name and the figure: times in ns, other units by the table.
+Figures = Mapping[tuple[str, ...], Sequence[float]]
+
+
+def value(samples: Sequence[float], share: Share = "p50") -> float:
+    """Return the median, the 99th percentile or the highest sample."""
+    return percentile(samples, {"p50": 0.5, "p99": 0.99, "max": 1.0}[share])
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """How a sample is printed."""
+
+    name: str
+    divisor: float
+    digits: int = 0
+
+    def text(self, value: float) -> str:
+        """Return a number without its unit."""
+        return f"{value / self.divisor:,.{self.digits}f}"
+
+
+US, MS, CPU, ONE = Unit("us", 1e3), Unit("ms", 1e6, 1), Unit("CPU %", 1e7, 1), Unit("", 1)
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table: a figure of each row, or its median as a multiple of a row's."""
+
+    head: str
+    figure: str  # the last part of a series' name
+    unit: Unit
+    share: Share = "p50"
+    of: tuple[str, ...] = ()
+
+    def cell(self, figures: Figures, row: tuple[str, ...]) -> str:
+        """Return the text for a row; empty where it was not measured."""
+        samples = figures.get((*row, self.figure))
+        others = figures.get((*self.of, self.figure)) if self.of else samples
+        if not samples or not others:
+            return ""
+        if self.of:
+            return f"× {value(samples) / value(others):.2f}"
+        return self.unit.text(value(samples, self.share))
+
+
+def columns(heads: Sequence[str], some: Sequence[Column], figures: Figures) -> str:
+    """Return the table of all rows; ``heads`` are of the parts of a row's name."""
+    names = list(dict.fromkeys(name[:-1] for name in figures))
+    cells = [[*row, *(column.cell(figures, row) for column in some)] for row in names]
+    return table([*heads, *(f"{c.head} {c.unit.name}".strip() for c in some)], cells)
+
+
+# Our row, the compared row, the figure, and the highest multiple.
+Limits = Sequence[tuple[tuple[str, ...], tuple[str, ...], Column, float]]
+
+
+def compared(question: str, limits: Limits, figures: Figures) -> list[list[str]]:
+    """Return a row for each limit whose figures were measured; the first has the question."""
+    rows: list[list[str]] = []
+    for ours, theirs, column, limit in limits:
+        both = [figures.get((*row, column.figure)) for row in (ours, theirs)]
+        mine, other = (value(some, column.share) if some else 0.0 for some in both)
+        if all(both) and other:
+            texts = [f"{column.unit.text(each)} {column.unit.name}" for each in (mine, other)]
+            rows.append([
+                "" if rows else question, f"{', '.join([*ours, column.head])}: {texts[0]}",
+                f"{', '.join(theirs)}: {texts[1]}", f"× {mine / other:.2f}",
+                f"at most × {limit:g}", "reached" if mine <= limit * other else "not reached",
+            ])  # fmt: skip
+    return rows
