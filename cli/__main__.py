@@ -41,10 +41,7 @@ GROUPS = {
             "record everything on the bus to files, until Ctrl-C",
         ),
         "info": ("cli.recordings.info", "show the content of a recording"),
-        "replay": (
-            "cli.recordings.replay",
-            "play a recording onto the bus, or its raw frames to a bridge",
-        ),
+        "replay": ("cli.recordings.replay", "play a recording onto the bus"),
         "report": (
             "cli.recordings.report",
             "HTML report of a recording: path, speeds, stops, streams",

@@ -1,8 +1,8 @@
 """``t2 wire decode``: captured frames as text.
 
-The source is hex on the command line (one datagram), text with one datagram of hex per line, pcap
-or pcapng. Spaces, colons, commas, dashes and 0x are ignored, and comments after #. A pcapng file is
-read with the link type of its first interface.
+The source is hex on the command line, which is one datagram, or a file, pcap or pcapng. Spaces,
+colons, commas, dashes and 0x are ignored in hex. A pcapng file is read with the link type of its
+first interface.
 
 The same id means one frame from the PC and another one from the board. The sizes differ, except for
 the two emergency brake switches. So each frame is decoded for both senders.
@@ -11,11 +11,10 @@ the two emergency brake switches. So each frame is decoded for both senders.
 import argparse
 import io
 import re
-import sys
 from collections.abc import Iterator
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import msgspec
 
@@ -39,10 +38,7 @@ FURTHEST = (
 )  # fmt: skip
 
 UNITS = {"_mmps": "mm/s", "_mm": "mm", "_ddeg": "deg", "_raw": ""}
-PCAP_MAGICS = tuple(
-    bytes.fromhex(magic)
-    for magic in ("a1b2c3d4", "d4c3b2a1", "a1b23c4d", "4d3cb2a1", "0a0d0d0a")  # the last: pcapng
-)
+Datagram = tuple[str, bytes]  # its place in the source, its bytes
 
 
 class WireConfig(Shared, frozen=True, kw_only=True):
@@ -56,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
     text = "print frames, one per line, with the reason for each invalid run of bytes"
     decode = tools.add_parser("decode", help=text, description=text)
-    decode.add_argument("source", metavar="HEX|FILE|-", help="hex, a pcap, hex lines, or stdin")
+    decode.add_argument("source", metavar="HEX|FILE", help="hex, or a capture (pcap, pcapng)")
     add_sources(decode)
 
 
@@ -76,54 +72,26 @@ def run(options: argparse.Namespace) -> int:
 # --- datagrams ----------------------------------------------------------------------------------
 
 
-class Datagram(NamedTuple):
-    """The bytes of one datagram and their place in the source."""
-
-    where: str
-    data: bytes
-
-
 def datagrams(source: str) -> list[Datagram]:
-    """Return the datagrams of ``-`` (standard input), a file, or a hex string."""
-    if source == "-":
-        return from_bytes("standard input", sys.stdin.buffer.read())
-    if data := _hex(source):
-        return [Datagram("", data)]
+    """Return the datagrams of a hex string or of a capture; raise ``RobotError`` without any."""
     try:
-        return from_bytes(source, Path(source).read_bytes())
+        data = bytes.fromhex(re.sub(r"0[xX]|[\s:,-]", "", source))
+    except ValueError:
+        data = b""
+    if data:
+        return [("", data)]
+    try:
+        content = Path(source).read_bytes()
     except OSError as error:
         raise RobotError(f"{source!r} is neither hex nor a file: {error.strerror}") from None
-
-
-def from_bytes(name: str, content: bytes) -> list[Datagram]:
-    """Return the datagrams of a capture, or of a text with hex lines."""
-    if content.startswith(PCAP_MAGICS):
-        found, kind = list(_from_pcap(name, content)), "UDP packets"
-    else:
-        found, kind = list(_from_text(name, content)), "hex lines"
+    found = list(from_pcap(source, content))
     if not found:
-        raise RobotError(f"{name}: contains no {kind}")
+        raise RobotError(f"{source}: contains no UDP packets")
     return found
 
 
-def _from_text(name: str, content: bytes) -> Iterator[Datagram]:
-    for number, line in enumerate(content.decode(errors="replace").splitlines(), 1):
-        where = f"{name} line {number}"
-        data = _hex(line.partition("#")[0])
-        if data is None:
-            raise RobotError(f"{where}: {line.strip()[:40]!r} is not hex")
-        if data:
-            yield Datagram(where, data)
-
-
-def _hex(text: str) -> bytes | None:
-    try:
-        return bytes.fromhex(re.sub(r"0[xX]|[\s:,-]", "", text))
-    except ValueError:
-        return None
-
-
-def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
+def from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
+    """Yield the payload of each UDP packet; raise ``RobotError`` at the first invalid one."""
     try:
         from dpkt import dpkt, ethernet, ip, pcap, sll, sll2, udp, utils  # type: ignore[import-untyped]
     except ImportError:
@@ -150,7 +118,7 @@ def _from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
                 segment = network.data
                 source = f"{utils.inet_to_str(network.src)}:{segment.sport}"
                 target = f"{utils.inet_to_str(network.dst)}:{segment.dport}"
-                yield Datagram(f"packet {number} {source} > {target}", bytes(segment.data))
+                yield f"packet {number} {source} > {target}", bytes(segment.data)
     except (dpkt.Error, ValueError, KeyError) as error:
         raise RobotError(f"{name}: invalid after packet {number}: {error}") from None
 

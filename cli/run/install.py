@@ -25,8 +25,6 @@ ENABLED = {  # links of `systemctl enable`
     "t2.target": Path("/etc/systemd/system/multi-user.target.wants/t2.target"),
     "t2-ros2.service": Path("/etc/systemd/system/t2.target.wants/t2-ros2.service"),
 }
-# Every version recognises the units of other versions by this line: never change it.
-MARK = "# From `t2 install`, which replaces and removes it; `systemctl edit` makes what stays.\n"
 SIM = "t2-sim.service"
 EXTRAS = {
     "t2-recorder.service": "mcap",
@@ -112,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def install(host: Host, prefix: Path, sim: bool) -> None:
-    """Write all files, and remove further files of an earlier installation."""
+    """Write all files, and remove those that this computer cannot run any more."""
     given = [path for path in (SETTINGS, KEYS) if host.has(path)]
     # The settings must be valid for this version.
     load(Everything, Sources(files=(DEFAULT_FILE, *map(host.at, given)), environ={}))
@@ -123,8 +121,8 @@ def install(host: Host, prefix: Path, sim: bool) -> None:
     options = " ".join(f"--config {path}" for path in dict.fromkeys((SETTINGS, *given)))
     for name in names_here(sim or host.has(UNITS / SIM)):
         text = template(name).replace("@PREFIX@", str(prefix))
-        wanted[UNITS / name] = MARK + text.replace("@SETTINGS@", options)
-    for path in sorted(ours(host) - wanted.keys()):
+        wanted[UNITS / name] = text.replace("@SETTINGS@", options)
+    for path in sorted(ours() - wanted.keys()):
         host.remove(path)
     for path, text in sorted(wanted.items()):
         host.write(path, text)
@@ -140,7 +138,7 @@ def uninstall(host: Host) -> None:
     if enabled := [name for name, link in ENABLED.items() if host.has(link)]:
         names = " ".join(enabled)
         raise RobotError(f"T2 is enabled: run `systemctl disable --now {names}` first")
-    for path in sorted(ours(host)):
+    for path in sorted(ours()):
         host.remove(path)
     print("next: systemctl daemon-reload")
     print(f"{SETTINGS.parent} and /var/lib/t2 are kept")
@@ -151,18 +149,14 @@ def uninstall(host: Host) -> None:
 
 def names() -> list[str]:
     """Return every unit and drop-in, relative to the folder of units."""
-    found = [*TEMPLATES.glob("t2*.*"), *TEMPLATES.glob("t2-.service.d/*.conf")]
-    kinds = {".service", ".target", ".conf"}
-    files = (path for path in found if path.is_file() and path.suffix in kinds)
+    forms = ("*.service", "*.target", "*/*.conf")
+    files = (path for form in forms for path in TEMPLATES.glob(form))
     return sorted(str(path.relative_to(TEMPLATES)) for path in files)
 
 
-def ours(host: Host) -> set[Path]:
-    """Return every file of an installation, also of another version, except the settings."""
-    folder = host.at(UNITS)
-    found = (path for form in ("t2*", "t2*.d/*") for path in folder.glob(form) if path.is_file())
-    marked = (path for path in found if path.read_bytes().startswith(MARK.encode()))
-    return {USER, SLEEP, *(UNITS / path.relative_to(folder) for path in marked)}
+def ours() -> set[Path]:
+    """Return every file that an installation may have, except the settings."""
+    return {USER, SLEEP, *(UNITS / name for name in names())}
 
 
 def names_here(sim: bool) -> list[str]:

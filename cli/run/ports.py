@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Collection, Sequence
 from contextlib import ExitStack
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from cli.settings import Everything
 from common.errors import LinkError
@@ -18,46 +18,44 @@ from common.settings import protocol
 
 PATIENCE_S = 5.0  # children of a killed supervisor may still be stopping the vehicle
 LOOK_S = 0.1
-
+KINDS = {socket.SOCK_STREAM: "tcp", socket.SOCK_DGRAM: "udp"}
 DATAGRAMS = ("udp", "quic")
 
 
 class Port(NamedTuple):
     """One address that a process listens on."""
 
-    kind: Literal["tcp", "udp", "unix"]
-    host: str  # or the path of a unix socket
+    kind: socket.SocketKind
+    host: str
     number: int
     setting: str  # setting that defines it
 
     def __str__(self) -> str:
-        where = self.host if self.kind == "unix" else f"{self.host}:{self.number}"
-        return f"{self.kind.upper()} {where} ({self.setting})"
+        return f"{KINDS[self.kind].upper()} {self.host}:{self.number} ({self.setting})"
 
 
 def wanted(config: Everything, names: Collection[str]) -> list[Port]:
-    """Return the ports of these processes."""
+    """Return the ports of these processes; not the router's sockets of the file system."""
     board = config.board
     found: list[Port] = []
     if "router" in names:
-        found += map(_listener, config.bus.listen)
+        on_network = (x for x in config.bus.listen if protocol(x) != "unixsock-stream")
+        found += map(_listener, on_network)
     if "bridge" in names:
         found += [
-            Port("udp", board.listen_address, port, "board.listen_ports")
+            Port(socket.SOCK_DGRAM, board.listen_address, port, "board.listen_ports")
             for port in board.listen_ports
         ]
     if "sim" in names:
-        found += [Port("udp", board.address, board.port, "board.port")]
+        found += [Port(socket.SOCK_DGRAM, board.address, board.port, "board.port")]
     return found
 
 
 def _listener(endpoint: str) -> Port:
     """Return the port of a router's endpoint."""
     address = endpoint.partition("/")[2].partition("?")[0].partition("#")[0]
-    if protocol(endpoint) == "unixsock-stream":
-        return Port("unix", address, 0, "bus.listen")
     host, _, number = address.rpartition(":")
-    kind: Literal["tcp", "udp"] = "udp" if protocol(endpoint) in DATAGRAMS else "tcp"
+    kind = socket.SOCK_DGRAM if protocol(endpoint) in DATAGRAMS else socket.SOCK_STREAM
     return Port(kind, host.strip("[]"), int(number), "bus.listen")
 
 
@@ -66,25 +64,23 @@ def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
 
     Raise ``LinkError`` with the first port that is still taken after ``patience_s``.
     """
-    claims = ExitStack()
     end_s = time.monotonic() + patience_s
-    try:
+    with ExitStack() as claims:
         for port in ports:
             while reason := _taken(port, claims):
                 if time.monotonic() > end_s:
                     raise LinkError(f"{port}: {reason}; {_advice(port)}")
                 time.sleep(LOOK_S)
-    except BaseException:
-        claims.close()
-        raise
-    return claims
+        return claims.pop_all()
 
 
 def _taken(port: Port, claims: ExitStack) -> str:
     """Claim a port; return why it is not available, or an empty text."""
     try:
-        (_connect if port.kind == "unix" else _bind)(port)
-        _claim(port, claims)
+        _bind(port)
+        if sys.platform == "linux":  # a name in the abstract namespace, free when this process ends
+            sock = claims.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
+            sock.bind(f"\0t2-up {KINDS[port.kind]} {port.host} {port.number}")
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             return "used by another program"
@@ -93,30 +89,13 @@ def _taken(port: Port, claims: ExitStack) -> str:
 
 
 def _bind(port: Port) -> None:
-    kind = socket.SOCK_STREAM if port.kind == "tcp" else socket.SOCK_DGRAM
-    family, kind, number, _, address = socket.getaddrinfo(port.host, port.number, type=kind)[0]
+    family, kind, number, _, address = socket.getaddrinfo(port.host, port.number, type=port.kind)[0]
     with socket.socket(family, kind, number) as sock:
-        if port.kind == "tcp":  # sockets in TIME_WAIT do not block a listener
+        if kind == socket.SOCK_STREAM:  # sockets in TIME_WAIT do not block a listener
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.bind(address)
-        if port.kind == "tcp":
+        if kind == socket.SOCK_STREAM:
             sock.listen(1)
-
-
-def _connect(port: Port) -> None:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
-        try:
-            sock.connect(port.host)
-        except OSError:  # no socket, or a stale one of a killed router
-            return
-    raise OSError(errno.EADDRINUSE, "used by another program")
-
-
-def _claim(port: Port, claims: ExitStack) -> None:
-    """Claim a name in Linux's abstract namespace; it is released when the process ends."""
-    if sys.platform == "linux":
-        sock = claims.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
-        sock.bind(f"\0t2-up {port.kind} {port.host} {port.number}")
 
 
 def _advice(port: Port) -> str:

@@ -1,6 +1,5 @@
 """``t2 replay`` on a real bus."""
 
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,11 +17,9 @@ from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
 from tests.cli.inspect.conftest import buses, tool
 from tests.cli.inspect.tool import Tool, pretend
-from tests.cli.processes import sets
 from tests.common.bus_fixture import BusFixture
 from tests.recorder import samples
 from tests.recorder.samples import bare, sample
-from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 __all__ = ["buses", "tool"]
@@ -112,34 +109,18 @@ def test_refused_while_bridge_or_safety_run(
 def test_a_service_that_starts_ends_the_replay(
     path: Path, buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    play = replay.BusTarget.play
+    play = replay.Player.play
 
-    def start_safety(self: replay.BusTarget, path: str, it: Any) -> bool:
+    def start_safety(self: replay.Player, path: str, it: Any) -> bool:
         if path == "tel/bridge/velocity":
             pretend(buses, "safety", {})
-            monkeypatch.setattr(replay.BusTarget, "play", play)
+            monkeypatch.setattr(replay.Player, "play", play)
         return play(self, path, it)
 
-    monkeypatch.setattr(replay.BusTarget, "play", start_safety)
+    monkeypatch.setattr(replay.Player, "play", start_safety)
     result = tool("replay", str(path), "--rate", "0.5")
     assert result.code == 1
     assert f"robot {buses.robot} has a running safety" in result.err
-
-
-def test_a_bridge_receives_the_raw_frames(path: Path, tool: Tool) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bridge:
-        bridge.bind(("127.0.0.1", 0))
-        board, listen = free_port(socket.SOCK_DGRAM), bridge.getsockname()[1]
-        words = sets(f"board.port={board}", f"board.listen_ports=[{listen}, 9]")
-        result = tool("replay", str(path), "--frames", *FAST, *words)
-        assert (result.code, result.err) == (0, "played 5 messages\n")
-        received = [bridge.recvfrom(99) for _ in range(5)]
-        assert received == [(b"%d" % second, ("127.0.0.1", board)) for second in range(5)]
-        taken = sets(f"board.port={listen}")
-        assert "is a simulated one running?" in tool("replay", str(path), "--frames", *taken).err
-    result = tool("replay", str(path), "--frames", *sets("board.address=10.7.5.224"))
-    assert result.code == 1
-    assert "--frames: the board at 10.7.5.224 is a real one" in result.err
 
 
 def test_a_truncated_recording_is_played_up_to_its_end(path: Path, tool: Tool) -> None:

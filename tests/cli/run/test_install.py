@@ -104,25 +104,6 @@ def test_install_again_keeps_edited_settings_and_renews_the_units(
     assert files(tmp_path).keys() == before.keys() - {f"{UNITS}/t2-dashboard.service"}
 
 
-def test_units_of_other_versions_are_removed_foreign_ones_stay(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    t2_install(tmp_path)
-    odom = (tmp_path / UNITS / "t2-odom.service").read_text()
-    theirs = {"t2-lidar.service": "[Service]\nExecStart=lidar\n", "t2-.service.d/50-site.conf": ""}
-    for name in ("t2-lamp.service", "t2-.service.d/30-older.conf"):
-        (tmp_path / UNITS / name).write_text(odom)
-    for name, text in theirs.items():
-        (tmp_path / UNITS / name).write_text(text)
-    (tmp_path / UNITS / "t2-masked.service").symlink_to("/dev/null")
-    capsys.readouterr()
-    assert t2_install(tmp_path) == 0
-    left = {str(path.relative_to(tmp_path / UNITS)) for path in (tmp_path / UNITS).rglob("*")}
-    assert {*theirs, "t2-masked.service"} <= left
-    assert not {"t2-lamp.service", "t2-.service.d/30-older.conf"} & left
-    assert f"remove  /{UNITS}/t2-lamp.service" in capsys.readouterr().out
-
-
 def test_invalid_settings_write_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settings = tmp_path / "etc/t2/t2.toml"
     settings.parent.mkdir(parents=True)

@@ -4,18 +4,17 @@ import contextlib
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 
 import pytest
 
 from cli.run import ports
 from cli.run.ports import Port, claimed, wanted
 from cli.settings import Everything
-from common.bus.session import router
 from common.errors import LinkError
 from common.settings import BusSettings
-from verification.harness.bus import listening
+
+TCP, UDP = socket.SOCK_STREAM, socket.SOCK_DGRAM
 
 
 @contextlib.contextmanager
@@ -28,35 +27,24 @@ def held(kind: socket.SocketKind) -> Iterator[int]:
         yield sock.getsockname()[1]
 
 
-def udp(number: int) -> Port:
-    return Port("udp", "127.0.0.1", number, "board.listen_ports")
-
-
-def tcp(number: int) -> Port:
-    return Port("tcp", "127.0.0.1", number, "bus.listen")
-
-
 def test_ports_by_process() -> None:
     listen = ("tcp/127.0.0.1:7447", "tls/[::1]:7448#iface=lo", "quic/localhost:9?a=b",
               "unixsock-stream//run/t2/bus.sock")  # fmt: skip
     bus = BusSettings(listen=listen, ca="a", certificate="b", private_key="c", members="d")
     config = Everything(bus=bus)
     assert [port[:3] for port in wanted(config, ["router"])] == [
-        ("tcp", "127.0.0.1", 7447),
-        ("tcp", "::1", 7448),
-        ("udp", "localhost", 9),
-        ("unix", "/run/t2/bus.sock", 0),
+        (TCP, "127.0.0.1", 7447),
+        (TCP, "::1", 7448),
+        (UDP, "localhost", 9),
     ]
     assert [port[2] for port in wanted(config, ["bridge", "safety"])] == [4002, 4001]
     assert [port[2] for port in wanted(config, ["sim"])] == [4003]
 
 
-@pytest.mark.parametrize(("kind", "of"), [(socket.SOCK_STREAM, tcp), (socket.SOCK_DGRAM, udp)])
-def test_a_taken_port_is_named_with_advice(
-    kind: socket.SocketKind, of: Callable[[int], Port]
-) -> None:
+@pytest.mark.parametrize(("kind", "setting"), [(TCP, "bus.listen"), (UDP, "board.listen_ports")])
+def test_a_taken_port_is_named_with_advice(kind: socket.SocketKind, setting: str) -> None:
     with held(kind) as number:
-        port = of(number)
+        port = Port(kind, "127.0.0.1", number, setting)
         with pytest.raises(LinkError) as raised:
             claimed([port], 0.0)
     message = str(raised.value)
@@ -66,24 +54,10 @@ def test_a_taken_port_is_named_with_advice(
         claimed([port], 0.0)  # of two concurrent starts one continues
 
 
-def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
-    path = str(tmp_path / "bus.sock")
-    port = Port("unix", path, 0, "bus.listen")
-    with (
-        router(listening(f"unixsock-stream/{path}")),
-        pytest.raises(LinkError, match="used by another"),
-    ):
-        claimed([port], 0.0)
-    with socket.socket(socket.AF_UNIX) as stale:
-        stale.bind(f"{path}.2")
-    with claimed([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0):
-        pass
-
-
 def test_ports_of_a_killed_stack_are_awaited() -> None:
     with contextlib.ExitStack() as leaving:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
         threading.Timer(3 * ports.LOOK_S, leaving.close).start()
         began_s = time.monotonic()
-        claimed([udp(number)]).close()
+        claimed([Port(UDP, "127.0.0.1", number, "board.port")]).close()
         assert time.monotonic() - began_s >= 2 * ports.LOOK_S
