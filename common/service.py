@@ -11,6 +11,7 @@ import signal
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
 from typing import Generic, TypeVar
@@ -178,18 +179,19 @@ def run_with(
 def run_optional_service(
     name: str,
     root: type[C],
-    found: Callable[[], Callable[[Node[C]], object]],
+    builder: str,
     settings: Sources,
     *,
     extra: str,
 ) -> int:
     """Run a service that needs an extra, at lower priority than the control chain.
 
-    ``found`` imports and returns the builder of the service.
+    ``builder`` is the path of its class, which only this process imports.
     """
+    module, _, attribute = builder.rpartition(".")
     try:
         with needs_extra(extra, name):
-            build = found()
+            build = getattr(import_module(module), attribute)
     except RobotError as error:
         print(error, file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG

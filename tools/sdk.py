@@ -19,7 +19,15 @@ from msgspec import Meta, Struct
 
 Command = Literal["run", "stop", "brake"]
 '''
-CLIENT_HEAD = "# Generated from the stack's own by ``make docs``, do not edit.\n"
+CLIENT_HEAD = '''"""Client of safety; generated from ``common/client.py``, do not edit."""
+
+from enum import Enum
+
+from msgspec import Struct
+
+from t2.messages import Drive, ReleaseRequest, ResetDone, ResetRequest, SafetyState
+
+'''
 KEYS_HEAD = '''"""Keys on the bus; generated from the stack's own by ``make docs``, do not edit."""
 
 from t2 import messages as m
@@ -31,18 +39,14 @@ def generated() -> dict[Path, str]:
     """Return the text of each generated module."""
     return {
         SDK / "messages.py": f"{HEAD}\n{_body(messages)}",
-        SDK / "client.py": CLIENT_HEAD + _text(client).replace("common.messages", "t2.messages"),
+        SDK / "client.py": CLIENT_HEAD + _body(client),
         SDK / "keys.py": KEYS_HEAD + _keys(),
     }
 
 
-def _text(module: ModuleType) -> str:
-    return Path(str(module.__file__)).read_text("utf-8")
-
-
 def _body(module: ModuleType) -> str:
     """Return a module without its docstring and its imports."""
-    text = _text(module)
+    text = Path(str(module.__file__)).read_text("utf-8")
     lines = text.splitlines(keepends=True)
     for node in reversed(ast.parse(text).body):
         is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
@@ -57,11 +61,8 @@ def _keys() -> str:
         f'    "{name.lower()}": ("{topic.path}", m.{topic.message.__name__}),\n'
         for name, topic in topics.items()
     ]
-    calls = [f'    "{call.path.removeprefix("srv/")}": "{call.path}",\n' for call in keys.CALLS]
     return (
         f'ROOT = "{keys.ROOT}"\n\n'
         "# By name: the path below the robot, and the type of the message.\n"
-        "TOPICS: dict[str, tuple[str, type[m.Message]]] = {\n" + "".join(rows) + "}\n\n"
-        "# By service and name: the path below the robot.\n"
-        "CALLS: dict[str, str] = {\n" + "".join(calls) + "}\n"
+        "TOPICS: dict[str, tuple[str, type[m.Message]]] = {\n" + "".join(rows) + "}\n"
     )

@@ -22,11 +22,3 @@ TOPICS: dict[str, tuple[str, type[m.Message]]] = {
     "estop_keepalive": ("@cmd/estop_keepalive/{source}", m.EstopKeepalive),
     "motion": ("@cmd/motion", m.Motion),
 }
-
-# By service and name: the path below the robot.
-CALLS: dict[str, str] = {
-    "bridge/switches": "srv/bridge/switches",
-    "bridge/led": "srv/bridge/led",
-    "safety/reset": "srv/safety/reset",
-    "odom/reset": "srv/odom/reset",
-}

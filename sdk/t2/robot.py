@@ -17,7 +17,7 @@ from t2.client import (
 )
 from t2.drive import Drive
 from t2.errors import NoData, NotAllowed, NotConfirmed, Refused
-from t2.keys import CALLS, ROOT, TOPICS
+from t2.keys import ROOT, TOPICS
 from t2.limit import SpeedLimit
 from t2.motion import finite
 from t2.publisher import PERIOD_S, DrivePublisher
@@ -158,7 +158,7 @@ class Robot:
         """
         seen = self.safety.latest()
         check = ResetCheck(seen)
-        done = self._call("safety/reset", reset_request(seen), m.ResetDone)
+        done = self._call("srv/safety/reset", reset_request(seen), m.ResetDone)
         check.answer(done)
         while (is_confirmed := check.outcome(self.safety.latest(), time.monotonic_ns())) is None:
             time.sleep(PERIOD_S)
@@ -204,17 +204,17 @@ class Robot:
 
         Raises ``Refused`` and ``TypeError``.
         """
-        self._call("bridge/led", m.LedRequest(channel=channel, mode=mode, **settings), m.Done)
+        self._call("srv/bridge/led", m.LedRequest(channel=channel, mode=mode, **settings), m.Done)
 
     def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Set the pose of odometry in ``odom``: m, m, rad. Raises ``Refused``."""
         echo = self.safety.latest().heartbeat
         request = m.PoseRequest(x=finite(x), y=finite(y), heading=finite(heading), echo=echo)
-        self._call("odom/reset", request, m.Done)
+        self._call("srv/odom/reset", request, m.Done)
 
     def _call(self, path: str, request: msgspec.Struct, reply: type[A]) -> A:
         check_process()
-        key = f"{ROOT}/{self.name}/{CALLS[path]}"
+        key = f"{ROOT}/{self.name}/{path}"
         payload = msgspec.msgpack.encode(request)
         for answer in self._session.get(
             key, payload=payload, timeout=CALL_S, congestion_control=zenoh.CongestionControl.DROP

@@ -2,10 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from common.cli_args import add_setting, add_sources, run_program, sources
-from common.service import Node, run_optional_service
+from common.service import run_optional_service
 from services.metrics.config import MetricsConfig
 
 
@@ -23,19 +23,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Export until SIGINT or SIGTERM; return the exit code."""
     return run_optional_service(
-        "metrics", MetricsConfig, _exporter, sources(options), extra="metrics"
+        "metrics",
+        MetricsConfig,
+        "services.metrics.exporter.Exporter",
+        sources(options),
+        extra="metrics",
     )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run with these arguments; return the exit code."""
     return run_program("metrics", add_arguments, run, argv)
-
-
-def _exporter() -> Callable[[Node[MetricsConfig]], object]:
-    from services.metrics.exporter import Exporter
-
-    return Exporter
 
 
 if __name__ == "__main__":

@@ -2,10 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from common.cli_args import add_setting, add_sources, run_program, sources
-from common.service import Node, run_optional_service
+from common.service import run_optional_service
 from services.recorder.config import RecorderConfig
 
 
@@ -27,19 +27,17 @@ def run(options: argparse.Namespace) -> int:
 def serve(options: argparse.Namespace) -> int:
     """Run the black box until SIGINT or SIGTERM; return the exit code."""
     return run_optional_service(
-        "recorder", RecorderConfig, _recorder, sources(options), extra="record"
+        "recorder",
+        RecorderConfig,
+        "services.recorder.recorder.Recorder",
+        sources(options),
+        extra="record",
     )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the service with these arguments; return the exit code."""
     return run_program("recorder", add_arguments, serve, argv)
-
-
-def _recorder() -> Callable[[Node[RecorderConfig]], object]:
-    from services.recorder.recorder import Recorder
-
-    return Recorder
 
 
 if __name__ == "__main__":

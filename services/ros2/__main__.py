@@ -2,10 +2,10 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from common.cli_args import add_setting, add_sources, run_program, sources
-from common.service import Node, run_optional_service
+from common.service import run_optional_service
 from services.ros2.config import Ros2Config
 
 
@@ -20,18 +20,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run until SIGINT or SIGTERM; return the exit code."""
-    return run_optional_service("ros2", Ros2Config, _gateway, sources(options), extra="ros2")
+    return run_optional_service(
+        "ros2", Ros2Config, "services.ros2.gateway.Gateway", sources(options), extra="ros2"
+    )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run with these arguments; return the exit code."""
     return run_program("ros2", add_arguments, run, argv)
-
-
-def _gateway() -> Callable[[Node[Ros2Config]], object]:
-    from services.ros2.gateway import Gateway
-
-    return Gateway
 
 
 if __name__ == "__main__":
