@@ -1,11 +1,13 @@
 """Run the simulated vehicle: main board and world, until ctrl-c."""
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import BinaryIO
 
 import msgspec
 
@@ -20,46 +22,33 @@ from sim import trace as t
 from sim.config import Config, add_profiles, load_model, load_plan, profile_list
 from sim.model import Model
 from sim.simulation import STEP_NS, Simulation
-from sim.sockets import BoardSocket, ControlSocket
+from sim.sockets import HOST, BoardSocket, answer_requests, bound
 from sim.world import Plan
 
 
-class Trace:
-    """A file of JSON lines, unbuffered; or none."""
-
-    def __init__(self, file: Path | None) -> None:
-        try:
-            self._out = file.open("wb", buffering=0) if file else None
-        except OSError as error:
-            raise ConfigError(f"--trace {file}: cannot be written: {error.strerror}") from None
-
-    def write(self, line: t.Line) -> None:
-        """Append a line."""
-        if self._out is not None:
-            self._out.write(msgspec.json.encode(line) + b"\n")
-
-    def close(self) -> None:
-        """Close the file."""
-        if self._out is not None:
-            self._out.close()
+def trace_file(path: Path) -> BinaryIO:
+    """Open the file of the trace, unbuffered; raise ``ConfigError`` if it cannot be written."""
+    try:
+        return path.open("wb", buffering=0)
+    except OSError as error:
+        raise ConfigError(f"--trace {path}: cannot be written: {error.strerror}") from None
 
 
 class Process:
     """Sockets, clock and trace around the simulation; the constructor opens the sockets."""
 
-    def __init__(self, config: Config, model: Model, plan: Plan, trace: Trace) -> None:
+    def __init__(self, config: Config, model: Model, plan: Plan, trace: BinaryIO) -> None:
         ports = config.board.listen_ports
         self.simulation = Simulation(model, plan, clock.now_ns(), config.sim.seed, ports)
         self._trace = trace
         self._log = Logger()
         with ExitStack() as stack:  # closes opened sockets when a later port is taken
             self.loop = stack.enter_context(closing(Loop()))
-            self._board = stack.enter_context(closing(BoardSocket(config.board)))
-            self.loop.watch(self._board.sock, self._receive)
+            self._board = BoardSocket(config.board)
+            self.loop.watch(stack.enter_context(self._board.sock), self._receive)
             if config.sim.control_port:
-                control = ControlSocket(config.sim.control_port, self.simulation)
-                stack.enter_context(closing(control))
-                self.loop.watch(control.sock, lambda now_ns: self._serve_control(control, now_ns))
+                self._control = bound(HOST, config.sim.control_port, "sim.control_port")
+                self.loop.watch(stack.enter_context(self._control), self._serve_control)
             self._opened = stack.pop_all()
         self.loop.every(STEP_NS / NS_PER_S, self._step)
 
@@ -84,8 +73,8 @@ class Process:
             self.simulation.receive(payload, port, now_ns)
         self._deliver()
 
-    def _serve_control(self, control: ControlSocket, now_ns: int) -> None:
-        control.serve(now_ns)
+    def _serve_control(self, now_ns: int) -> None:
+        answer_requests(self._control, self.simulation, now_ns)
         self._deliver()
 
     def _deliver(self) -> None:
@@ -93,7 +82,7 @@ class Process:
         for datagram in self.simulation.take_sent(now_ns):
             self._board.send(datagram)
         for line in self.simulation.take_records():
-            self._trace.write(line)
+            self._trace.write(msgspec.json.encode(line) + b"\n")
             self._log_line(line)
 
     def _log_line(self, line: t.Line) -> None:
@@ -114,7 +103,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--world", help="name of a file in sim/worlds, or path of a TOML file")
     add_profiles(parser)
     parser.add_argument("--list-profiles", action="store_true", help="list the profiles and end")
-    parser.add_argument("--trace", type=Path, metavar="FILE", help="write a trace file")
+    parser.add_argument(
+        "--trace", type=Path, default=os.devnull, metavar="FILE", help="write a trace file"
+    )
     add_sources(parser)
 
 
@@ -131,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
     if config.robot.realtime:
         realtime.request(realtime.BOARD)
     log.configure(config.log, "sim")
-    with closing(Trace(options.trace)) as trace:
+    with trace_file(options.trace) as trace:
         try:
             process = Process(config, model, plan, trace)
         except LinkError as error:

@@ -46,35 +46,16 @@ class BoardSocket:
         except OSError:
             self.unsent += 1
 
-    def close(self) -> None:
-        """Close the socket."""
-        self.sock.close()
 
-
-class ControlSocket:
-    """The simulator's end of the control socket."""
-
-    def __init__(self, port: int, simulation: Simulation) -> None:
-        self.sock = bound(HOST, port, "sim.control_port")
-        self._simulation = simulation
-
-    def serve(self, now_ns: int) -> None:
-        """Answer the waiting requests."""
-        for payload, sender in drain(self.sock):
-            reply = self._answer(payload, now_ns)
-            with contextlib.suppress(OSError):  # the client may be gone
-                self.sock.sendto(msgspec.json.encode(reply), sender)
-
-    def close(self) -> None:
-        """Close the socket."""
-        self.sock.close()
-
-    def _answer(self, payload: bytes, now_ns: int) -> Reply:
+def answer_requests(control: socket.socket, simulation: Simulation, now_ns: int) -> None:
+    """Answer the requests that wait at the control socket."""
+    for payload, sender in drain(control):
         try:
-            request = _requests.decode(payload)
+            reply = simulation.handle(_requests.decode(payload), now_ns)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            return Reply(ok=False, error=str(error))
-        return self._simulation.handle(request, now_ns)
+            reply = Reply(ok=False, error=str(error))
+        with contextlib.suppress(OSError):  # the client may be gone
+            control.sendto(msgspec.json.encode(reply), sender)
 
 
 def bound(address: str, port: int, setting: str) -> socket.socket:

@@ -69,28 +69,25 @@ class DriverLock:
             return False
         if self.driver != viewer:
             self.driver, self.gear = viewer, 1
-            self.let_go(viewer)
+            self.let_go()
         return True
 
     def leave(self, viewer: str) -> None:
         """Free the lock if this viewer has it."""
         if self.driver == viewer:
-            self.let_go(viewer)
+            self.let_go()
             self.driver = None
 
-    def hold(self, viewer: str, push: Push, shown: Shown, now_ns: int) -> None:
-        """Handle a browser's hold in answer to a state of safety."""
-        is_young = fresh(shown, now_ns, HOLD_S)
-        if viewer != self.driver or self.state is HoldState.LAPSED or not is_young:
-            return
-        if finite(push.linear, push.angular):
+    def hold(self, push: Push, shown: Shown, now_ns: int) -> None:
+        """Handle the driver's hold in answer to a state of safety."""
+        is_refused = self.state is HoldState.LAPSED or not fresh(shown, now_ns, HOLD_S)
+        if not is_refused and finite(push.linear, push.angular):
             self.state, self.shown = HoldState.HELD, shown
             self.push = Push(clamp(push.linear, 1.0), clamp(push.angular, 1.0), push.release)
 
-    def let_go(self, viewer: str) -> None:
+    def let_go(self) -> None:
         """End the driver's hold."""
-        if viewer == self.driver:
-            self.state, self.push = HoldState.FREE, Push()
+        self.state, self.push = HoldState.FREE, Push()
 
     def lapse(self) -> None:
         """End the hold and require ``let_go`` before the next one."""
@@ -102,11 +99,6 @@ class DriverLock:
         if not fresh(self.shown, now_ns, HOLD_S):
             self.lapse()
         return self.push if self.state is HoldState.HELD else None
-
-    def shift(self, viewer: str, gear: int) -> None:
-        """Change the gear, as the driver."""
-        if viewer == self.driver:
-            self.gear = gear
 
 
 @dataclass

@@ -6,7 +6,6 @@ they are to show.
 
 import re
 import threading
-from collections.abc import Collection
 
 from common import clock, keys
 from common.bus.bus import Bus
@@ -97,13 +96,10 @@ class Fleet:
     def _open(self, name: str) -> RobotPage:
         if name not in self._pages:
             bus = Bus(self._node.config.bus, name, self._node.loop.post)
-            self._pages[name] = RobotPage(bus, self._node.config, self._send)
+            self._pages[name] = RobotPage(bus, self._node.config, lambda *sent: self.send(*sent))
             bus.open()
         self._pages[name].used_ns = clock.now_ns()
         return self._pages[name]
-
-    def _send(self, viewers: Collection[str], text: bytes, replaces: bool) -> None:
-        self.send(viewers, text, replaces)
 
     def _close(self, name: str, page: RobotPage) -> None:
         if not page.robot.bus.connected:

@@ -10,19 +10,17 @@ from pathlib import Path
 import msgspec
 
 FILE = Path(__file__).with_name("texts.toml")
-LANGUAGES = ("en", "zh")
 PHRASES_FILE = Path(__file__).with_name("phrases.toml")
-PLACEHOLDER = "{}"
-TEXTS = msgspec.toml.decode(FILE.read_bytes(), type=dict[str, tuple[str, str]])
+CATALOGUE = msgspec.toml.decode(FILE.read_bytes(), type=dict[str, tuple[str, str] | str])
+EVENTS = {key: words for key, words in CATALOGUE.items() if isinstance(words, str)}  # Chinese
+TEXTS = {key: words for key, words in CATALOGUE.items() if not isinstance(words, str)}
 PHRASES = msgspec.toml.decode(PHRASES_FILE.read_bytes(), type=dict[str, str])
 
 
 def table() -> dict[str, dict[str, str]]:
     """Return the texts by language, as the page gets them."""
-    return {
-        language: {key: words[index] for key, words in TEXTS.items()}
-        for index, language in enumerate(LANGUAGES)
-    }
+    english, chinese = ({key: words[at] for key, words in TEXTS.items()} for at in (0, 1))
+    return {"en": english, "zh": chinese | EVENTS}
 
 
 def phrases() -> dict[str, str]:

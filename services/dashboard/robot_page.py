@@ -107,13 +107,13 @@ class RobotPage:
         match message:
             case client.Hold(echo, x, y, release):
                 shown = robot.telemetry.shown(echo)
-                lock.hold(viewer, Push(x, y, release), shown, clock.now_ns())
+                lock.hold(Push(x, y, release), shown, clock.now_ns())
             case client.Free():
-                lock.let_go(viewer)
+                lock.let_go()
             case client.Leave():
                 lock.leave(viewer)
             case client.Gear(gear):
-                lock.shift(viewer, gear)
+                lock.gear = gear
             case client.Reset(echo):
                 robot.reset(echo, notify)
             case client.Switch(to):

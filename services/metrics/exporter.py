@@ -4,10 +4,9 @@ The web server handles a scrape in its own thread and lets the node's loop make 
 loop hangs, the scrape fails; it never returns old values.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from concurrent.futures import Future
-from typing import Any, TypeVar
-from wsgiref.simple_server import WSGIServer
+from typing import Any
 
 from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import Metric
@@ -43,8 +42,15 @@ class Exporter(Collector):
             self._bus = Bus(node.config.bus, settings.robots, node.loop.post)
             self._bus.open()
         self._subscribe()
-        node.loop.every(CHECK_S, self._prune)
-        self._server = start_server(settings.port, self)
+        node.loop.every(CHECK_S, lambda now_ns: prune(self._robots, self._own, now_ns))
+        registry = CollectorRegistry()
+        registry.register(self)
+        try:
+            self._server = start_http_server(settings.port, HOST, registry)[0]
+        except OSError as error:
+            raise LinkError(
+                f"metrics cannot listen on {HOST}:{settings.port}: {error.strerror}"
+            ) from None
         node.on_exit = self._close
 
     def _subscribe(self) -> None:
@@ -69,9 +75,6 @@ class Exporter(Collector):
     def _robot(self, key: str) -> RobotState:
         return self._robots.setdefault(key.split("/")[2], RobotState())
 
-    def _prune(self, now_ns: int) -> None:
-        prune(self._robots, self._own, now_ns)
-
     def _families(self) -> list[Metric]:
         return metric_families(
             {n: robot for n, robot in self._robots.items() if n == self._own or robot.is_robot},
@@ -81,31 +84,11 @@ class Exporter(Collector):
 
     def collect(self) -> Iterable[Metric]:
         """Return the families, in the web server's thread; raise ``TimeoutError``."""
-        return call_in_loop(self._node.loop.post, self._families)
+        answer: Future[list[Metric]] = Future()
+        self._node.loop.post(lambda: answer.set_result(self._families()))
+        return answer.result(PATIENCE_S)
 
     def _close(self) -> None:
         self._server.shutdown()
         if self._bus is not self._node.bus:
             self._bus.close()
-
-
-ResultT = TypeVar("ResultT")
-
-
-def call_in_loop(
-    post: Callable[[Callable[[], None]], None], call: Callable[[], ResultT]
-) -> ResultT:
-    """Call a function in the loop and return its result; raise ``TimeoutError`` if it hangs."""
-    answer: Future[ResultT] = Future()
-    post(lambda: answer.set_result(call()))
-    return answer.result(PATIENCE_S)
-
-
-def start_server(port: int, collector: Collector) -> WSGIServer:
-    """Start the web server; raise ``LinkError`` if the port is taken."""
-    registry = CollectorRegistry()
-    registry.register(collector)
-    try:
-        return start_http_server(port, HOST, registry)[0]
-    except OSError as error:
-        raise LinkError(f"metrics cannot listen on {HOST}:{port}: {error.strerror}") from None

@@ -65,11 +65,7 @@ class Entry:
     @property
     def message(self) -> Message | None:
         """Return the decoded message; None if its type is unknown or it is invalid."""
-        kind = MESSAGE_TYPES.get(self.kind)
-        try:
-            return codec.decode(self.sample.payload, kind) if kind else None
-        except MessageError:
-            return None
+        return _message(self.sample)
 
     @property
     def sample(self) -> Sample:
@@ -103,7 +99,7 @@ class Encoder:
         channel = Channel(sample.key, schema_of(kind) if kind else None, sample.encoding)
         sent_ns, number = _header(fields, "t_ns") or log_ns, _header(fields, "seq") & 0xFFFFFFFF
         yield Entry(channel, encode_json(sample, fields), log_ns, sent_ns, number)
-        message = _message(sample, kind)
+        message = _message(sample)
         if message is not None:
             service = sample.key.rpartition("/")[2]
             for topic, view_schema, view in self._views.of(message, service, log_ns):
@@ -142,7 +138,8 @@ def _codec(encoding: str) -> Any:
     return msgspec.json if encoding.startswith(JSON) else msgspec.msgpack
 
 
-def _message(sample: Sample, kind: type[Message] | None) -> Message | None:
+def _message(sample: Sample) -> Message | None:
+    kind = MESSAGE_TYPES.get(codec.kind_of(sample.encoding))
     try:
         return codec.decode(sample.payload, kind) if kind else None
     except MessageError:

@@ -32,7 +32,8 @@ class Recorder:
         robot = node.bus.robot if settings.make_room else None
         self._storage = Storage(Path(settings.folder), settings.free * MB, robot=robot)
         files = (self._open_recording, self._close_recording)
-        self._rolling = RollingWriter(*files) if settings.everything else None
+        self._everything = settings.everything
+        self._rolling = RollingWriter(*files)
         self._black_box = BlackBox(*files)
         node.counters.update(recorded=0, not_recorded=0, removed=0)
         self._check_storage(clock.now_ns())
@@ -47,13 +48,13 @@ class Recorder:
 
     def _on_sample(self, sample: Sample) -> None:
         self._black_box.add(sample)
-        if self._rolling is not None:
+        if self._everything:
             self._on_disk(lambda: self._record(sample))
         if sample.key == self._safety_key:
             self._on_safety(sample)
 
     def _record(self, sample: Sample) -> None:
-        if self._rolling is None or not self._storage.has_room:
+        if not self._storage.has_room:
             self._node.counters["not_recorded"] += 1
             return
         self._rolling.write(sample)
@@ -73,9 +74,7 @@ class Recorder:
 
     def _flush(self, now_ns: int) -> None:
         self._on_disk(self._black_box.flush)
-        if self._rolling is not None:
-            rolling = self._rolling
-            self._on_disk(lambda: rolling.flush(now_ns))
+        self._on_disk(lambda: self._rolling.flush(now_ns))
 
     def _check_storage(self, now_ns: int) -> None:
         """Make room, stop before the disk is full, continue when there is room again."""
@@ -97,10 +96,9 @@ class Recorder:
     def _stop(self) -> None:
         text = f"no room for recordings: {self._storage.problem}"
         self._node.event("disk_full", "error", text, folder=str(self._storage.folder))
-        for close in (self._black_box.finish, self._rolling.close if self._rolling else None):
+        for close in (self._black_box.finish, self._rolling.close):
             try:
-                if close is not None:
-                    close()
+                close()
             except OSError as error:
                 self._node.log.error("cannot complete a recording", reason=str(error))
 
@@ -134,5 +132,4 @@ class Recorder:
 
     def _close(self) -> None:
         self._on_disk(self._black_box.close)
-        if self._rolling is not None:
-            self._on_disk(self._rolling.close)
+        self._on_disk(self._rolling.close)

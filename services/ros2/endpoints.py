@@ -26,6 +26,7 @@ Take = Callable[[Attachment, Value, int], None]  # sender, message, receive time
 Answer = Callable[[Value], None]
 Serve = Callable[[Attachment, Value, Answer], None]  # the client, its request
 Seen = Callable[[str, bool], None]  # a token, and whether it appeared
+Declare = Callable[[zenoh.Session, str, str], Any]  # with the key and the token of an endpoint
 
 DEPTH = 32  # commands that wait for the loop
 LATCHED: dict[str, Any] = {
@@ -92,27 +93,24 @@ class Endpoints:
 
     def publisher(self, topic: str, interface: str, *, latched: bool = False) -> Publisher:
         """Return a publisher of an absolute topic."""
-        made, key = Publisher(interface), names.data_key(self._node.domain, topic, interface)
-        number = self._next()
+        made = Publisher(interface)
 
-        def declare(session: zenoh.Session) -> Any:
+        def declare(session: zenoh.Session, key: str, token: str) -> Any:
             if latched:
                 sent: Any = zenoh.ext.declare_advanced_publisher(session, key, **LATCHED)
             else:
                 sent = session.declare_publisher(key, **QOS)
-            qos = names.QOS_LATCHED if latched else names.QOS
-            token = self._token(number, "MP", topic, interface, qos)
             made.declared(sent, gid(token))
-            return sent, session.liveliness().declare_token(token)
+            return sent
 
-        self._session.declare(declare)
+        qos = names.QOS_LATCHED if latched else names.QOS
+        self._declare("MP", topic, interface, declare, qos)
         return made
 
     def subscribe(
         self, topic: str, interface: str, take: Take, refused: Callable[[str], None]
     ) -> None:
         """Call ``take`` for each message; ``refused`` gets the error of unreadable ones."""
-        key, number = names.data_key(self._node.domain, topic, interface), self._next()
 
         def read(stamped: tuple[zenoh.Sample, int]) -> None:
             sample, received_ns = stamped
@@ -130,32 +128,23 @@ class Endpoints:
         def queue(sample: zenoh.Sample) -> None:
             waiting.put((sample, clock.now_ns()))
 
-        def declare(session: zenoh.Session) -> Any:
-            token = self._token(number, "MS", topic, interface, names.QOS)
-            return (
-                session.declare_subscriber(key, queue),
-                session.liveliness().declare_token(token),
-            )
-
-        self._session.declare(declare)
+        self._declare(
+            "MS", topic, interface, lambda session, key, _: session.declare_subscriber(key, queue)
+        )
 
     def serve(self, service: str, interface: str, handle: Serve) -> None:
         """Answer the requests of a service; ``handle`` calls the answer once, now or later."""
-        key, number = names.data_key(self._node.domain, service, interface), self._next()
+        key = names.data_key(self._node.domain, service, interface)
 
         def answer(query: zenoh.Query) -> None:
             self._answer(query, key, interface, handle)
 
         waiting = OverwritingQueue(DEPTH, answer, self._post, self.counters)
 
-        def declare(session: zenoh.Session) -> Any:
-            token = self._token(number, "SS", service, interface, names.QOS)
-            return (
-                session.declare_queryable(key, waiting.put, complete=True),
-                session.liveliness().declare_token(token),
-            )
+        def declare(session: zenoh.Session, key: str, _: str) -> Any:
+            return session.declare_queryable(key, waiting.put, complete=True)
 
-        self._session.declare(declare)
+        self._declare("SS", service, interface, declare)
 
     def _answer(self, query: zenoh.Query, key: str, interface: str, handle: Serve) -> None:
         try:
@@ -197,12 +186,18 @@ class Endpoints:
         self._node = self._node._replace(zid=str(session.info.zid()))
         return session.liveliness().declare_token(self._node.token)
 
-    def _token(self, number: int, kind: str, topic: str, interface: str, qos: str) -> str:
-        return self._node.endpoint_token(number, kind, topic, interface, qos)
-
-    def _next(self) -> int:
+    def _declare(
+        self, kind: str, topic: str, interface: str, declare: Declare, qos: str = names.QOS
+    ) -> None:
+        """Declare an endpoint with its token in each session."""
         self._number += 1
-        return self._number
+        number, key = self._number, names.data_key(self._node.domain, topic, interface)
+
+        def both(session: zenoh.Session) -> Any:
+            token = self._node.endpoint_token(number, kind, topic, interface, qos)
+            return declare(session, key, token), session.liveliness().declare_token(token)
+
+        self._session.declare(both)
 
 
 def _attachment(sent: zenoh.Sample | zenoh.Query) -> Attachment:

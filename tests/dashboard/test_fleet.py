@@ -14,6 +14,7 @@ from common.messages import Event, SwitchesRequest
 from services.dashboard import client_messages as client
 from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
+from services.dashboard.driver_lock import HoldState
 from services.dashboard.fleet import IDLE_S, KNOWN_MAX, PAGES_MAX, Fleet
 from services.dashboard.robot_page import SLOW_TICKS
 from tests.factories import safety_state
@@ -165,9 +166,15 @@ def test_one_viewer_drives_and_a_takeover_asks(
     for viewer in ("1", "2"):
         fleet.join("001", viewer)
     lock = fleet._pages["001"].robot.driver_lock
+    receive(buses["001"], keys.SAFETY, safety_state(heartbeat=5))
     fleet.handle("001", "1", client.Take())
-    for message in (client.Reset(1), client.Hold(1), client.Leave()):
+    for message in (client.Hold(5, x=1.0), client.Leave(), client.Gear(2), client.Reset(5)):
         fleet.handle("001", "2", message)
+    assert (lock.state, lock.gear) == (HoldState.FREE, 1)
+    assert not buses["001"].call.called
+    fleet.handle("001", "1", client.Hold(5, x=1.0))
+    fleet.handle("001", "2", client.Free())
+    assert lock.state is HoldState.HELD
     fleet.handle("001", "2", client.Take())
     assert sent[-2][1]["text"] == "take_first"
     assert sent[-1] == (["2"], {"k": "taken"})

@@ -9,7 +9,7 @@ import pytest
 from common.messages import Direction, FaultName, LinkState, Verdict
 from services.dashboard import server
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.i18n import PHRASES, PLACEHOLDER, TEXTS
+from services.dashboard.i18n import EVENTS, PHRASES, TEXTS
 from services.safety.core.causes import RULES
 from tools.docs import DOCS
 
@@ -72,14 +72,14 @@ def events_of_the_guide() -> list[tuple[str, str]]:
 
 def test_every_event_has_its_text() -> None:
     for service, name in events_of_the_guide():
-        assert {f"event.{service}.{name}", f"event.{name}"} & set(TEXTS), name
+        assert {f"event.{service}.{name}", f"event.{name}"} & set(EVENTS), name
 
 
 def test_every_result_of_a_call_has_its_text() -> None:
     robot = (CODE / "robot.py").read_text(encoding="utf-8")
     found = re.findall(r'(?:reason|text|done\.text), "(\w+)"\)', robot)
     assert {"reset_refused", "reset_done", "reset_partial", "call_refused"} == set(found)
-    assert {f"event.{name}" for name in found} <= set(TEXTS)
+    assert {f"event.{name}" for name in found} <= set(EVENTS)
 
 
 def test_both_languages_have_each_text() -> None:
@@ -88,6 +88,7 @@ def test_both_languages_have_each_text() -> None:
         if key != "language":  # each names the other one
             assert not HAN.search(english), key
             assert HAN.search(chinese), key
+    assert all(map(HAN.search, EVENTS.values()))
     for english, chinese in PHRASES.items():
         assert HAN.search(chinese), english
-        assert chinese.count(PLACEHOLDER) == english.count(PLACEHOLDER), english
+        assert chinese.count("{}") == english.count("{}"), english

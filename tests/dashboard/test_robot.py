@@ -42,9 +42,9 @@ class RobotFixture:
             if held:
                 push = Push(release=self.release) if self.release else Push(1.0)
                 shown = self.robot.telemetry.shown(self.now_ns - self.delay_ns)
-                lock.hold("1", push, shown, self.now_ns)
+                lock.hold(push, shown, self.now_ns)
             else:
-                lock.let_go("1")
+                lock.let_go()
             self.robot.tick(self.now_ns)
 
     def is_held(self) -> bool:

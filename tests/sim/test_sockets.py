@@ -1,6 +1,5 @@
 import socket
 from collections.abc import Iterator
-from contextlib import closing
 from select import select
 
 import msgspec
@@ -9,7 +8,7 @@ import pytest
 from common.settings import Board
 from sim.faults import Datagram
 from sim.simulation import Reply
-from sim.sockets import BURST, HOST, BoardSocket, ControlSocket, bound, drain
+from sim.sockets import BURST, HOST, BoardSocket, answer_requests, bound, drain
 from tests.sim.sim_fixture import SimFixture
 from verification.harness.ports import free_port
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -42,7 +41,7 @@ def received(sock: socket.socket) -> tuple[bytes, tuple[str, int]]:
 
 def test_it_tells_the_pc_from_everybody_else(pc: socket.socket) -> None:
     board, port = board_for(pc)
-    with closing(board), bound("127.0.0.1", 0, "test") as stranger:
+    with board.sock, bound("127.0.0.1", 0, "test") as stranger:
         pc.sendto(b"ours", board.sock.getsockname())
         stranger.sendto(b"theirs", board.sock.getsockname())
         got: dict[bytes, int | None] = {}
@@ -57,14 +56,14 @@ def test_it_tells_the_pc_from_everybody_else(pc: socket.socket) -> None:
 
 def test_it_sends_from_its_own_address(pc: socket.socket) -> None:
     board, port = board_for(pc)
-    with closing(board):
+    with board.sock:
         board.send(Datagram(b"own", port))
         assert received(pc) == (b"own", board.sock.getsockname())
 
 
 def test_what_cannot_be_sent_is_counted(pc: socket.socket) -> None:
     board, port = board_for(pc)
-    with closing(board):
+    with board.sock:
         board.send(Datagram(bytes(70_000), port))
     assert board.unsent == 1
 
@@ -81,11 +80,10 @@ def test_a_flood_is_read_in_bursts(pc: socket.socket) -> None:
 
 @pytest.mark.parametrize("text", [b"", b"\xff", b'{"do": "dance"}', b"[" * 60_000])
 def test_what_is_no_request_is_answered_with_the_reason(text: bytes, pc: socket.socket) -> None:
-    port = free_port(socket.SOCK_DGRAM)
-    with closing(ControlSocket(port, SimFixture().simulation)) as control:
-        pc.sendto(text, (HOST, port))
-        assert select([control.sock], [], [], PATIENCE_S)[0]
-        control.serve(0)
+    with bound(HOST, 0, "test") as control:
+        pc.sendto(text, control.getsockname())
+        assert select([control], [], [], PATIENCE_S)[0]
+        answer_requests(control, SimFixture().simulation, 0)
         reply = msgspec.json.decode(received(pc)[0], type=Reply)
     assert not reply.ok
     assert reply.error
