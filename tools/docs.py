@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from common import codec, keys
+from common import keys
 from common import messages as m
 from services.metrics.samples import METRICS
 from services.safety.core.causes import RULES, Clears
@@ -49,8 +49,7 @@ def current(path: Path) -> str:
 
 def generated() -> dict[Path, str]:
     """Return the text of each generated file."""
-    all_fields = "\n".join(fields(kind) for kind in kinds())
-    bus = {"topics": topics(), "calls": calls(), "classes": classes(), "fields": all_fields}
+    bus = {"topics": topics(), "calls": calls(), "classes": classes(), "fields": fields()}
     blocks = {
         "bus": bus,
         "safety": {"causes": causes()},
@@ -109,16 +108,17 @@ def classes() -> str:
     return table(("class", "priority", "express", "history", "because"), rows)
 
 
-def fields(kind: type[Struct]) -> str:
-    """Return the table of a struct's fields with units, from its source."""
-    cells = [
-        (f"`{name}`", f"`{type_}`".replace("|", "\\|"), f"`{default}`" if default else "", why)
-        for name, type_, default, why in fields_of(kind)
-    ]
-    summary = (kind.__doc__ or "").splitlines()[0]
-    carried = f" Encoding `{codec.encoding(kind)}`." if kind is not m.Message else ""
-    head = f"### {kind.__name__}\n\n{summary}{carried}\n"
-    return head + (f"\n{table(('field', 'type', 'default', ''), cells)}\n" if cells else "")
+def fields() -> str:
+    """Return the table of all structs and their fields with units, from their source."""
+    rows: list[tuple[str, str, str, str]] = []
+    for kind in kinds():
+        anchor = f'<a id="{kind.__name__.lower()}"></a>'
+        rows.append((f"{anchor}**{kind.__name__}**", "", "", (kind.__doc__ or "").splitlines()[0]))
+        rows.extend(
+            (f"`{name}`", f"`{type_}`".replace("|", "\\|"), f"`{default}`" if default else "", why)
+            for name, type_, default, why in fields_of(kind)
+        )
+    return table(("field", "type", "default", ""), rows)
 
 
 def causes() -> str:
