@@ -1,6 +1,5 @@
 """MessagePack encoding and type-checked decoding of messages."""
 
-import math
 from functools import cache
 from typing import Any, TypeVar
 
@@ -40,11 +39,6 @@ def encoding(kind: type[Struct]) -> str:
 def kind_of(encoding: str) -> str:
     """Return the type name in an encoding, such as ``Odometry``, or an empty string."""
     return encoding.removeprefix(PREFIX) if encoding.startswith(PREFIX) else ""
-
-
-def finite(*values: float) -> bool:
-    """Return whether all values are finite; NaN and infinity pass a typed decode."""
-    return all(math.isfinite(value) for value in values)
 
 
 class Sample(Struct, frozen=True):

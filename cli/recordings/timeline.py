@@ -15,7 +15,6 @@ from itertools import pairwise
 
 from cli.inspect.addressing import chunks, topic_of
 from common import keys
-from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import (
     Cause,
@@ -264,7 +263,7 @@ class Timeline:
             case Velocity():
                 self.linear.measured.add(at_s, message.linear)
                 self.angular.measured.add(at_s, message.angular)
-            case Odometry() if finite(message.x, message.y):
+            case Odometry():
                 self._add_pose(message, at_s)
             case SafetyState():
                 add_state(self.verdicts, at_s, message, GAP_S)

@@ -25,6 +25,9 @@ Direction = Literal["forward", "backward"]
 ReleaseRequest = Literal["none", "forward", "backward"]  # off a pressed bumper
 LimitEffect = Literal["none", "slow", "stop"]
 
+# NaN and infinity are out of this range, too: a message with such a number is undecodable.
+Number = Annotated[float, Meta(ge=-1e9, le=1e9)]
+
 # A longer text or list makes a message undecodable. Members that may only read publish events, too:
 # one of 1 MB delayed the emergency stop of a terminal by seconds.
 MAX_TEXT = 4000
@@ -33,12 +36,12 @@ Name = Annotated[str, Meta(max_length=200)]
 Few = Meta(max_length=128)
 Counts = Annotated[dict[Name, int], Few]
 
-Ranges = Annotated[tuple[float | None, ...], Meta(min_length=8, max_length=8)]
+Ranges = Annotated[tuple[Number | None, ...], Meta(min_length=8, max_length=8)]
 Statuses = Annotated[tuple[RangeStatus, ...], Meta(min_length=8, max_length=8)]
-Covariance3 = Annotated[tuple[float, ...], Meta(min_length=9, max_length=9)]
-Covariance2 = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
+Covariance3 = Annotated[tuple[Number, ...], Meta(min_length=9, max_length=9)]
+Covariance2 = Annotated[tuple[Number, ...], Meta(min_length=4, max_length=4)]
 
-Cap = Annotated[float, Meta(ge=0.0)]
+Cap = Annotated[float, Meta(ge=0.0, le=1e9)]
 MAX_REASON = 80  # characters
 Reason = Annotated[str, Meta(max_length=MAX_REASON)]
 
@@ -59,15 +62,15 @@ class Message(Struct, frozen=True, kw_only=True):
 class Velocity(Message, frozen=True, kw_only=True):
     """Measured by the board (manual 2.2)."""
 
-    linear: float  # m/s, forward positive
-    angular: float  # rad/s, counter-clockwise positive
+    linear: Number  # m/s, forward positive
+    angular: Number  # rad/s, counter-clockwise positive
 
 
 class Mileage(Message, frozen=True, kw_only=True):
     """Counted by the board since it was powered on (manual 2.3)."""
 
-    distance: float  # m, forward positive
-    heading: float  # rad, wrapped to -pi..pi
+    distance: Number  # m, forward positive
+    heading: Number  # rad, wrapped to -pi..pi
     epoch: int  # number of board restarts that the bridge has detected
 
 
@@ -105,7 +108,7 @@ class Relay(Struct, frozen=True, kw_only=True):
     state: LinkState
     version: Name
     braking: Name  # why it sends BRAKE: start, silent, hit; empty while it passes commands
-    uptime: float  # s
+    uptime: Number  # s
     counters: Counts  # datagrams since its start, by what became of them
 
 
@@ -117,9 +120,9 @@ class Link(Message, frozen=True, kw_only=True):
     epoch: int
     armed: bool  # whether the bridge would obey a RUN now
     waiting: Text  # why it would not, as text; empty when armed
-    rates: Annotated[dict[Name, float], Few]  # frames by name, over the last second, Hz
+    rates: Annotated[dict[Name, Number], Few]  # frames by name, over the last second, Hz
     rejected: Counts  # frames and datagrams refused since start, by reason
-    round_trip: float | None  # s, the median of the last queries
+    round_trip: Number | None  # s, the median of the last queries
     latched_by: int | None = None  # ``boot`` of the safety or bridge whose latch is not reset
     ports: Counts = {}  # our UDP port that each frame is taken from, by the frame's name
     send_errors: int = 0  # datagrams that the system refused to send, since start
@@ -133,15 +136,15 @@ class Link(Message, frozen=True, kw_only=True):
 class Odometry(Message, frozen=True, kw_only=True):
     """Pose in ``odom`` and twist in ``base_link``."""
 
-    x: float  # m
-    y: float  # m
-    heading: float  # rad, wrapped to -pi..pi
-    linear: float  # m/s
-    angular: float  # rad/s
+    x: Number  # m
+    y: Number  # m
+    heading: Number  # rad, wrapped to -pi..pi
+    linear: Number  # m/s
+    angular: Number  # rad/s
     pose_covariance: Covariance3  # 3x3 row by row over x, y, heading
     twist_covariance: Covariance2  # 2x2 row by row over linear, angular
     epoch: int  # number of times the pose was set
-    residual: float | None  # m, counters less integrated velocity over the last second
+    residual: Number | None  # m, counters less integrated velocity over the last second
     slip: bool
     frame_id: Name = "odom"
     child_frame_id: Name = "base_link"
@@ -152,7 +155,7 @@ class Cause(Struct, frozen=True, kw_only=True):
 
     name: Name
     action: Action
-    age: float  # s since it became active
+    age: Number  # s since it became active
     text: Text  # text for the operator
     id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one for each occurrence
 
@@ -163,29 +166,29 @@ class Limits(Struct, frozen=True, kw_only=True):
     A release has its own speed, ``safety.release_speed``.
     """
 
-    forward: float  # m/s
-    backward: float  # m/s, as a positive number
-    angular: float  # rad/s, either way
+    forward: Number  # m/s
+    backward: Number  # m/s, as a positive number
+    angular: Number  # rad/s, either way
 
 
 class Release(Struct, frozen=True, kw_only=True):
     """State of moving off a pressed bumper; the operator chooses the direction."""
 
     believed_free: Direction | None  # opposite of the last motion; None when none is known
-    travelled: float  # m, travel by the counters since the last reversal before the contact
-    age: float | None  # s since that motion; None when none is known
+    travelled: Number  # m, travel by the counters since the last reversal before the contact
+    age: Number | None  # s since that motion; None when none is known
     forbidden: Annotated[tuple[Direction, ...], Few]  # until a reset: it was pressed that way
-    left: float  # m that may still be travelled until a reset
+    left: Number  # m that may still be travelled until a reset
 
 
 class LimitState(Struct, frozen=True, kw_only=True):
     """State of one source of speed limits, see ``Limit``."""
 
     source: Name
-    linear: float | None  # m/s; None: no cap
-    angular: float | None  # rad/s, likewise
+    linear: Number | None  # m/s; None: no cap
+    angular: Number | None  # rad/s, likewise
     reason: Text  # in the source's words
-    age: float | None  # s since its last limit; None: none was received
+    age: Number | None  # s since its last limit; None: none was received
     silent: bool  # whether its lease is over, or it was never received
     effect: LimitEffect  # on the vehicle now
 
@@ -194,9 +197,9 @@ class KeepaliveState(Struct, frozen=True, kw_only=True):
     """State of an emergency stop that must be kept alive, see ``EstopKeepalive``."""
 
     source: Name
-    age: float | None  # s since safety sent the newest heartbeat that it echoed; None: not received
+    age: Number | None  # s since safety sent the heartbeat that it echoed; None: not received
     alive: bool
-    timeout: float  # s; older, and safety brakes and latches
+    timeout: Number  # s; older, and safety brakes and latches
 
 
 class SafetyState(Message, frozen=True, kw_only=True):
@@ -227,8 +230,8 @@ class SourceMessage(Message, frozen=True, kw_only=True):
 class Drive(SourceMessage, frozen=True, kw_only=True):
     """A drive request; valid for its source's lease."""
 
-    linear: float  # m/s
-    angular: float  # rad/s
+    linear: Number  # m/s
+    angular: Number  # rad/s
     release: ReleaseRequest = "none"  # move slowly off a pressed bumper instead, as an operator
 
 
@@ -248,8 +251,8 @@ class Motion(Message, frozen=True, kw_only=True):
     """The motion that safety allows; the bridge obeys only this, for 200 ms."""
 
     command: Command
-    linear: float = 0.0  # m/s
-    angular: float = 0.0  # rad/s
+    linear: Number = 0.0  # m/s
+    angular: Number = 0.0  # rad/s
     source: Name | None = None
     judged: int = 0  # ``seq`` of the newest bumper sample in the verdict
     judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
@@ -267,15 +270,15 @@ class Event(Message, frozen=True, kw_only=True):
     name: Name
     level: Level
     text: Text
-    about: Annotated[dict[Name, Text | int | float | bool | None], Few] = {}
+    about: Annotated[dict[Name, Text | int | Number | bool | None], Few] = {}
 
 
 class Durations(Struct, frozen=True, kw_only=True):
     """Histogram of durations since the service's start."""
 
-    bounds: Annotated[tuple[float, ...], Few]  # s, rising; upper bounds of the counts
+    bounds: Annotated[tuple[Number, ...], Few]  # s, rising; upper bounds of the counts
     counts: Annotated[tuple[int, ...], Few]  # one for each bound, and one above
-    worst: float  # s, 0 without any
+    worst: Number  # s, 0 without any
 
 
 class Health(Message, frozen=True, kw_only=True):
@@ -283,10 +286,10 @@ class Health(Message, frozen=True, kw_only=True):
 
     service: Name
     version: Name
-    uptime: float  # s
-    rates: Annotated[dict[Name, float], Few]  # messages by key, in the last second, Hz
+    uptime: Number  # s
+    rates: Annotated[dict[Name, Number], Few]  # messages by key, in the last second, Hz
     counters: Counts  # since start
-    lateness: float  # s, maximum lateness of the loop's timers in the last second
+    lateness: Number  # s, maximum lateness of the loop's timers in the last second
     rss: int  # bytes
     priority: int = 0  # of SCHED_FIFO; 0 for normal priority
     reactions: Annotated[dict[Name, Durations], Few] = {}  # reaction times, by name
@@ -327,9 +330,9 @@ class ResetRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Set the odometry pose in ``odom``."""
 
-    x: float = 0.0  # m
-    y: float = 0.0  # m
-    heading: float = 0.0  # rad
+    x: Number = 0.0  # m
+    y: Number = 0.0  # m
+    heading: Number = 0.0  # rad
     echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from common.messages import Direction, SwitchesRequest
+from common.messages import Direction, Number, SwitchesRequest
 from services.dashboard.config import GEARS
 
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
@@ -35,8 +35,8 @@ class Hold(ClientMessage, frozen=True):
     """
 
     echo: int
-    x: float = 0.0
-    y: float = 0.0
+    x: Number = 0.0
+    y: Number = 0.0
     release: Direction | None = None
 
 

@@ -26,7 +26,6 @@ would hide that the first operator is gone.
 from dataclasses import dataclass, field
 from enum import Enum
 
-from common.codec import finite
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Direction, SafetyState
 from common.motion import clamp
@@ -80,8 +79,7 @@ class DriverLock:
 
     def hold(self, push: Push, shown: Shown, now_ns: int) -> None:
         """Handle the driver's hold in answer to a state of safety."""
-        is_refused = self.state is HoldState.LAPSED or not fresh(shown, now_ns, HOLD_S)
-        if not is_refused and finite(push.linear, push.angular):
+        if self.state is not HoldState.LAPSED and fresh(shown, now_ns, HOLD_S):
             self.state, self.shown = HoldState.HELD, shown
             self.push = Push(clamp(push.linear, 1.0), clamp(push.angular, 1.0), push.release)
 

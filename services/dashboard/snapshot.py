@@ -2,7 +2,7 @@
 
 Two snapshots are sent to the browsers as JSON, each encoded once for all viewers:
 ``FastSnapshot``, 20 times a second, and ``SlowSnapshot``, twice a second. None and empty mean that
-there is no fresh message, or no finite number. Distances are metres, angles radians, times seconds.
+there is no fresh message. Distances are metres, angles radians, times seconds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,6 @@ from typing import Literal
 from msgspec import Struct
 
 from common import keys
-from common.codec import finite
 from common.messages import (
     SONAR_NAMES,
     Cause,
@@ -95,12 +94,12 @@ def fast_snapshot(
     )
     return FastSnapshot(
         connected=connected,
-        measured=_numbers(velocity.linear, velocity.angular) if velocity else None,
-        requested=_numbers(drive.linear, drive.angular) if drive else None,
-        allowed=_numbers(motion.linear, motion.angular) if motion else None,
-        pose=_numbers(odometry.x, odometry.y, odometry.heading) if odometry else None,
+        measured=(velocity.linear, velocity.angular) if velocity else None,
+        requested=(drive.linear, drive.angular) if drive else None,
+        allowed=(motion.linear, motion.angular) if motion else None,
+        pose=(odometry.x, odometry.y, odometry.heading) if odometry else None,
         epoch=odometry.epoch if odometry else 0,
-        ranges=tuple(map(_number, sonar.ranges)) if sonar else (None,) * 8,
+        ranges=sonar.ranges if sonar else (None,) * 8,
         tones=tones(sonar, state.causes if state else ()),
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
@@ -132,7 +131,7 @@ def tones(ultrasonic: Ultrasonic | None, causes: Sequence[Cause]) -> tuple[Tone,
     if ultrasonic is None:
         return tuple("dark" for _ in SONAR_NAMES)
     own: list[Tone] = [
-        OF_STATUS.get(status) or ("dark" if _number(reading) is None else "clear")
+        OF_STATUS.get(status) or ("dark" if reading is None else "clear")
         for status, reading in zip(ultrasonic.status, ultrasonic.ranges, strict=True)
     ]
     for cause in causes:
@@ -150,11 +149,3 @@ def sonars_named(text: str) -> list[int]:
             text = text.replace(words, "")
             found.append(SONAR_NAMES.index(name))
     return found
-
-
-def _numbers(*values: float) -> tuple[float, ...] | None:
-    return values if finite(*values) else None
-
-
-def _number(value: float | None) -> float | None:
-    return value if value is not None and finite(value) else None

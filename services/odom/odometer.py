@@ -7,7 +7,6 @@ Zenoh sends nothing to the router without a subscriber.
 from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Caller
-from common.codec import finite
 from common.freshness import NS_PER_S
 from common.heartbeat import Echoes
 from common.service import Node
@@ -41,25 +40,16 @@ class Odometer:
         node.loop.every(CHECK_S, self._check_silence)
 
     def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
-        velocity, now_ns = arrival.message, arrival.received_ns
-        if self._is_finite(velocity.linear, velocity.angular):
-            self._estimator.on_velocity(velocity, now_ns)
-        if now_ns - self._counted_ns > NO_COUNTERS_NS:
+        self._estimator.on_velocity(arrival.message, arrival.received_ns)
+        if arrival.received_ns - self._counted_ns > NO_COUNTERS_NS:
             self._estimate()
 
     def _on_mileage(self, arrival: Arrival[m.Mileage]) -> None:
-        mileage, self._counted_ns = arrival.message, arrival.received_ns
-        is_finite = self._is_finite(mileage.distance, mileage.heading)
-        if is_finite and self._estimator.on_mileage(mileage, arrival.received_ns):
+        self._counted_ns = arrival.received_ns
+        if self._estimator.on_mileage(arrival.message, arrival.received_ns):
             text = "the counters restarted: the pose is kept"
             self._node.event("reanchored", "warning", text)
         self._estimate()
-
-    def _is_finite(self, *values: float) -> bool:
-        """Return whether a sample is finite; count it if not."""
-        if not finite(*values):
-            self._node.counters["refused_not_finite"] += 1
-        return finite(*values)
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
         self._echoes = self._echoes.received(arrival.message, arrival.received_ns)
@@ -68,9 +58,6 @@ class Odometer:
         late = self._echoes.refusal(request.echo, clock.now_ns())
         if late:
             caller.refuse(late)
-            return
-        if not finite(request.x, request.y, request.heading):
-            caller.refuse("x, y and heading must be finite, not NaN or infinity")
             return
         pose = Pose(request.x, request.y, request.heading)
         self._estimator.place(pose, clock.now_ns())

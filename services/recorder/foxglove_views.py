@@ -15,7 +15,6 @@ from typing import Any
 
 import msgspec
 
-from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import SONAR_NAMES, Event, Message, Odometry, Ultrasonic
 from common.settings import Vehicle, sonar_mounts
@@ -108,7 +107,7 @@ class FoxgloveViews:
         """Yield the views of a message, with the log time as their timestamp."""
         timestamp = {"sec": log_ns // NS_PER_S, "nsec": log_ns % NS_PER_S}
         match message:
-            case Odometry() if finite(message.x, message.y, message.heading):
+            case Odometry():
                 views = _odometry(message)
             case Ultrasonic():
                 views = self._scans(message)

@@ -1,5 +1,6 @@
 """Limits of what a message may contain."""
 
+import math
 from collections.abc import Iterator
 
 import pytest
@@ -8,13 +9,26 @@ from msgspec import Struct, inspect
 from common.codec import decode, encode
 from common.errors import MessageError
 from common.keys import CALLS, TOPICS
-from common.messages import MAX_TEXT, Event
+from common.messages import (
+    MAX_TEXT,
+    Drive,
+    Event,
+    Limit,
+    Mileage,
+    Motion,
+    PoseRequest,
+    Ultrasonic,
+    Velocity,
+)
+from common.motion import Command
 
 
 def unbounded(kind: inspect.Type, at: str) -> Iterator[str]:
-    """Yield where a type has a text, a list or a map without a maximum length."""
+    """Yield where a text, list or map has no maximum length, or a number may be NaN."""
     sized = inspect.StrType | inspect.BytesType | inspect.CollectionType | inspect.DictType
     if isinstance(kind, sized) and kind.max_length is None:
+        yield at
+    if isinstance(kind, inspect.FloatType) and None in (kind.ge, kind.le):
         yield at
     for name in ("item_type", "key_type", "value_type"):
         if hasattr(kind, name):
@@ -30,8 +44,23 @@ KINDS |= {kind.__name__: kind for call in CALLS for kind in (call.request, call.
 
 
 @pytest.mark.parametrize("name", sorted(KINDS))
-def test_every_text_and_list_of_a_message_has_a_maximum_length(name: str) -> None:
+def test_every_text_list_and_number_of_a_message_has_limits(name: str) -> None:
     assert list(unbounded(inspect.type_info(KINDS[name]), name)) == []
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 1.1e9])
+def test_a_number_that_is_not_finite_does_not_decode(wrong: float) -> None:
+    for message in (
+        Velocity(linear=0.0, angular=wrong),
+        Mileage(distance=wrong, heading=0.0, epoch=0),
+        Ultrasonic(ranges=(wrong,) * 8, status=("ok",) * 8),
+        Drive(linear=wrong, angular=0.0, echo=0),
+        Limit(linear=wrong, echo=0),
+        Motion(command=Command.RUN, linear=wrong),
+        PoseRequest(x=wrong),
+    ):
+        with pytest.raises(MessageError, match=r"Expected `float` [<>]= .* - at `\$"):
+            decode(encode(message), type(message))
 
 
 def test_a_longer_text_does_not_decode() -> None:

@@ -54,10 +54,6 @@ def test_pose_orientation_follows_the_heading() -> None:
     assert (transform["translation"], transform["rotation"]) == tuple(pose.values())
 
 
-def test_a_non_finite_pose_has_no_view() -> None:
-    assert views_of(samples.odometry(x=math.nan)) == {}
-
-
 def test_each_sonar_is_a_scan_at_its_mounting_position() -> None:
     made = views_of(samples.ultrasonic())
     assert list(made) == [f"foxglove/sonar/{name}" for name in SONAR_NAMES]

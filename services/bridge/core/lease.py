@@ -40,7 +40,6 @@ from enum import StrEnum
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common.codec import finite
 from common.freshness import NS_PER_S
 from common.messages import Motion
 from common.motion import BRAKE, RUN, STOP, Command
@@ -52,7 +51,6 @@ AT_ONCE = -STOP_PERIOD_NS  # a send time so old that the next STOP is due
 class Refusal(StrEnum):
     """Why a motion message, or its RUN, was refused."""
 
-    NOT_FINITE = "not_finite"
     SECOND_AUTHORITY = "second_authority"
     OLD = "seq_not_rising"
     LATE = "too_late"
@@ -145,9 +143,7 @@ def on_motion(
 
 
 def _refusal(lease: Lease, motion: Motion, now_ns: int, lease_ns: int) -> Refusal | None:
-    """Return why a message is ignored: by its sender, ``seq`` or numbers."""
-    if motion.command is RUN and not finite(motion.linear, motion.angular):
-        return Refusal.NOT_FINITE
+    """Return why a message is ignored: by its sender or ``seq``."""
     if motion.boot == lease.boot:
         return Refusal.OLD if motion.seq <= lease.seq else None
     is_valid = lease.boot is not None and now_ns - lease.renewed_ns <= lease_ns

@@ -166,7 +166,6 @@ def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Obse
         "the emergency stop's path through the router": _is_old(
             inputs.estop_path, settings.times.estop_path_age, now_ns
         ),
-        "a finite velocity": inputs.velocity is not None and inputs.measured is None,
     }
     old = [name for name, is_old in too_old.items() if is_old]
     return Observation("silent", bool(old), text=f"No recent data: {', '.join(old)}.")

@@ -4,7 +4,6 @@ from typing import Generic, TypeVar
 
 from msgspec import Struct
 
-from common import codec
 from common.freshness import Latest, fresh
 from common.messages import (
     Bumper,
@@ -72,23 +71,13 @@ class Inputs(Struct, frozen=True):
     boot: int = 0  # this service's own
 
     def known_velocity(self, now_ns: int, age_s: float) -> Latest[Twist] | None:
-        """Return the measured velocity; None when not finite or older than ``age_s``."""
+        """Return the measured velocity; None when older than ``age_s``."""
         return self.measured if fresh(self.velocity, now_ns, age_s) else None
 
     @property
     def measured(self) -> Latest[Twist] | None:
-        """The newest measured velocity of any age; None when not finite."""
+        """The newest measured velocity of any age."""
         if self.velocity is None:
             return None
         velocity = self.velocity.value
-        if not codec.finite(velocity.linear, velocity.angular):
-            return None
         return Latest(Twist(velocity.linear, velocity.angular), self.velocity.received_ns)
-
-    @property
-    def counters(self) -> Latest[Mileage] | None:
-        """The newest reading of the board's counters; None when not finite."""
-        latest = self.mileage
-        if latest is None or not codec.finite(latest.value.distance, latest.value.heading):
-            return None
-        return latest

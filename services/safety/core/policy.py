@@ -118,7 +118,7 @@ class Policy:
                 return state, ""
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
-        sent, counters = state.verdict, inputs.counters
+        sent, counters = state.verdict, inputs.mileage
         velocity = inputs.known_velocity(now_ns, self.settings.times.velocity_age)
         known = velocity.value if velocity else None
         release = state.release

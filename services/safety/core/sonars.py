@@ -1,9 +1,9 @@
 """Sonars: geometry and plausibility of the eight ultrasonic sensors.
 
 **One sonar.** A nearer reading counts at once. A farther one counts after three consecutive samples
-that are farther by the hysteresis; then the nearest of the three counts. A sample that is faulty,
-too near to measure or not finite counts as distance zero, so the same rule accepts a sonar again
-after three good samples. ``no_echo`` is free space, at infinity.
+that are farther by the hysteresis; then the nearest of the three counts. A sample that is faulty
+or too near to measure counts as distance zero, so the same rule accepts a sonar again after three
+good samples. ``no_echo`` is free space, at infinity.
 
 **Suspicion.** A reading that is constant to the millimetre is not a fault by itself: a wall
 alongside, or a surface beyond the sensor's range, gives the same. It contradicts odometry when the
@@ -137,7 +137,7 @@ def trusted(reading: float | None, status: RangeStatus) -> tuple[float, str]:
         return math.inf, ""
     if status != "ok":
         return 0.0, {"fault": "faulty", "too_near": "too near to measure"}[status]
-    if reading is None or not math.isfinite(reading) or reading < 0:
+    if reading is None or reading < 0:
         return 0.0, "faulty"
     return reading, ""
 

@@ -5,8 +5,7 @@ safety. A refused message changes nothing except where noted. It is counted by i
 
 ================ =============================================================================
 unknown_source   the settings contain no such source
-not_a_request    payload of the wrong type
-not_finite       NaN or infinity
+not_a_request    payload of the wrong type, NaN or infinity
 late             the echo is unknown or too old, see ``common/heartbeat.py``
 second_publisher another ``boot`` while the lease of the first one lives; also stops the vehicle
 seq_not_rising   a repeated or an older number, until the last message is older than ``max_age_ns``
@@ -47,11 +46,11 @@ from typing import TypeVar
 from msgspec import Struct
 from msgspec.structs import replace
 
-from common import codec
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.messages import Drive, KeepaliveState, LimitState, ReleaseRequest, SourceMessage
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
+from common.text import printable
 from services.safety.config import LimitSource, Source
 from services.safety.core.causes import Observation
 from services.safety.core.inputs import DriveRequest, KeepaliveRequest, LimitRequest
@@ -106,16 +105,12 @@ class Admission(Struct, frozen=True):
     max_age_ns: int  # of the echoed heartbeat
     now_ns: int
 
-    def refusal(
-        self, source: str, known: Container[str], message: SourceMessage | None, *values: float
-    ) -> str:
-        """Return why a message with these values is refused; empty if it is not."""
+    def refusal(self, source: str, known: Container[str], message: SourceMessage | None) -> str:
+        """Return why a message is refused; empty if it is not."""
         if source not in known:
             return "unknown_source"
         if message is None:
             return "not_a_request"
-        if not codec.finite(*values):
-            return "not_finite"
         late = self.heartbeat.is_late(message.echo, self.now_ns, self.max_age_ns)
         return "late" if late else ""
 
@@ -151,8 +146,7 @@ class Arbiter(Struct, frozen=True):
     def accept(self, request: DriveRequest, admission: Admission) -> tuple["Arbiter", str]:
         """Check a request; return the reason of its refusal, empty when accepted."""
         name, drive = request.source, request.message
-        values = (drive.linear, drive.angular) if drive else ()
-        refused = admission.refusal(name, self.sources, drive, *values)
+        refused = admission.refusal(name, self.sources, drive)
         if refused or drive is None:
             return self, refused
         before, lease_s = self.channels.get(name, DriveChannel()), self.sources[name].lease
@@ -252,10 +246,7 @@ class SpeedLimits(Struct, frozen=True):
     def accept(self, request: LimitRequest, admission: Admission) -> tuple["SpeedLimits", str]:
         """Check a limit; return the reason of its refusal, empty when accepted."""
         name, limit = request.source, request.message
-        caps = (limit.linear, limit.angular) if limit else ()
-        refused = admission.refusal(
-            name, self.sources, limit, *(cap for cap in caps if cap is not None)
-        )
+        refused = admission.refusal(name, self.sources, limit)
         if refused or limit is None:
             return self, refused
         before, lease_s = self.channels.get(name, LimitChannel()), self.sources[name].lease
@@ -333,11 +324,6 @@ class SpeedLimits(Struct, frozen=True):
             for name, source in self.sources.items()
             if source.silence == "stop" and name not in valid
         ]
-
-
-def printable(text: str) -> str:
-    """Return the text without control and formatting characters, which could forge a screen."""
-    return " ".join("".join(one if one.isprintable() else " " for one in text).split())
 
 
 def _cap(value: float | None) -> float:

@@ -24,7 +24,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from common import codec
 from common.client import DriveRequests, Phase, request
 from common.messages import Direction, Drive
 from common.motion import Twist, clamp
@@ -199,7 +198,5 @@ def twist(push: Deflection, gear: int, settings: Teleop) -> Twist:
 
 
 def _shape(raw: float, deadzone: float, expo: float) -> float:
-    if not codec.finite(raw):
-        return 0.0
     linear = max(0.0, min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone)))
     return math.copysign(expo * linear**3 + (1.0 - expo) * linear, raw)

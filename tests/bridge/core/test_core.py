@@ -392,14 +392,6 @@ def test_a_run_carries_the_velocities(bench: Bench) -> None:
     assert frame == commands.MotionCommand(MotionKind.RUN, 300, -300)
 
 
-def test_a_run_that_is_not_finite_is_dropped_and_counted(bench: Bench) -> None:
-    bench.arm()
-    for value in (math.nan, math.inf, -math.inf):
-        assert bench.move(linear=value) == bench.move(angular=value) == []
-    assert bench.counters["motion_not_finite"] == 6
-    assert motions(bench.move(BRAKE, linear=math.nan)) == [MotionKind.BREAK]
-
-
 def test_an_emergency_stop_brakes_at_once_until_safety_has_latched_it(bench: Bench) -> None:
     bench.arm()
     bench.move()

@@ -1,6 +1,5 @@
 """The verdict, cause by cause: what trips it, at which boundary, and how it clears."""
 
-import math
 from collections.abc import Callable
 
 import pytest
@@ -12,7 +11,6 @@ from common.messages import (
     Bumper,
     Direction,
     Limits,
-    Mileage,
     SafetyState,
     Switches,
     Velocity,
@@ -146,7 +144,6 @@ SETTLING: list[tuple[str, Trip, Trip]] = [
     ("silent", _set("muted", {"switches"}), _set("muted", set())),
     ("silent", _set("muted", {"left"}), _set("muted", set())),
     ("silent", _set("muted", {"right"}), _set("muted", set())),
-    ("silent", _set("linear", math.nan), _set("linear", 0.0)),
 ]
 
 
@@ -364,23 +361,10 @@ def test_a_contact_brakes_before_any_other_sample() -> None:
     assert fixture.motions[0].predecessor is None
 
 
-def test_a_velocity_is_unknown_until_it_is_a_number() -> None:
+def test_a_velocity_is_unknown_until_its_first_sample() -> None:
     assert Inputs().measured is None
-    for linear, known in ((math.nan, None), (0.5, Twist(0.5, 0.0))):
-        velocity = Latest(Velocity(linear=linear, angular=0.0), 0)
-        assert Inputs(velocity=velocity).measured == (Latest(known, 0) if known else None)
-
-
-@pytest.mark.parametrize(
-    ("distance", "heading", "known"),
-    [(1.0, 2.0, True), (math.nan, 0.0, False), (0.0, math.inf, False), (-math.inf, 0.0, False)],
-)
-def test_counters_are_unknown_until_they_are_numbers(
-    distance: float, heading: float, known: bool
-) -> None:
-    assert Inputs().counters is None
-    mileage = Latest(Mileage(distance=distance, heading=heading, epoch=3, boot=9), 0)
-    assert Inputs(mileage=mileage).counters is (mileage if known else None)
+    velocity = Latest(Velocity(linear=0.5, angular=0.1), 7)
+    assert Inputs(velocity=velocity).measured == Latest(Twist(0.5, 0.1), 7)
 
 
 OLD, OWN = 5, 6
