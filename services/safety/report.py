@@ -17,7 +17,7 @@ from common.messages import (
 )
 from common.motion import RUN, Twist
 from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched, ordered
-from services.safety.core.inputs import Event as Trigger
+from services.safety.core.inputs import Trigger
 from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, spent
 from services.safety.core.policy import Policy
 from services.safety.core.sonars import Sonar

@@ -27,10 +27,10 @@ from services.safety.core.conditions import LOST_SAMPLES
 from services.safety.core.inputs import (
     DriveRequest,
     Estop,
-    Event,
     Inputs,
     KeepaliveRequest,
     LimitRequest,
+    Trigger,
 )
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, State
@@ -78,7 +78,7 @@ class SafetyService:
     def _subscribe_source(
         self,
         topic: Topic[M],
-        request: Callable[[str, M | None, int], Event],
+        request: Callable[[str, M | None, int], Trigger],
         known: Collection[str],
     ) -> None:
         """Decide on each message of a source; on an invalid one, too, which is counted.
@@ -155,7 +155,7 @@ class SafetyService:
         self._decide(request, answer)
 
     def _decide(
-        self, event: Event | None = None, answer: Callable[[Reply], None] | None = None
+        self, event: Trigger | None = None, answer: Callable[[Reply], None] | None = None
     ) -> None:
         now_ns = clock.now_ns()
         self._decision_timer.defer(now_ns)
@@ -171,7 +171,7 @@ class SafetyService:
     def _report(
         self,
         before: State,
-        event: Event | None,
+        event: Trigger | None,
         answer: Callable[[Reply], None] | None,
         now_ns: int,
     ) -> None:

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from common.codec import decode, encode
 from common.messages import MAX_REASON, MAX_TEXT, Limits, ResetRequest, SafetyState
 from services.safety.config import LimitSource, Safety, Source
-from services.safety.core.inputs import Estop, Event
+from services.safety.core.inputs import Estop, Trigger
 from services.safety.core.operator_requests import BUMPER_FREE
 from services.safety.report import (
     sentence,
@@ -17,7 +17,7 @@ from services.safety.report import (
 from tests.safety.core.policy_fixture import PolicyFixture
 
 
-def noted(fixture: PolicyFixture, event: Event | None = None) -> list[str]:
+def noted(fixture: PolicyFixture, event: Trigger | None = None) -> list[str]:
     before = fixture.state
     fixture.decide(event)
     return [note.name for note in transitions(before, fixture.state, event)]

@@ -49,7 +49,7 @@ class Estop(Struct, frozen=True):
     """A PUT or DELETE on the estop key."""
 
 
-Event = DriveRequest | LimitRequest | KeepaliveRequest | Estop | ResetRequest
+Trigger = DriveRequest | LimitRequest | KeepaliveRequest | Estop | ResetRequest
 
 
 class Inputs(Struct, frozen=True):
@@ -67,7 +67,7 @@ class Inputs(Struct, frozen=True):
     # This service's own state, received back through the router on that session.
     estop_path: Latest[SafetyState] | None = None
     leaving: bool = False  # whether this service is shutting down
-    event: Event | None = None
+    event: Trigger | None = None
     boot: int = 0  # this service's own
 
     def known_velocity(self, now_ns: int, age_s: float) -> Latest[Twist] | None:

@@ -32,10 +32,10 @@ from services.safety.core.causes import latched
 from services.safety.core.inputs import (
     DriveRequest,
     Estop,
-    Event,
     Inputs,
     KeepaliveRequest,
     LimitRequest,
+    Trigger,
 )
 from services.safety.core.policy import Policy
 from services.safety.core.state import Verdict
@@ -94,7 +94,7 @@ class PolicyFixture:
         self.estop_connection = 1
         self.decide()  # a service decides before anything has come
 
-    def decide(self, event: Event | None = None) -> Verdict:
+    def decide(self, event: Trigger | None = None) -> Verdict:
         inputs = replace(self.inputs, estop_connection=self.estop_connection, event=event)
         self.motions = []
         for output in self.policy.decide(self.state, inputs, self.now_ns):
