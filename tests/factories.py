@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from common.messages import Cause, Limits, Link, Odometry, Release, SafetyState
+from common.messages import Cause, Health, Limits, Link, Odometry, Release, SafetyState
 
 
 def safety_state(**fields: Any) -> SafetyState:
@@ -75,3 +75,16 @@ def odometry(**fields: Any) -> Odometry:
         "slip": False,
     }
     return Odometry(**usual | fields)
+
+
+def health(service: str = "bridge", **fields: Any) -> Health:
+    """Return the health of a service."""
+    usual: dict[str, Any] = {
+        "version": "0.1.0",
+        "uptime": 60.0,
+        "rates": {},
+        "counters": {},
+        "lateness": 0.0,
+        "rss": 50_000_000,
+    }
+    return Health(service=service, **usual | fields)

@@ -1,6 +1,5 @@
 """The page in a real browser at a simulated safety: release, roles, what is not there."""
 
-import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,10 +12,9 @@ from common.messages import KeepaliveState
 from tests.dashboard.bus_fixture import Peer
 from tests.dashboard.page import BROWSER_MARKS, center_of, take_control, text, wait_for_text
 from tests.dashboard.servers import FREE, NEWER, CallServers
-from verification.harness.bus import at, joined, router_process, running
+from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site
 from verification.harness.dashboard import Server, dashboard
-from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 pytestmark = BROWSER_MARKS
@@ -58,26 +56,6 @@ def test_the_operator_chooses_the_direction(page: Page, server: Server, calls: C
     wait_until(lambda: calls.releases() == {"forward"}, "requests forward")
     page.keyboard.up("f")
     wait_until(lambda: has_ended(calls), "the end of them")
-
-
-def test_a_forbidden_direction_is_released_and_disabled(
-    page: Page, server: Server, calls: CallServers
-) -> None:
-    at_a_contact(page, server)
-    calls.peer.release_refusal = "The vehicle still moves."
-    page.keyboard.down("b")
-    wait_until(lambda: calls.releases() == {"backward"}, "requests backward")
-    wait_for_text(page, "#release-forbidden", "The vehicle still moves.")
-    calls.peer.release = msgspec.structs.replace(FREE, forbidden=("backward",), left=0.02)
-    wait_until(lambda: has_ended(calls), "the end of them")
-    wait_for_text(page, "#release-forbidden", "Backward is forbidden until a reset")
-    assert page.is_disabled("#release-backward")
-    assert page.is_enabled("#release-forward")
-    page.keyboard.up("b")
-    calls.peer.requests.clear()
-    page.keyboard.press("b")
-    wait_for_text(page, "#toasts", "Backward is forbidden")
-    assert calls.releases() == set()
 
 
 def test_a_reset_answers_what_is_on_the_screen(
@@ -151,22 +129,3 @@ def test_a_viewer_is_offered_no_stick(page: Page, view_only: Server) -> None:
     page.keyboard.down("w")
     page.wait_for_timeout(500)
     assert "You drive" not in text(page, "#driver")
-
-
-WHY = "No connection to the router"
-
-
-def test_without_a_router_no_control_looks_usable(page: Page, tmp_path: Path) -> None:
-    where = f"tcp/127.0.0.1:{free_port()}"
-    with contextlib.ExitStack() as router, contextlib.ExitStack() as rest:
-        router.enter_context(router_process(where))
-        server = rest.enter_context(dashboard(where, tmp_path))
-        page.goto(server.url)
-        wait_until(lambda: page.evaluate("!document.body.matches('.stale')"), "snapshots")
-        take_control(page)
-        assert page.locator("#stick.disabled").count() == 0
-        router.close()
-        wait_for_text(page, "#verdict", "NO ROUTER")
-        wait_until(lambda: page.get_attribute("#reset", "title") == WHY, "the reason")
-        assert page.is_disabled("#reset")
-        assert page.get_attribute("#stick", "title") == WHY

@@ -2,21 +2,17 @@
 
 from common import keys
 from common.freshness import NS_PER_S, Latest
-from common.messages import Bumper, Drive, Driver, Event, Health, Velocity
+from common.messages import Bumper, Drive, Driver, Event, Velocity
 from services.dashboard.telemetry_cache import (
     EVENTS_MAX,
     FIXED,
     INVENTED_MAX,
     STATES_MAX,
     TelemetryCache,
-    max_age_s,
 )
-from tests.factories import safety_state
+from tests.factories import health, safety_state
 
 BUMPER = "tel/bridge/bumper"
-HEALTH = Health(
-    service="safety", version="", uptime=1.0, rates={}, counters={}, lateness=0.0, rss=0
-)
 
 
 def event(number: int) -> Event:
@@ -36,15 +32,10 @@ def test_invented_names_are_bounded_and_displace_nothing() -> None:
     for number in range(1000):
         telemetry.update(f"@cmd/drive/{number}", Drive(linear=0.0, angular=0.0, echo=0), number)
     telemetry.update("tel/bridge/driver/left", Driver(faults=("under_voltage",), bits=8), NS_PER_S)
-    telemetry.update("tel/safety/health", HEALTH, NS_PER_S)
+    telemetry.update("tel/safety/health", health("safety"), NS_PER_S)
     assert len(telemetry._latest) <= len(FIXED) + INVENTED_MAX + 2
     assert telemetry.newest(keys.DRIVER, NS_PER_S, side="left") is not None
     assert telemetry.services() == ["safety"]
-
-
-def test_slow_streams_have_a_longer_limit() -> None:
-    assert (max_age_s(keys.BUMPER), max_age_s(keys.LINK)) == (0.5, 0.8)
-    assert (max_age_s(keys.DRIVER), max_age_s(keys.HEALTH)) == (2.0, 3.0)
 
 
 def test_a_message_of_another_type_is_not_returned() -> None:
@@ -70,10 +61,7 @@ def test_services_by_token_or_by_health() -> None:
     telemetry.update_liveliness("t2/v1/001/live/safety/a", True)
     telemetry.update_liveliness("t2/v1/001/live/safety/b", True)
     telemetry.update_liveliness("t2/v1/001/live/safety/a", False)
-    health = Health(
-        service="odom", version="1", uptime=1.0, rates={}, counters={}, lateness=0.0, rss=1
-    )
-    telemetry.update("tel/odom/health", health, 0)
+    telemetry.update("tel/odom/health", health("odom"), 0)
     assert telemetry.services() == ["odom", "safety"]
     assert telemetry.alive == {"safety": {"b"}}
 

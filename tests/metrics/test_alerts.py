@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from services.metrics.samples import metric_families
-from tests.metrics.robots import NOW_NS, SAFETY, health, safety, whole
+from tests.factories import health
+from tests.metrics.robots import NOW_NS, SAFETY, safety, whole
 
 FOLDER = Path(__file__).parent.parent.parent / "deploy" / "prometheus"
 ALERTS = FOLDER / "alerts.yml"

@@ -13,14 +13,14 @@ import pytest
 
 from common import codec, keys
 from common import messages as m
-from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from common.cli_args import EXIT_LINK
 from common.keys import Topic
-from services.metrics import __main__ as metrics
 from services.metrics import exporter
 from services.metrics.exporter import Exporter
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
-from tests.metrics.robots import event, health, link, names, odometry, safety
+from tests.factories import health, odometry
+from tests.metrics.robots import event, link, names, safety
 from tests.metrics.scraping import running, scraped, value
 from verification.harness.bus import router_process
 from verification.harness.ports import free_port
@@ -92,14 +92,6 @@ def test_a_taken_port_ends_it_with_its_name(buses: BusFixture) -> None:
         )  # fmt: skip
     assert done.returncode == EXIT_LINK
     assert f"metrics cannot listen on 127.0.0.1:{port}" in done.stderr
-
-
-def test_missing_library_names_the_extra(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setitem(sys.modules, "services.metrics.exporter", None)
-    assert metrics.main([]) == EXIT_CONFIG
-    assert "install the extra `metrics`" in capsys.readouterr().err
 
 
 def test_a_hanging_loop_raises_timeout(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,8 @@ from common.errors import ConfigError
 from common.freshness import NS_PER_S
 from services.metrics.config import MetricsConfig
 from services.metrics.robot import EVENT_NAMES_MAX, EXPIRY_S, FRESH_S, RobotState, prune
-from tests.metrics.robots import LINK, NOW_NS, SERVICES, event, health, link, whole
+from tests.factories import health
+from tests.metrics.robots import LINK, NOW_NS, SERVICES, event, link, whole
 
 LATE_NS = NOW_NS + round(FRESH_S * NS_PER_S) + 1
 LONG_NS = NOW_NS + round(EXPIRY_S * NS_PER_S) + 1

@@ -6,6 +6,7 @@ from common.freshness import NS_PER_S
 from common.messages import Durations
 from services.metrics.robot import FRESH_S, RobotState
 from services.metrics.samples import metric_families
+from tests.factories import health, odometry
 from tests.metrics.robots import (
     LINK,
     NOW_NS,
@@ -14,10 +15,8 @@ from tests.metrics.robots import (
     Values,
     event,
     flat,
-    health,
     link,
     names,
-    odometry,
     safety,
     whole,
 )
@@ -42,11 +41,11 @@ def test_samples_of_a_healthy_robot() -> None:
     for name, expected in {
         "t2_robot_up": 1,
         "t2_link_armed": 1,
-        "t2_link_round_trip_seconds": 0.002,
+        "t2_link_round_trip_seconds": 0.0008,
         "t2_link_epoch": 2,
-        "t2_odometry_linear_meters_per_second": 0.4,
+        "t2_odometry_linear_meters_per_second": 0.2,
         "t2_odometry_angular_radians_per_second": -0.2,
-        "t2_odometry_residual_meters": 0.01,
+        "t2_odometry_residual_meters": 0.004,
         "t2_odometry_slip": 0,
         "t2_safety_limits_forward_meters_per_second": 1,  # of a struct inside
     }.items():
@@ -60,7 +59,7 @@ def test_samples_of_a_healthy_robot() -> None:
         assert value(found, name, service="bridge") == expected, name
     assert value(found, "t2_service_version", service="bridge", name="0.1.0") == 1
     assert value(found, "t2_safety_source", name="teleop") == 1
-    assert value(found, "t2_link_rates_hertz", name="VelocityReport") == 50
+    assert value(found, "t2_link_rates_hertz", name="Velocity") == 50
     assert value(found, "t2_link_rejected", name="crc") == 3
 
 

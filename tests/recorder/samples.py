@@ -4,6 +4,7 @@ from common import codec
 from common import messages as m
 from common.codec import Sample
 from common.freshness import NS_PER_S
+from tests import factories
 
 ROOT = "t2/v1/001"
 BEGIN_NS = 1_700_000_000 * NS_PER_S  # on the wall clock
@@ -48,11 +49,7 @@ def velocity(linear: float = 0.5, seq: int = 1) -> m.Velocity:
 
 
 def odometry(x: float = 1.0, heading: float = 0.0) -> m.Odometry:
-    return m.Odometry(
-        x=x, y=2.0, heading=heading, linear=0.5, angular=-0.25,
-        pose_covariance=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0),
-        twist_covariance=(10.0, 11.0, 12.0, 13.0), epoch=0, residual=None, slip=False,
-    )  # fmt: skip
+    return factories.odometry(x=x, y=2.0, heading=heading)
 
 
 def ultrasonic() -> m.Ultrasonic:
@@ -60,8 +57,5 @@ def ultrasonic() -> m.Ultrasonic:
     return m.Ultrasonic(ranges=ranges, status=("ok", "no_echo", "ok", "ok", "ok", "ok", "ok", "ok"))
 
 
-def state(*latched: str, verdict: m.Verdict = "run") -> m.SafetyState:
-    return m.SafetyState(
-        verdict=verdict, latched=latched, causes=(), source=None,
-        limits=m.Limits(forward=1.0, backward=1.0, angular=1.0), heartbeat=1, text="",
-    )  # fmt: skip
+def state(*latched: str) -> m.SafetyState:
+    return factories.safety_state(latched=latched)

@@ -88,14 +88,6 @@ def test_a_flood_of_both_sides_does_not_delay_the_lease(relay: RunningRelay) -> 
     pass_commands(relay)
 
 
-def test_too_long_a_datagram_is_dropped(relay: RunningRelay) -> None:
-    pass_commands(relay)
-    relay.to_pc(bytes(2049))
-    relay.to_pc(bytes(2048))
-    wait_for(relay.pc[0], bytes(2048))
-    wait_until(lambda: "too_long" in relay.wait_for("silent")["counters"], "the counter")
-
-
 def test_a_stalled_relay_does_not_pass_what_waited(relay: RunningRelay) -> None:
     pass_commands(relay)
     relay.to_board(RUN)
@@ -142,12 +134,3 @@ def test_an_address_that_does_not_exist_yet_is_waited_for(relay: RunningRelay) -
 )
 def test_an_invalid_setting_ends_it(words: list[str]) -> None:
     assert main(words) == EXIT_CONFIG
-
-
-def test_help_is_no_error() -> None:
-    assert main(["--help"]) == 0
-
-
-def test_a_port_beyond_the_range_is_named(relay: RunningRelay) -> None:
-    assert relay.start("--ports", "70000").wait(20) == EXIT_LINK
-    assert "port must be 0-65535" in relay.log.read_text()

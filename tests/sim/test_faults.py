@@ -65,17 +65,6 @@ def test_a_delayed_one_is_not_there_before_its_time(at_ns: int) -> None:
     assert Cable(1).due_ns is None
 
 
-def test_jitter_is_at_most_that_much_more() -> None:
-    cable = Cable(1)
-    cable.faults = Line(delay=0.1, jitter=0.1)
-    for datagram in MANY:
-        cable.put(datagram, 0)
-    assert cable.take(NS_PER_S // 10 - 1) == []
-    early = cable.take(3 * NS_PER_S // 20)
-    assert 400 < len(early) < 600
-    assert len(early) + len(cable.take(NS_PER_S // 5)) == len(MANY)
-
-
 def test_a_thin_cable_lets_one_after_the_other_through() -> None:
     cable = Cable(1)
     cable.faults = Line(rate=8e3, delay=1.0)  # a byte in a millisecond

@@ -14,13 +14,6 @@ segments = st.builds(Segment, coordinates, coordinates, coordinates, coordinates
 poses = st.builds(Pose, coordinates, coordinates, st.floats(-7.0, 7.0))
 
 
-@given(poses, coordinates, coordinates)
-def test_looking_outward_and_back_is_the_same_point(pose: Pose, x: float, y: float) -> None:
-    there = pose.outward(x, y)
-    back = Segment(*there, *there).seen_from(pose)
-    assert (back.ax, back.ay) == pytest.approx((x, y), abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("segment", "gap"),
     [

@@ -4,21 +4,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from common.wire import commands as c
-from common.wire import reports as r
 from sim import requests as q
 from tests.sim.sim_fixture import START_NS, SimFixture, room
 
 BOX: dict[str, Any] = {"name": "crate", "x": 3.0, "y": 0.0, "length": 1.0, "width": 1.0}
-
-
-def test_the_bumper_is_pressed_and_let_go_by_hand() -> None:
-    sim = SimFixture()
-    assert sim.do(q.Bumper(pressed=True)).ok
-    assert (sim.truth.pressed, sim.truth.contact) == (True, False)
-    assert sim.say(c.BumperQuery()) == [r.BumperReport(True)]
-    sim.do(q.Bumper(pressed=False))
-    assert sim.say(c.BumperQuery()) == [r.BumperReport(False)]
 
 
 def test_a_hand_does_not_lift_the_bumper_off_an_obstacle() -> None:
@@ -64,16 +53,3 @@ def test_a_refused_request_changes_nothing_and_is_traced_with_its_reason() -> No
             "error": "an obstacle is at x 3, y 0",
         }
     ]
-
-
-@pytest.mark.parametrize(
-    ("text", "error"),
-    [
-        (b'{"pressed": true}', "missing required field `do`"),
-        (b'{"do": "bumper", "pressed": true, "hard": true}', "unknown field `hard`"),
-        (b'{"do": "place", "x": 1e300, "y": 0}', "<= 1000.0"),
-    ],
-)
-def test_a_wrong_request_is_refused_with_its_field(text: bytes, error: str) -> None:
-    with pytest.raises(msgspec.ValidationError, match=error):
-        msgspec.json.decode(text, type=q.Asked)

@@ -6,7 +6,6 @@ import msgspec
 import pytest
 
 from common.settings import Board
-from sim.faults import Datagram
 from sim.simulation import Reply
 from sim.sockets import BURST, HOST, BoardSocket, answer_requests, bound, drain
 from tests.sim.sim_fixture import SimFixture
@@ -52,20 +51,6 @@ def test_it_tells_the_pc_from_everybody_else(pc: socket.socket) -> None:
 
         wait_until(both, "both")
     assert got == {b"ours": port, b"theirs": None}
-
-
-def test_it_sends_from_its_own_address(pc: socket.socket) -> None:
-    board, port = board_for(pc)
-    with board.sock:
-        board.send(Datagram(b"own", port))
-        assert received(pc) == (b"own", board.sock.getsockname())
-
-
-def test_what_cannot_be_sent_is_counted(pc: socket.socket) -> None:
-    board, port = board_for(pc)
-    with board.sock:
-        board.send(Datagram(bytes(70_000), port))
-    assert board.unsent == 1
 
 
 def test_a_flood_is_read_in_bursts(pc: socket.socket) -> None:

@@ -1,37 +1,11 @@
 """The trace of a simulation: its contents, and equality for equal seeds."""
 
-import itertools
-import math
-
 import msgspec
-import pytest
 
-from common.freshness import NS_PER_S
 from common.wire import commands as c
 from sim import trace as t
 from sim.requests import Asked, PowerCycle, Wire
-from tests.sim.sim_fixture import START_NS, WALL_AHEAD, SimFixture, model, room
-
-
-def test_commands_are_traced_in_si_and_queries_only_counted() -> None:
-    sim = SimFixture()
-    sim.after(0.25)
-    sim.say(
-        c.BumperQuery(),
-        c.MotionCommand(c.MotionKind.RUN, -250, 900),
-        c.MotionCommand(c.MotionKind.STOP),
-        c.MotionCommand(c.MotionKind.BREAK),
-    )
-    lines = [msgspec.to_builtins(line) for line in sim.of(t.Command)]
-    assert [line["kind"] for line in lines] == ["run", "stop", "brake"]
-    assert lines[0] == {
-        "event": "command",
-        "mono_ns": START_NS + NS_PER_S // 4,
-        "kind": "run",
-        "linear": -0.25,
-        "angular": pytest.approx(math.pi / 2),
-    }
-    assert sim.simulation.counters["BumperQuery"] == 1
+from tests.sim.sim_fixture import WALL_AHEAD, SimFixture, model, room
 
 
 def test_the_trace_knows_when_the_first_frame_said_so() -> None:
@@ -49,15 +23,6 @@ def test_the_trace_knows_when_the_first_frame_said_so() -> None:
         sim.after(1.0)
     sim.say(c.BumperQuery())
     assert [line.pressed for line in sim.of(t.BumperSent)] == [True, False]
-
-
-def test_truth_comes_at_20_hz() -> None:
-    sim = SimFixture(WALL_AHEAD)
-    sim.after(1.0)
-    lines = sim.of(t.Truth)
-    assert len(lines) == 20
-    assert {b.mono_ns - a.mono_ns for a, b in itertools.pairwise(lines)} == {NS_PER_S // 20}
-    assert lines[-1].clearance == pytest.approx(3.0 - 0.55)
 
 
 LAP = (

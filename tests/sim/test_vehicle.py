@@ -3,8 +3,6 @@
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from common.motion import Twist
 from common.wire.commands import MotionKind
@@ -18,7 +16,6 @@ TRACK = 0.56
 RUN, STOP, BREAK = MotionKind.RUN, MotionKind.STOP, MotionKind.BREAK
 AT_SPEED = Twist(1.0, -1.0)
 STANDING = Twist()
-twists = st.builds(Twist, st.floats(-5.0, 5.0), st.floats(-3.0, 3.0))
 
 
 def settled(twist: Twist, kind: MotionKind, target: Twist) -> tuple[Twist, float]:
@@ -52,15 +49,6 @@ def test_a_straight_way_and_a_quarter_circle_are_exact() -> None:
     assert (pose.x, pose.y, pose.heading) == pytest.approx((1.0, 2.0, math.pi / 2))
     pose = moved(Pose(0.0, 0.0, 0.0), Twist(math.pi, math.pi / 2), 1.0)
     assert (pose.x, pose.y, pose.heading) == pytest.approx((2.0, 2.0, math.pi / 2))
-
-
-@given(twists, st.integers(1, 50))
-def test_many_short_steps_are_one_long_one(twist: Twist, steps: int) -> None:
-    pose = Pose(0.0, 0.0, 0.3)
-    for _ in range(steps):
-        pose = moved(pose, twist, 1.0 / steps)
-    once = moved(Pose(0.0, 0.0, 0.3), twist, 1.0)
-    assert (pose.x, pose.y) == pytest.approx((once.x, once.y), abs=1e-6)
 
 
 def test_a_way_ends_just_before_what_blocks_it() -> None:

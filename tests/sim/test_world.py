@@ -16,11 +16,6 @@ def at(x: float, y: float = 0.0, heading: float = 0.0) -> Pose:
     return Pose(x, y, heading)
 
 
-def test_walls_are_lines_through_points() -> None:
-    world = World.of(room(walls=[{"points": [[0, 0], [1, 0], [1, 2]]}]))
-    assert [(s.ax, s.ay, s.bx, s.by) for s in world.visible] == [(0, 0, 1, 0), (1, 0, 1, 2)]
-
-
 POST = {"name": "post", "x": 0.2, "y": 0.1, "length": 0.02, "width": 0.02}
 
 
