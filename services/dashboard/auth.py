@@ -132,7 +132,9 @@ class AuthMiddleware:
             return answer
         if token:
             await asyncio.sleep(WRONG_TOKEN_DELAY_S)
-        return HTMLResponse(token_page(wrong=bool(token)), status_code=401)
+        lines = map(html.escape, TEXTS["token_wrong" if token else "token_ask"])
+        page = Template(TOKEN_PAGE).substitute(text="<br>".join(lines))
+        return HTMLResponse(page, status_code=401)
 
     async def _submitted(self, request: Request) -> str:
         if request.method != "POST":
@@ -158,9 +160,3 @@ def content_policy(camera: str) -> str:
 
 async def _close(_: Scope, __: Receive, send: Send) -> None:
     await send({"type": "websocket.close", "code": 1008})
-
-
-def token_page(wrong: bool) -> str:
-    """Return the HTML of the token page."""
-    lines = [html.escape(text) for text in TEXTS["token_wrong" if wrong else "token_ask"]]
-    return Template(TOKEN_PAGE).substitute(text="<br>".join(lines))

@@ -4,9 +4,7 @@ Each robot has a bus session of its own, which opens with the first viewer of it
 """
 
 from collections.abc import Callable
-from typing import Any, TypeVar
-
-import msgspec
+from typing import Any
 
 from common import clock, keys
 from common import messages as m
@@ -21,7 +19,7 @@ from common.client import (
     request,
     reset_request,
 )
-from common.keys import Call, Topic
+from common.keys import Topic
 from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
 from services.dashboard.config import Dashboard
@@ -29,7 +27,6 @@ from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive,
 from services.dashboard.snapshot import DriverState
 from services.dashboard.telemetry_cache import TelemetryCache, path_of
 
-R = TypeVar("R", bound=msgspec.Struct)
 # Takes the level, the text or its key in ``i18n``, and the key of the result that it explains.
 Notify = Callable[[m.Level, str, str], None]
 
@@ -148,12 +145,12 @@ class Robot:
             lambda reason: notify("warning", reason, "reset_refused"),
         )
 
-    def call(self, call: Call[Any, R], request: msgspec.Struct, notify: Notify) -> None:
-        """Call a service of the robot and report its answer."""
+    def switch(self, request: m.SwitchesRequest, notify: Notify) -> None:
+        """Set the board's emergency brakes and report the answer."""
         self.bus.call(
-            call,
+            keys.SET_SWITCHES,
             request,
-            lambda reply: notify("info", reply.text if isinstance(reply, m.Done) else "done", ""),
+            lambda _: notify("info", "done", ""),
             lambda reason: notify("warning", reason, "call_refused"),
         )
 

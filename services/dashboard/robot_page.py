@@ -8,7 +8,7 @@ from functools import partial
 
 import msgspec
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Bus
 from common.messages import Level
 from services.dashboard import client_messages as client
@@ -117,7 +117,7 @@ class RobotPage:
             case client.Reset(echo):
                 robot.reset(echo, notify)
             case client.Switch(to):
-                robot.call(keys.SET_SWITCHES, to, notify)
+                robot.switch(to, notify)
 
     def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
         self._send_text([viewer], notice(level, text, about), False)

@@ -63,11 +63,6 @@ def to_remove(
     return candidates[: enough + 1]
 
 
-def free_bytes(folder: Path) -> int:
-    """Return the free space on the folder's disk."""
-    return shutil.disk_usage(folder).free
-
-
 def in_use(path: Path) -> bool:
     """Return whether a process writes the file: its writer holds a lock."""
     with path.open("rb") as file:
@@ -85,7 +80,7 @@ class Storage:
         self,
         folder: Path,
         free_min: float,
-        free: Callable[[Path], int] = free_bytes,
+        free: Callable[[Path], int] = lambda folder: shutil.disk_usage(folder).free,  # bytes
         *,
         robot: str | None = None,
     ) -> None:
