@@ -107,20 +107,6 @@ def test_wheels_of_another_size_count_another_distance_and_turn() -> None:
     assert some.answer(c.DistanceQuery()) == r.DistanceReport(1010, heading)
 
 
-def test_the_slip_of_wheels_grows_with_the_root_of_the_way() -> None:
-    found = []
-    for seed in range(200):
-        some = board(seed, counters={"noise": 0.1, "turn_noise": 0.1})
-        for _ in range(100):
-            some.count(0.04, 0.01)
-        report = some.answer(c.DistanceQuery())
-        assert isinstance(report, r.DistanceReport)
-        found.append((report.distance_mm / 1000 - 4.0, math.radians(report.heading_ddeg / 10) - 1))
-    for errors, deviation in zip(zip(*found, strict=True), (0.2, 0.1), strict=True):
-        assert abs(statistics.mean(errors)) < 0.3 * deviation
-        assert 0.8 < statistics.stdev(errors) / deviation < 1.2
-
-
 @pytest.mark.parametrize(
     ("command", "rolling", "sonar", "millimetres", "brakes"),
     [
