@@ -1,6 +1,5 @@
 """Snapshots from telemetry."""
 
-
 import pytest
 
 from common import keys
