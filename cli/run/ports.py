@@ -2,6 +2,7 @@
 
 A second stack on the same ports would add a second safety service to the robot's bus. Each port is
 bound once and released, then claimed while ``t2 up`` runs: of two concurrent starts, one continues.
+A Unix socket is claimed only: its file may be a stale one.
 """
 
 import errno
@@ -18,44 +19,42 @@ from common.settings import protocol
 
 PATIENCE_S = 5.0  # children of a killed supervisor may still be stopping the vehicle
 LOOK_S = 0.1
-KINDS = {socket.SOCK_STREAM: "tcp", socket.SOCK_DGRAM: "udp"}
-DATAGRAMS = ("udp", "quic")
+KINDS = {"udp": "udp", "quic": "udp", "unixsock-stream": "unix"}  # of other protocols: tcp
 
 
 class Port(NamedTuple):
     """One address that a process listens on."""
 
-    kind: socket.SocketKind
-    host: str
+    kind: str  # tcp, udp or unix
+    host: str  # or the path of a Unix socket
     number: int
     setting: str  # setting that defines it
 
     def __str__(self) -> str:
-        return f"{KINDS[self.kind].upper()} {self.host}:{self.number} ({self.setting})"
+        return f"{self.kind.upper()} {self.host}:{self.number} ({self.setting})"
 
 
 def wanted(config: Everything, names: Collection[str]) -> list[Port]:
-    """Return the ports of these processes; not the router's sockets of the file system."""
+    """Return the ports of these processes."""
     board = config.board
     found: list[Port] = []
     if "router" in names:
-        on_network = (x for x in config.bus.listen if protocol(x) != "unixsock-stream")
-        found += map(_listener, on_network)
+        found += map(_listener, config.bus.listen)
     if "bridge" in names:
         found += [
-            Port(socket.SOCK_DGRAM, board.listen_address, port, "board.listen_ports")
+            Port("udp", board.listen_address, port, "board.listen_ports")
             for port in board.listen_ports
         ]
     if "sim" in names:
-        found += [Port(socket.SOCK_DGRAM, board.address, board.port, "board.port")]
+        found += [Port("udp", board.address, board.port, "board.port")]
     return found
 
 
 def _listener(endpoint: str) -> Port:
     """Return the port of a router's endpoint."""
     address = endpoint.partition("/")[2].partition("?")[0].partition("#")[0]
-    host, _, number = address.rpartition(":")
-    kind = socket.SOCK_DGRAM if protocol(endpoint) in DATAGRAMS else socket.SOCK_STREAM
+    kind = KINDS.get(protocol(endpoint), "tcp")
+    host, _, number = (address, "", 0) if kind == "unix" else address.rpartition(":")
     return Port(kind, host.strip("[]"), int(number), "bus.listen")
 
 
@@ -77,10 +76,11 @@ def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
 def _taken(port: Port, claims: ExitStack) -> str:
     """Claim a port; return why it is not available, or an empty text."""
     try:
-        _bind(port)
+        if port.kind != "unix":
+            _bind(port)
         if sys.platform == "linux":  # a name in the abstract namespace, free when this process ends
             sock = claims.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
-            sock.bind(f"\0t2-up {KINDS[port.kind]} {port.host} {port.number}")
+            sock.bind(f"\0t2-up {port.kind} {port.host} {port.number}")
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             return "used by another program"
@@ -89,12 +89,13 @@ def _taken(port: Port, claims: ExitStack) -> str:
 
 
 def _bind(port: Port) -> None:
-    family, kind, number, _, address = socket.getaddrinfo(port.host, port.number, type=port.kind)[0]
+    kind = socket.SOCK_STREAM if port.kind == "tcp" else socket.SOCK_DGRAM
+    family, kind, number, _, address = socket.getaddrinfo(port.host, port.number, type=kind)[0]
     with socket.socket(family, kind, number) as sock:
-        if kind == socket.SOCK_STREAM:  # sockets in TIME_WAIT do not block a listener
+        if port.kind == "tcp":  # sockets in TIME_WAIT do not block a listener
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         sock.bind(address)
-        if kind == socket.SOCK_STREAM:
+        if port.kind == "tcp":
             sock.listen(1)
 
 

@@ -14,7 +14,7 @@ from cli.settings import Everything
 from common.errors import LinkError
 from common.settings import BusSettings
 
-TCP, UDP = socket.SOCK_STREAM, socket.SOCK_DGRAM
+TYPES = {"tcp": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}
 
 
 @contextlib.contextmanager
@@ -33,25 +33,30 @@ def test_ports_by_process() -> None:
     bus = BusSettings(listen=listen, ca="a", certificate="b", private_key="c", members="d")
     config = Everything(bus=bus)
     assert [port[:3] for port in wanted(config, ["router"])] == [
-        (TCP, "127.0.0.1", 7447),
-        (TCP, "::1", 7448),
-        (UDP, "localhost", 9),
+        ("tcp", "127.0.0.1", 7447),
+        ("tcp", "::1", 7448),
+        ("udp", "localhost", 9),
+        ("unix", "/run/t2/bus.sock", 0),
     ]
     assert [port[2] for port in wanted(config, ["bridge", "safety"])] == [4002, 4001]
     assert [port[2] for port in wanted(config, ["sim"])] == [4003]
 
 
-@pytest.mark.parametrize(("kind", "setting"), [(TCP, "bus.listen"), (UDP, "board.listen_ports")])
-def test_a_taken_port_is_named_with_advice(kind: socket.SocketKind, setting: str) -> None:
-    with held(kind) as number:
+@pytest.mark.parametrize(
+    ("kind", "setting"), [("tcp", "bus.listen"), ("udp", "board.listen_ports")]
+)
+def test_a_taken_port_is_named_with_advice(kind: str, setting: str) -> None:
+    with held(TYPES[kind]) as number:
         port = Port(kind, "127.0.0.1", number, setting)
         with pytest.raises(LinkError) as raised:
             claimed([port], 0.0)
     message = str(raised.value)
     assert f"127.0.0.1:{number} ({port.setting}): used by another program" in message
     assert "is a stack already running?" in message
-    with claimed([port], 0.0), pytest.raises(LinkError, match="used by another program"):
-        claimed([port], 0.0)  # of two concurrent starts one continues
+    unix = Port("unix", "/run/t2/bus.sock", 0, "bus.listen")
+    for each in (port, unix):  # of two concurrent starts one continues
+        with claimed([each], 0.0), pytest.raises(LinkError, match="used by another program"):
+            claimed([each], 0.0)
 
 
 def test_ports_of_a_killed_stack_are_awaited() -> None:
@@ -59,5 +64,5 @@ def test_ports_of_a_killed_stack_are_awaited() -> None:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
         threading.Timer(3 * ports.LOOK_S, leaving.close).start()
         began_s = time.monotonic()
-        claimed([Port(UDP, "127.0.0.1", number, "board.port")]).close()
+        claimed([Port("udp", "127.0.0.1", number, "board.port")]).close()
         assert time.monotonic() - began_s >= 2 * ports.LOOK_S
