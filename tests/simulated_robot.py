@@ -18,7 +18,6 @@ import t2.drive
 import t2.publisher
 import t2.robot
 import t2.stream
-from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
@@ -44,9 +43,7 @@ class SimulatedStack(Stack):
     def __init__(self, world: str = "office") -> None:
         super().__init__(plan=load_plan(world, Vehicle()), step_ns=TICK_MS * MS)
         self.each_beat: list[Callable[[], object]] = []
-        self.poses: list[m.Odometry] = []
         self.answers: list[bool] = []  # to resets
-        self.hand.subscribe(keys.ODOMETRY, lambda arrival: self.poses.append(arrival.message))
 
     def advance(self) -> None:
         """Turn for one tick."""

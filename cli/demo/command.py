@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     log.configure(replace(config.log, level="error"), "demo")
     odometry = drive(options, config, SLOW if stall_s > host_stalls.LIMIT_S else 1.0)
     trace = read(options.out / TRACE)
-    rows = results(trace, odometry)
+    rows = results(trace)
     body = [(what, amount, "ok" if fine else "WRONG") for what, amount, fine in rows]
     print(f"\n{output.table(('the lap', 'result', ''), body)}")
     file = options.out / "lap.png"

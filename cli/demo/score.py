@@ -5,7 +5,6 @@ metres, times in seconds.
 """
 
 import math
-from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,6 @@ from typing import NamedTuple
 from common.freshness import NS_PER_S
 from common.motion import Command
 from sim import trace as t
-from t2.messages import Odometry
 
 Result = tuple[str, str, bool]  # quantity, value, whether it is within its limit
 
@@ -22,8 +20,6 @@ Result = tuple[str, str, bool]  # quantity, value, whether it is within its limi
 CLEARANCE_MIN = 0.05
 HOME_MAX = 0.25
 STOP_MAX = 0.1
-ODOMETRY_MAX = 0.15
-REST_SAMPLES = 20  # of the truth, which is written at 20 Hz
 REACTION_MAX = 0.5  # limit for a busy host; docs/safety.md has the budget
 
 
@@ -53,14 +49,13 @@ def read(file: Path) -> Trace:
     )
 
 
-def results(trace: Trace, odometry: Sequence[Odometry]) -> list[Result]:
+def results(trace: Trace) -> list[Result]:
     """Return the table of results."""
     last = trace.truth[-1]
     wall = min((x.clearance for x in trace.truth if x.clearance is not None), default=math.inf)
-    error, home = odometry_error(trace, odometry), math.hypot(last.x, last.y)
+    home = math.hypot(last.x, last.y)
     rows: list[Result] = [
         ("closest to an obstacle", f"{wall:.2f} m", wall > CLEARANCE_MIN),
-        ("odometry error, at rest", f"{error * 100:.1f} cm at most", error < ODOMETRY_MAX),
         ("distance from the start at the end", f"{home * 100:.1f} cm", home < HOME_MAX),
     ]
     for number, (reaction_s, driven_m) in enumerate(stops(trace), 1):
@@ -91,15 +86,3 @@ def stops(trace: Trace) -> Iterator[Stop]:
             None if first is None else (first - hit_ns) / NS_PER_S,
             None if rest is None else rest.distance - before[-1].distance,
         )
-
-
-def odometry_error(trace: Trace, odometry: Sequence[Odometry]) -> float:
-    """Return the largest error of a pose at rest, where no transport delay is in it."""
-    times = [truth.mono_ns for truth in trace.truth]
-    largest = 0.0
-    for pose in odometry:
-        at = bisect_left(times, pose.mono_ns)
-        before = trace.truth[at - REST_SAMPLES : at] if at >= REST_SAMPLES else ()
-        if before and all(x.linear == 0 and x.angular == 0 for x in before):
-            largest = max(largest, math.dist((pose.x, pose.y), (before[-1].x, before[-1].y)))
-    return largest

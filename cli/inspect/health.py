@@ -6,7 +6,7 @@ run it often.
 
 import argparse
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
@@ -31,19 +31,10 @@ SHOWN = (
     "rss",
     "counters",
 )
-REASONS = {
-    "hangs": "is present and publishes no health: it hangs",
-    "missing": "is not running",
-}
+REASONS = {"hangs": "is present and publishes no health: it hangs", "missing": "is not running"}
 
 
-class Row(NamedTuple):
-    """One service with its state and last health message."""
-
-    robot: str
-    name: str
-    state: str  # ok, or a key of REASONS
-    health: Health | None
+Row = dict[str, Any]  # robot, service, state (ok, or a key of REASONS), fields of the message
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,29 +49,29 @@ def run(options: argparse.Namespace) -> int:
     """Show health; return 1 if a needed or the queried service is unhealthy."""
     with open_session(options) as session:
         if options.service == ROUTER:
-            rows = [Row(session.robot, ROUTER, "ok", None)]
+            rows = [{"robot": session.robot, "service": ROUTER, "state": "ok"}]
         else:
             rows = listen(session, options.service)
-    things = list(map(as_json, rows))
     if options.json:
-        output.rows(things, as_json=True)
+        output.rows(rows, as_json=True)
     else:
-        output.rows([{name: each.get(name) for name in SHOWN} for each in things], as_json=False)
+        output.rows([{name: each.get(name) for name in SHOWN} for each in rows], as_json=False)
         print(*notes(rows), sep="", end="", flush=True)
-    unhealthy = [row for row in rows if row.state != "ok"]
+    unhealthy = [row for row in rows if row["state"] != "ok"]
     for row in unhealthy:
-        output.warn(f"t2 health: {row.name} of robot {row.robot} {REASONS[row.state]}")
+        reason = REASONS[row["state"]]
+        output.warn(f"t2 health: {row['service']} of robot {row['robot']} {reason}")
     return 1 if unhealthy else 0
 
 
 def listen(session: BusSession, service: str | None) -> list[Row]:
     """Listen to one or all services, and list those without a health message from their tokens."""
-    newest: dict[tuple[str, str], Health] = {}
+    newest: dict[tuple[str, str], Row] = {}
     session.probe.listen(keys.HEALTH.on(session.robot, service=service or "*"))
     for sample in session.probe.samples(LISTEN_S):
         try:
             health = decode(sample, Health)
-            newest[chunks(sample.key)[0], health.service] = health
+            newest[chunks(sample.key)[0], health.service] = msgspec.to_builtins(health)
         except MessageError as error:
             output.warn(f"t2 health: {sample.key}: {error}")
         if (session.robot, service) in newest:
@@ -89,24 +80,22 @@ def listen(session: BusSession, service: str | None) -> list[Row]:
     robots = {robot for robot, _ in newest.keys() | alive} or {session.robot}
     needed = {(robot, name) for robot in robots for name in ([service] if service else NEEDED)}
     return [
-        Row(*each, "ok" if each in newest else "hangs" if each in alive else "missing",
-            newest.get(each))
+        {
+            "robot": each[0],
+            "service": each[1],
+            "state": "ok" if each in newest else "hangs" if each in alive else "missing",
+            **newest.get(each, {}),
+        }
         for each in sorted(newest.keys() | alive | needed)
-    ]  # fmt: skip
-
-
-def as_json(row: Row) -> dict[str, Any]:
-    """Return one service as a JSON object."""
-    fields = msgspec.to_builtins(row.health) if row.health else {}
-    return {"robot": row.robot, "service": row.name, "state": row.state} | fields
+    ]
 
 
 def notes(rows: list[Row]) -> Iterator[str]:
     """Yield each reaction that was measured since a service's start."""
     for row in rows:
-        for name, each in row.health.reactions.items() if row.health else ():
-            if any(each.counts):
+        for name, each in row.get("reactions", {}).items():
+            if any(each["counts"]):
                 yield (
-                    f"{row.name} of robot {row.robot}: {name} measured {sum(each.counts)} times, "
-                    f"worst {1e3 * each.worst:.2f} ms\n"
+                    f"{row['service']} of robot {row['robot']}: {name} measured "
+                    f"{sum(each['counts'])} times, worst {1e3 * each['worst']:.2f} ms\n"
                 )

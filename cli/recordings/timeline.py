@@ -48,11 +48,8 @@ class Phase:
     def is_same(self, state: SafetyState) -> bool:
         """Return whether a state differs in nothing that a report shows."""
         first = self.state
-        return (
-            first.verdict == state.verdict
-            and first.latched == state.latched
-            and [cause.name for cause in first.causes] == [cause.name for cause in state.causes]
-        )
+        names = [[cause.name for cause in each.causes] for each in (first, state)]
+        return first.verdict == state.verdict and names[0] == names[1]
 
 
 @dataclass(slots=True)
@@ -64,20 +61,11 @@ class Stop:
     was_driving: bool  # the vehicle moved before
     verdict: str  # the first one
     reasons: dict[str, str] = field(default_factory=dict)  # text by name, in order of appearance
-    latched: dict[str, None] = field(default_factory=dict)  # in order; these needed a reset
-    over: bool = False  # it ended before the recording, or safety's messages, ended
 
     @property
     def lasts_s(self) -> float:
         """Return the duration."""
         return self.ends_s - self.begins_s
-
-    @property
-    def ended_by(self) -> str:
-        """Return what ended it."""
-        if not self.over:
-            return "not ended when the recording, or safety's messages, ended"
-        return "a reset" if self.latched else "itself"
 
 
 def add_state(phases: list[Phase], at_s: float, state: SafetyState, gap_s: float) -> None:
@@ -98,7 +86,6 @@ def stops(phases: Iterable[Phase]) -> list[Stop]:
     for phase in phases:
         causes = stopping_causes(phase.state)
         if current is not None and (not causes or phase.begins_s > current.ends_s):
-            current.over = not causes
             current = None
         if causes and current is None:
             current = Stop(phase.begins_s, phase.ends_s, driving, phase.state.verdict)
@@ -107,7 +94,6 @@ def stops(phases: Iterable[Phase]) -> list[Stop]:
             current.ends_s = phase.ends_s
             for cause in causes:
                 current.reasons.setdefault(cause.name, cause.text)
-            current.latched |= dict.fromkeys(phase.state.latched)
         driving = phase.state.verdict in ("run", "slow")
     return found
 

@@ -34,7 +34,7 @@ def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = out.read_text()
     for word in (
         "requested by teleop", "allowed by safety", "measured", "The bumper was hit.",
-        "tel/bridge/velocity", "bridge 0.1.0", "4.0 m", "a reset",
+        "tel/bridge/velocity", "bridge 0.1.0", "4.0 m",
         "2023-11-14 22:13:20 UTC",
     ):  # fmt: skip
         assert word in text, word

@@ -29,7 +29,7 @@ def test_the_timeline_of_a_drive() -> None:
     assert set(timeline.angular.measured.values) == {0.1}
     (stop,) = timeline.stops
     assert (stop.begins_s, stop.ends_s) == (HIT_S, RESET_S)
-    assert (list(stop.reasons), stop.over, stop.was_driving) == (["contact"], True, True)
+    assert (list(stop.reasons), stop.was_driving) == (["contact"], True)
     assert [(each.at_s, each.service) for each in timeline.events] == [(HIT_S, "safety")]
     assert timeline.distance == pytest.approx(199 * 0.02)
     assert timeline.versions == {"bridge": "0.1.0"}
@@ -102,14 +102,9 @@ LINK = Cause(name="link", action="stop", age=0.0, text="The link to the board is
 SLOWED = Cause(name="obstacle", action="slow", age=0.0, text="Slowed by an obstacle.")
 
 
-def made_of(
-    verdict: Verdict, causes: tuple[Cause, ...], latched: tuple[str, ...] | None = None
-) -> SafetyState:
-    """Return a state; a contact among the causes is latched."""
-    if latched is None:
-        latched = tuple(cause.name for cause in causes if cause is CONTACT)
+def made_of(verdict: Verdict, causes: tuple[Cause, ...]) -> SafetyState:
     return SafetyState(
-        verdict=verdict, latched=latched, causes=causes, source=None, limits=state(False).limits,
+        verdict=verdict, latched=(), causes=causes, source=None, limits=state(False).limits,
         heartbeat=1, text="",
     )  # fmt: skip
 
@@ -127,9 +122,8 @@ def test_a_contact_while_driving_with_a_reset() -> None:
         phases_of((0, 2, "run", ()), (2, 5, "brake", (CONTACT, IDLE)), (5, 9, "stop", (IDLE,)))
     )
     assert (stop.begins_s, stop.ends_s, stop.lasts_s) == (2, 5, 3)
-    assert (stop.was_driving, stop.verdict, stop.over) == (True, "brake", True)
+    assert (stop.was_driving, stop.verdict) == (True, "brake")
     assert stop.reasons == {"contact": "The bumper was hit."}
-    assert (list(stop.latched), stop.ended_by) == (["contact"], "a reset")
 
 
 def test_consecutive_reasons_are_one_stop() -> None:
@@ -138,8 +132,6 @@ def test_consecutive_reasons_are_one_stop() -> None:
     )
     assert list(stop.reasons) == ["link", "contact"]
     assert (stop.verdict, stop.ends_s, stop.was_driving) == ("inhibited", 2, False)
-    (stop,) = stops(phases_of((0, 1, "stop", (LINK,)), (1, 2, "run", ())))
-    assert stop.ended_by == "itself"
 
 
 def test_an_idle_vehicle_is_not_a_stop() -> None:
@@ -148,9 +140,7 @@ def test_an_idle_vehicle_is_not_a_stop() -> None:
 
 def test_a_gap_in_the_safety_state_ends_a_stop() -> None:
     first, second = stops(phases_of((0, 1, "inhibited", (LINK,)), (4, 5, "inhibited", (LINK,))))
-    assert (first.ends_s, first.over) == (1, False)
-    assert first.ended_by.startswith("not ended")
-    assert (second.begins_s, second.over) == (4, False)
+    assert (first.ends_s, second.begins_s) == (1, 4)
 
 
 @pytest.mark.parametrize(
@@ -159,7 +149,6 @@ def test_a_gap_in_the_safety_state_ends_a_stop() -> None:
         (made_of("brake", (CONTACT,)), True),
         (made_of("stop", (CONTACT,)), False),
         (made_of("brake", (CONTACT, LINK)), False),
-        (made_of("brake", (CONTACT,), latched=()), False),
     ],
 )
 def test_a_phase_lasts_until_another_state(later: SafetyState, is_same: bool) -> None:
