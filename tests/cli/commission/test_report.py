@@ -20,43 +20,17 @@ REPORT = Report(
 )
 
 
-def test_the_whole_report() -> None:
-    assert (
-        render(REPORT)
-        == """\
-# Checkout of robot 001
-
-**Passed.**
-
-| what | value |
-| --- | --- |
-| date | 2026-03-01 10:00:00 +0800 |
-| operator | Ada |
-| board | 10.7.5.224:4002 |
-
-## Steps
-
-| step | result | finding |
-| --- | --- | --- |
-| Link | passed | The board's link is up. |
-
-### Link
-
-| measured | value |
-| --- | --- |
-| state | up |
-
-## Effective settings
-
-| setting | value | from |
-| --- | --- | --- |
-| wire.crc | crc-16 | config/t2.toml |
-
-## Signed off
-
-Ada, 2026-03-01 10:20:00 +0800
-"""
-    )
+def test_a_signed_report() -> None:
+    lines = render(REPORT).splitlines()
+    assert lines[2] == "**Passed.**"
+    assert lines[-1] == "Ada, 2026-03-01 10:20:00 +0800"
+    for row in (
+        "| board | 10.7.5.224:4002 |",
+        "| Link | passed | The board's link is up. |",
+        "| state | up |",
+        "| wire.crc | crc-16 | config/t2.toml |",
+    ):
+        assert row in lines
 
 
 @pytest.mark.parametrize(

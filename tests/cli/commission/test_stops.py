@@ -9,7 +9,7 @@ from cli.commission.stops import Streams, UnsuitableError, find_stops, slope
 from common.freshness import NS_PER_S
 from common.messages import Bumper, Health, Message, Mileage, Motion, Velocity
 from common.motion import Command
-from tests.cli.commission.stops_fixture import RUN, StopMaker, at, changed, speed_at, streams
+from tests.cli.commission.stops_fixture import at, changed, speed_at, streams
 
 
 @pytest.mark.parametrize(("sign", "direction"), [(1, "forward"), (-1, "backward")])
@@ -26,7 +26,7 @@ def test_a_stop_is_measured(sign: int, direction: str) -> None:
 
 def test_the_distance_begins_between_two_counters() -> None:
     made = Streams()
-    made.add(at(RUN, -0.02))
+    made.add(at(Motion(command=Command.RUN, linear=0.8), -0.02))
     made.add(at(Motion(command=Command.STOP), 0.0))
     for number in range(-15, 8):
         now = number * 0.02 + 0.01
@@ -37,24 +37,6 @@ def test_the_distance_begins_between_two_counters() -> None:
     assert stop.distance == pytest.approx(1.1 - 1.024)
     assert stop.reaction == pytest.approx(0.03)
     assert stop.deceleration == pytest.approx(0.8 / 0.02)
-
-
-@pytest.mark.parametrize("command", [Command.STOP, Command.BRAKE])
-def test_the_simulators_stops(command: Command) -> None:
-    """BRAKE stops the simulated vehicle within a period: its deceleration is a lower bound."""
-    maker = StopMaker(delay=0.1, jitter=0.0, coast=0.7)
-    for speed in (0.3, -0.8):
-        maker.stop(speed, command)
-    found, left_out = find_stops(maker.streams)
-    assert not left_out
-    assert [stop.kind for stop in found] == [command] * 2
-    assert [stop.direction for stop in found] == ["forward", "backward"]
-    for stop in found:
-        assert 0.08 <= stop.reaction <= 0.131
-        slow = stop.speed / 0.02 if command is Command.BRAKE else 0.7
-        assert stop.deceleration == pytest.approx(slow, rel=0.03)
-        braked = stop.speed**2 / 1.4 if command is Command.STOP else 0.0
-        assert stop.distance == pytest.approx(braked + stop.speed * stop.reaction, abs=0.012)
 
 
 def commanding(command: Command, seconds: float, linear: float = 0.0) -> Message:
@@ -89,9 +71,7 @@ def test_a_single_velocity_of_zero_is_no_standstill() -> None:
 
 def braking(*then: Command) -> Streams:
     """Return a BRAKE at 0 s, and further commands at 1 s."""
-    made = streams(*(commanding(command, 1.0) for command in then))
-    made.motions[1] = replace(made.motions[1], command=Command.BRAKE)
-    return made
+    return streams(*(commanding(each, 1.0) for each in then), command=Command.BRAKE)
 
 
 def moving(change: Callable[[Velocity, float], Velocity | None], speed: float = 0.8) -> Streams:

@@ -94,7 +94,6 @@ def test_routers_are_known_without_their_folders(keys: Keys, tmp_path: Path) -> 
     [
         (("init",), 1, "exists: another CA would invalidate all certificates"),
         (("issue", "viewer", "hall"), 1, "viewer hall has a certificate until"),
-        (("issue", "driver", "anna"), EXIT_CONFIG, "a driver needs --robot ID"),
         (("issue", "viewer", "v", "--days", "9999"), EXIT_CONFIG, "--days 9999: allowed is 1..36"),
         (("issue", "viewer", "v", "--ca-key", "no/such"), 1, "no/such not found: it is needed"),
         (("renew", "driver", "ben"), 1, "driver ben has no certificate, or a revoked one"),

@@ -101,15 +101,11 @@ def test_a_certificate_never_exceeds_the_authority(days: int, left_days: float, 
 
 def test_newest_skips_revoked_certificates() -> None:
     assert member_list.newest(SITE, "driver", "anna") is NEW
-    with pytest.raises(RobotError, match="driver anna has no certificate, or a revoked one"):
-        member_list.newest(members(GONE, OTHER, SAME_NAME), "driver", "anna")
 
 
 def test_a_name_is_free_without_a_valid_certificate() -> None:
     ended = member("driver", "anna", days=-1)
     member_list.check_free(members(ended, GONE, OTHER, SAME_NAME), "driver", "anna", NOW_S)
-    with pytest.raises(RobotError, match=r"has a certificate until 2027-09-17; `t2 keys renew dri"):
-        member_list.check_free(SITE, "driver", "anna", NOW_S)
 
 
 def test_routers_have_the_addresses_of_their_latest_certificate() -> None:
@@ -132,7 +128,6 @@ def test_revoke_certificates_of_a_member(serial: str | None, ended: list[Member]
     [
         ("ben", None, "driver ben has no certificate that could be revoked"),
         ("anna", "00000003", "has no certificate with the serial '00000003' that could be"),
-        ("anna", "", "has no certificate with the serial '' that could be"),
     ],
 )
 def test_nothing_to_revoke(name: str, serial: str | None, message: str) -> None:
@@ -154,14 +149,3 @@ def test_nothing_to_revoke(name: str, serial: str | None, message: str) -> None:
 )
 def test_states(who: Member, expected: str) -> None:
     assert member_list.state(who, NOW_S) == expected
-
-
-def test_the_table() -> None:
-    every = member("driver", "ben", "00000002", robots=("*",), sources=("nav", "web"))
-    site = members(member("driver", "anna"), every, member("viewer", "guest", days=-1))
-    assert member_list.as_table(site, NOW_S).splitlines() == [
-        "role    name   robots  sources       until  state    certificate",
-        "driver  anna   001     -        2027-09-17  valid    driver.anna.00000001",
-        "driver  ben    *       nav web  2027-09-17  valid    driver.ben.00000002",
-        "viewer  guest  -       -        2026-11-20  expired  viewer.guest.00000001",
-    ]
