@@ -6,12 +6,9 @@ import pytest
 from msgspec.structs import replace
 
 from cli.inspect.addressing import (
-    chunks,
     decode,
     expression,
     parse_key,
-    parse_one_key,
-    short,
     topic_of,
 )
 from common import codec, keys
@@ -47,19 +44,6 @@ def test_whole_key_of_a_typed_key(word: str, key: str) -> None:
 def test_invalid_keys(word: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError, match="is not a key"):
         parse_key(word)
-
-
-def test_an_expression_is_not_one_key() -> None:
-    assert parse_one_key("tel/x") == "tel/x"
-    with pytest.raises(argparse.ArgumentTypeError, match="several keys"):
-        parse_one_key("tel/*")
-
-
-def test_displayed_keys() -> None:
-    assert short("t2/v1/7/tel/x", "7") == "tel/x"
-    assert short("t2/v1/8/tel/x", "7") == "t2/v1/8/tel/x"
-    assert chunks("t2/v1/7/tel/x") == ("7", "tel/x")
-    assert chunks("other/v1/7/tel/x") == chunks("t2/v1/7") == ("", "")
 
 
 def test_topic_of_a_key() -> None:

@@ -10,7 +10,7 @@ from common.messages import Event, Health
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
-from tests.cli.recordings import drive_fixture
+from tests.cli.recordings.drive_fixture import state
 from tests.recorder import samples
 from tests.recorder.samples import bare, sample
 
@@ -27,7 +27,7 @@ def path(tmp_path: Path) -> Path:
         made.write(sample("tel/bridge/velocity", samples.velocity(), number / 10, raw=b"x"))
     made.write(sample("tel/safety/state", samples.state(), 1.0))
     made.flush()
-    made.write(sample("tel/safety/state", drive_fixture.state(True), 1.5))
+    made.write(sample("tel/safety/state", state(True), 1.5))
     made.write(sample("evt/bridge", Event(name="contact", level="error", text="hit"), 1.5))
     made.write(bare("tel/mine", b"\xc1", at_s=2.0))
     made.close()

@@ -4,24 +4,14 @@ import math
 
 import pytest
 
-from cli.recordings.timeline import (
-    Phase,
-    Series,
-    Stream,
-    Timeline,
-    add_state,
-    downsampled,
-    stops,
-)
+from cli.recordings.timeline import Phase, Series, Stream, add_state, downsampled, stops
 from common.messages import Cause, Drive, SafetyState, Velocity, Verdict
-from tests.cli.recordings import drive_fixture
-from tests.cli.recordings.drive_fixture import CONTACT, HIT_S, IDLE, RESET_S, drive, state
+from tests import factories
+from tests.cli.recordings.drive_fixture import CONTACT, HIT_S, RESET_S, at, drive, timeline_of
 
 
 def test_the_timeline_of_a_drive() -> None:
-    timeline = Timeline()
-    for arrival in drive():
-        timeline.add(*arrival)
+    timeline = timeline_of(*drive())
     assert set(timeline.linear.requested) == {"teleop"}
     assert set(timeline.linear.requested["teleop"].values) == {0.5}
     allowed = zip(timeline.linear.allowed.times, timeline.linear.allowed.values, strict=True)
@@ -37,10 +27,8 @@ def test_the_timeline_of_a_drive() -> None:
 
 
 def test_a_new_odometry_epoch_starts_a_new_segment() -> None:
-    timeline = Timeline()
-    for number in range(4):
-        message = drive_fixture.odometry(number % 2, epoch=number // 2)
-        timeline.add(*drive_fixture.at("tel/odom/odometry", message, number / 50))
+    poses = [factories.odometry(x=0.02 * (n % 2), epoch=n // 2) for n in range(4)]
+    timeline = timeline_of(*(at("tel/odom/odometry", pose, 0.0) for pose in poses))
     assert [len(segment.xs) for segment in timeline.path] == [2, 2]
     assert timeline.distance == pytest.approx(0.04)
 
@@ -80,12 +68,10 @@ def test_rate_gaps_and_losses() -> None:
     assert stream.gaps == [pytest.approx(0.08), pytest.approx(0.42)]
 
 
-@pytest.mark.parametrize("path", ["tel/lidar/points", "@cmd/drive/teleop"])
-def test_a_key_without_a_rate_has_no_gaps(path: str) -> None:
-    stream = Stream(f"t2/v1/001/{path}")
-    stream.add(0.0, Drive(seq=1, boot=9, linear=0.0, angular=0.0, echo=1))
-    assert (stream.hz, stream.gaps) == (None, [])
-    stream.add(9.0, Drive(seq=2, boot=9, linear=0.0, angular=0.0, echo=1))
+def test_a_key_without_a_rate_has_no_gaps() -> None:
+    stream = Stream("t2/v1/001/@cmd/drive/teleop")
+    for at_s in (0.0, 9.0):
+        stream.add(at_s, Drive(seq=int(at_s) + 1, boot=9, linear=0.0, angular=0.0, echo=1))
     assert (stream.gaps, stream.expected_hz) == ([], 0.0)
     assert stream.hz == pytest.approx(1 / 9)
 
@@ -93,20 +79,18 @@ def test_a_key_without_a_rate_has_no_gaps(path: str) -> None:
 def test_an_emergency_stop_has_no_message_to_decode() -> None:
     stream = Stream("t2/v1/001/estop")
     stream.add(0.0, None)
-    assert (stream.undecoded, len(stream.times)) == (0, 1)
+    assert (stream.undecoded, stream.hz) == (0, None)
 
 
 # --- stops --------------------------------------------------------------------------------------
 
+IDLE = Cause(name="no_request", action="stop", age=0.0, text="No source requests motion.")
 LINK = Cause(name="link", action="stop", age=0.0, text="The link to the board is lost.")
 SLOWED = Cause(name="obstacle", action="slow", age=0.0, text="Slowed by an obstacle.")
 
 
 def made_of(verdict: Verdict, causes: tuple[Cause, ...]) -> SafetyState:
-    return SafetyState(
-        verdict=verdict, latched=(), causes=causes, source=None, limits=state(False).limits,
-        heartbeat=1, text="",
-    )  # fmt: skip
+    return factories.safety_state(verdict=verdict, causes=causes)
 
 
 def phases_of(*steps: tuple[float, float, Verdict, tuple[Cause, ...]]) -> list[Phase]:
