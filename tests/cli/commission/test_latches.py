@@ -20,11 +20,11 @@ def motion(after_s: float, command: Command) -> Latest[Motion]:
     return Latest(Motion(command=command), T + round(after_s * NS_PER_S))
 
 
-def latch_test(cause: str = "estop") -> LatchTest:
+def latch_test() -> LatchTest:
     return LatchTest(
-        cause=cause,
+        cause="estop",
         at_ns=T,
-        states=[state(-0.1), state(0.02, cause), state(0.07, cause)],
+        states=[state(-0.1), state(0.02, "estop"), state(0.07, "estop")],
         motions=[
             motion(-0.1, Command.STOP),
             motion(0.01, Command.BRAKE),
@@ -53,38 +53,22 @@ def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
 @pytest.mark.parametrize(
     ("change", "phrase"),
     [
-        ({"states": [state(0.02)]}, "Safety did not latch estop."),
         ({"states": [state(0.02, "contact")]}, "Safety did not latch estop."),
         ({"states": [state(LIMIT_S + 0.01, "estop")]}, "Safety took 0.51 s to latch estop"),
         ({"motions": [motion(0.01, Command.STOP)]}, "Safety did not command BRAKE."),
-        ({"motions": []}, "Safety did not command BRAKE."),
         ({"motions": [motion(0.6, Command.BRAKE)]}, "Safety took 0.60 s to command BRAKE"),
-        (
-            {
-                "motions": [
-                    motion(0.01, Command.BRAKE),
-                    motion(0.03, Command.RUN),
-                    motion(0.05, Command.STOP),
-                ]
-            },
-            "safety sent RUN, STOP instead of BRAKE",
-        ),
+        ({"motions": [motion(0.01, Command.BRAKE), motion(0.03, Command.RUN)]}, "safety sent RUN"),
         ({"reset": RESET._replace(granted=False, text="It moves.")}, "was refused: It moves."),
         ({"reset": RESET._replace(latched=("estop",))}, "Still latched after the reset: estop."),
     ],
 )
 def test_missing_parts_are_named(change: dict[str, object], phrase: str) -> None:
-    verdict = judge_latch(latch_test()._replace(**change))  # type: ignore[arg-type]
+    verdict = judge_latch(latch_test()._replace(**change), "It stays pressed.")  # type: ignore[arg-type]
     assert verdict.outcome == "failed"
+    assert verdict.text.startswith("It stays pressed. ")
     assert phrase in verdict.text
 
 
 def test_commands_after_the_reset_are_ignored() -> None:
     more = [*latch_test().motions, motion(2.01, Command.STOP)]
     assert judge_latch(latch_test()._replace(motions=more)).outcome == "passed"
-
-
-def test_a_problem_that_was_found_before_comes_first() -> None:
-    verdict = judge_latch(latch_test("contact")._replace(states=[]), "It stays pressed.")
-    assert verdict.outcome == "failed"
-    assert verdict.text == "It stays pressed. Safety did not latch contact."

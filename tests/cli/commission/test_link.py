@@ -56,22 +56,17 @@ RELAY = Relay(state="up", version="0.1.0", braking="", uptime=1.0, counters={})
     ("given", "phrase"),
     [
         ({"state": "lost"}, "The link is lost"),
-        ({"state": "never"}, "The link is never"),
         ({"epoch": 1}, "restarted during this step"),
         ({"rejected": {"wrong_address": 20}}, "20 frames rejected as wrong_address"),
         ({"rejected": {"truncated": 5}}, ""),  # one in a hundred of 545 frames
         ({"rejected": {"truncated": 6}}, "6 frames rejected as truncated"),
         ({"switches": None}, "both its emergency brakes"),
         ({"switches": Switches(ultrasonic_brake=True)}, "both its emergency brakes"),
-        (
-            {"switches": Switches(ultrasonic_brake=False, bumper_brake=True)},
-            "both its emergency brakes",
-        ),
         ({"frames": CRC_FRAMES - 1, "nonzero": 900}, "Too few frames for a verdict"),
         ({"nonzero": NONZERO_FRAMES - 1}, "Too few frames for a verdict"),
-        ({"rejected": {"bad_crc": 1}}, "check the cable"),
         ({"rejected": {"bad_crc": 499}, "frames": 501}, "check the cable"),
         ({"rejected": {"bad_crc": 500}, "frames": 500}, "another CRC"),
+        ({"rates": EXPECTED_HZ | {"UltrasonicReport": 0.0}}, ""),  # once: the median counts
         ({"relay": RELAY}, ""),
         ({"relay": replace(RELAY, braking="silent")}, "now: 0.1.0, braking: silent."),
         ({"relay": replace(RELAY, state="lost")}, "now: silent."),
@@ -83,20 +78,12 @@ def test_problems_are_named(given: dict[str, Any], phrase: str) -> None:
     assert phrase in verdict.text
 
 
-@pytest.mark.parametrize(
-    ("rates", "problem"),
-    [
-        ({"UltrasonicReport": 14.0}, ""),
-        ({"UltrasonicReport": 13.9}, "UltrasonicReport has 14 Hz, expected are 20 Hz."),
-        ({"BumperReport": 0.0}, "BumperReport has 0 Hz, expected are 50 Hz."),
-    ],
-)
-def test_lowest_allowed_rate(rates: dict[str, float], problem: str) -> None:
-    links = [link(rates=EXPECTED_HZ | rates)] * 5
-    verdict = judge_link(links, ON, CRC_FRAMES, NONZERO_FRAMES)
-    assert problem == ("" if verdict.outcome == "passed" else verdict.text)
-
-
 def test_only_rejections_of_the_step_count() -> None:
     before, after = ({"bad_crc": bad, "no_magic": 1} for bad in (3, 5))
     assert rejected([link(rejected=before), link(rejected=after)]) == {"bad_crc": 2}
+
+
+@pytest.mark.parametrize(("rate", "outcome"), [(14.0, "passed"), (13.9, "failed")])
+def test_lowest_allowed_rate(rate: float, outcome: str) -> None:
+    links = [link(rates=EXPECTED_HZ | {"UltrasonicReport": rate})] * 5
+    assert judge_link(links, ON, CRC_FRAMES, NONZERO_FRAMES).outcome == outcome

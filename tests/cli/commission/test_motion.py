@@ -86,7 +86,6 @@ COMMAND, FEEDBACK = "set wire.command_angular_unit = ", "set wire.feedback_angul
     [
         (FORWARD, both(1 + RATIO - 0.01), ""),
         (FORWARD, both(1 + RATIO + 0.01), "It goes 1.26 times as fast as commanded."),
-        (FORWARD, both(1 - RATIO + 0.01), ""),
         (FORWARD, both(1 - RATIO - 0.01), "It goes 0.74 times as fast as commanded."),
         (FORWARD, both(0.0), "No motion: neither the velocity nor the di"),
         (FORWARD, Vehicle(counted=0.0), "but the distance does not."),
@@ -94,16 +93,13 @@ COMMAND, FEEDBACK = "set wire.command_angular_unit = ", "set wire.feedback_angul
         (FORWARD, both(-1.0), "The sign is wrong: on a positive command"),
         (LEFT, both(-1.0), "it goes clockwise."),
         (FORWARD, Vehicle(measured=-1.0), "The measured velocity has the wrong sign"),
-        (FORWARD, both(2.0), "It goes 2.00 times as fast as commanded."),
         (FORWARD, Vehicle(measured=2.0), "2.00 times the velocity of the counter."),
         (FORWARD, Vehicle(stands_after_s=5.0), "It did not stand within 2 s"),
         (FORWARD, Vehicle(driven_s=0.8), "did not grant the full speed for long enough"),
         (FORWARD, Vehicle(granted=0.5), "Measured at most 0.05 m/s of 0.10 requested. Safety rep"),
         # The firmware uses one unit for both directions, so its feedback looks correct.
-        (LEFT, both(-MRAD), f'{COMMAND}"milliradian"'),
         (LEFT, Vehicle(counted=MRAD), f'{COMMAND}"milliradian"'),
         (LEFT, Vehicle(counted=1 / MRAD, unit="milliradian"), f'{COMMAND}"decidegree"'),
-        (LEFT, Vehicle(counted=0.1), "heading does not"),
         (LEFT, Vehicle(counted=3.0), "It goes 3.00 times as fast as commanded."),
         # The counter shows the unit of the feedback.
         (LEFT, Vehicle(measured=1 / MRAD), f'{FEEDBACK}"milliradian"'),
@@ -124,19 +120,14 @@ def test_the_window_must_be_long_enough() -> None:
     assert measure(Vehicle(driven_s=shortest_s - 0.02).run(FORWARD)) is None
 
 
-def test_no_measurement_across_a_pause() -> None:
+def test_no_measurement_across_a_pause_or_without_messages() -> None:
     run = Vehicle().run(FORWARD)
     pause = Latest(Motion(command=Command.STOP), NS_PER_S)
     motions = sorted([*run.motions, pause], key=lambda motion: motion.received_ns)
     assert measure(replace(run, motions=motions)) is None
-
-
-def test_no_measurement_without_messages() -> None:
-    run = Vehicle().run(FORWARD)
     assert measure(replace(run, velocities=[])) is None
     assert measure(replace(run, mileages=run.mileages[:1])) is None
     verdict = judge_motion(replace(run, motions=[], velocities=[], mileages=[], states=[]))
-    assert verdict.text.endswith("Measured at most 0.00 m/s of 0.10 requested.")
     assert verdict.data == (("standstill after", "never"),)
 
 
@@ -151,9 +142,7 @@ def test_no_standstill_if_it_moves_again() -> None:
     [
         (FORWARD, 0.3, 0.0, False),
         (FORWARD, -0.31, 0.0, True),
-        (FORWARD, 0.1, 0.61, True),
         (LEFT, 0.0, 0.6, False),
-        (LEFT, 0.0, -0.61, True),
         (LEFT, 0.31, 0.0, True),
     ],
 )

@@ -36,7 +36,6 @@ def sample(**values: float | RangeStatus) -> Ultrasonic:
         (0.6, math.inf, False),
         ("too_near", math.inf, True),
         ("fault", math.inf, False),
-        ("no_echo", math.inf, False),
         (0.3, 0.5, False),
         (0.3, 0.51, True),
         (0.3, None, False),

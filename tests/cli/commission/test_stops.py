@@ -54,12 +54,6 @@ def test_brake_after_stop(brake_s: float, braked: bool) -> None:
     assert stop.deceleration == pytest.approx(0.5, abs=0.002)
 
 
-def test_brake_after_stop_as_soon_as_it_slowed_down() -> None:
-    """0.72 m/s is 90 % of the speed, reached after 0.26 s: three velocities at 0.305 s."""
-    (stop,), _ = find_stops(streams(commanding(Command.BRAKE, 0.305)))
-    assert stop.deceleration == pytest.approx(0.5, abs=0.03)
-
-
 def test_a_single_velocity_of_zero_is_no_standstill() -> None:
     glitch = changed(streams(), lambda v, now: replace(v, linear=0.0) if 0.5 < now < 0.52 else v)
     (stop,), _ = find_stops(glitch)
@@ -119,49 +113,39 @@ HIT, RESTART = "the bumper was pressed", "bridge or board restarted"
     ("made", "reason"),
     [
         (streams(commanding(Command.RUN, 1.0, 0.5)), RUN_FIRST),
-        (streams(commanding(Command.RUN, 1.0)), RUN_FIRST),
         (streams(commanding(Command.RUN, STANDS_S)), RUN_FIRST),
         (streams(commanding(Command.RUN, STANDS_S + 0.001, 0.5)), ""),
         (streams(commanding(Command.STOP, 0.5)), ""),
-        (streams(commanding(Command.BRAKE, 0.1)), TOO_SOON),
         (streams(commanding(Command.BRAKE, 0.3)), TOO_SOON),
         (braking(Command.STOP), STOP_FIRST),
         (braking(Command.BRAKE), ""),
         (streams(speed=0.099), "slower than 0.1 m/s"),
         (streams(speed=0.1), ""),
         (turned(0.11), "turning"),
-        (turned(-0.11), "turning"),
         (turned(0.1), ""),
         # 5 % of the faster velocity, in the 0.2 s before the newest one at the command
         (faster(0.041, -0.19), ""),
         (faster(0.043, -0.19), UNSTEADY),
-        (faster(-0.041, -0.19), UNSTEADY),
         (faster(0.1, -0.22), ""),
         (faster(0.029, -0.1, 0.2), ""),  # a slow vehicle may scatter by 3 cm/s
         (faster(0.031, -0.1, 0.2), UNSTEADY),
         (only(lambda now: now > 0), SPEEDS),
-        (only(lambda now: now > -0.02), ""),
         (only(lambda now: now > 0 or now < -0.1), SPEEDS),
         (only(lambda now: not 0.5 < now < 0.6), SPEEDS),
         (only(lambda now: not 0.5 < now < 0.58), ""),
         (streams(until_s=1.5), ENDS),
-        (only(lambda now: now < 0.0), ENDS),
         (turned(0.2, 1.0, 9.0), ENDS),  # it does not stand while it turns
-        (bumped(0.0), HIT),
         (bumped(STANDS_S), HIT),
         (bumped(0.5, pressed=False), ""),
-        (bumped(-0.01), ""),
         (bumped(1.69), ""),
         (counted(lambda now: now > 0), COUNTERS),
         (counted(lambda now: now < 1.69), COUNTERS),
-        (counted(lambda now: now < 0), COUNTERS),
         (counted(lambda now: not -0.1 < now < 0.15), COUNTERS),
         (counted(lambda now: not 1.7 < now < 1.9), COUNTERS),
         (counted(lambda now: not -0.1 < now < 0.05), ""),
         (counted(lambda now: not 1.7 < now < 1.88), ""),
         (restarted(33, epoch=1), RESTART),
         (restarted(33, boot=4), RESTART),
-        (restarted(3, epoch=1), ""),
         (restarted(3, boot=4), ""),
     ],
 )
@@ -190,8 +174,6 @@ def test_what_begins_a_stop() -> None:
 def test_a_rate_that_is_not_falling() -> None:
     with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
         slope([(0.0, 1.0), (0.1, 0.2), (0.2, 0.5), (0.3, 0.8), (0.4, 0.0)])
-    with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
-        slope([(0.0, 1.0), (0.1, 0.5), (0.2, 0.5), (0.3, 0.5), (0.4, 0.0)])
 
 
 @pytest.mark.parametrize(
@@ -219,9 +201,6 @@ def test_problems_of_a_recording() -> None:
         "has no @cmd/motion and no tel/bridge/velocity and no tel/bridge/mileage: "
         "record all keys with `t2 record`"
     )
-    one = streams()
-    one.velocities.clear()
-    assert one.problem.startswith("has no tel/bridge/velocity:")
     coarse = streams()
     coarse.velocities = coarse.velocities[::5]
     assert coarse.problem.startswith("has a velocity each 0.10 s, too coarse for a stop")
