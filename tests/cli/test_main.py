@@ -22,8 +22,6 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     shown = capsys.readouterr().out
     for name in COMMANDS:
         assert re.search(rf"^  {name}\s", shown, re.MULTILINE), name
-    titles = re.findall(r"^([A-Z]\w+):$", shown, re.MULTILINE)
-    assert titles == ["Run", "Inspect", "Record", "Commission", "Administer"]
     assert max(map(len, shown.splitlines())) <= 80
 
 
@@ -34,7 +32,6 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
         ("fly", 2, "unknown command 'fly'; \"t2 --help\" lists the commands"),
         ("eco safety/state", 2, "unknown command 'eco'; did you mean \"t2 echo\"?"),
         ("up --nonsense", 2, "t2 up: error: unrecognized arguments: --nonsense"),
-        ("keys list --nonsense", 2, "usage: t2 keys"),
         ("--set board.port=1 up", 2, "options follow the command, as in: t2 COMMAND --set"),
     ],
 )

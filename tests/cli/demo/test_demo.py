@@ -64,18 +64,9 @@ def test_a_process_that_cannot_run_ends_it_and_names_the_log(
     assert (tmp_path / "trace.jsonl").read_text() == ""
 
 
-@pytest.mark.parametrize(
-    ("words", "error"),
-    [
-        (["--out", "{}", "--set", "sim.seed=-1"], "--set sim.seed=-1: sim.seed = -1: "),
-        (["--out", "{}/file"], "--out {}/file: cannot be written: "),
-    ],
-)
-def test_bad_options_are_named(
-    words: list[str], error: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_folder_that_cannot_be_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("in the way")
-    assert main(["demo", *(word.format(tmp_path) for word in words)]) == EXIT_CONFIG
-    shown = capsys.readouterr().err
-    assert shown.startswith(f"t2 demo: {error.format(tmp_path)}")
-    assert len(shown.splitlines()) == 1
+    assert main(["demo", "--out", f"{tmp_path}/file"]) == EXIT_CONFIG
+    assert f"t2 demo: --out {tmp_path}/file: cannot be written: " in capsys.readouterr().err

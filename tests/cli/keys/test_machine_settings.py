@@ -38,7 +38,6 @@ def test_a_router_listens_on_socket_and_tls() -> None:
             [OTHER],
             ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"],
         ),
-        (Profile(role="viewer", name="b"), [OTHER], ["tls/robot-2.lan:7447", "tls/[fd00::2]:7447"]),
     ],
 )
 def test_other_members_connect(who: Profile, routers: list[Profile], endpoints: list[str]) -> None:

@@ -65,7 +65,6 @@ def test_print_the_configuration_for_zenohd(
 @pytest.mark.parametrize(
     ("text", "words"),
     [(None, "cannot be read: No such file or directory; `t2 keys` makes it"),
-     ("{}", "is no list of members: Object missing required field `site`"),
      ("[", "is no list of members: ")],
 )  # fmt: skip
 def test_an_invalid_member_list(

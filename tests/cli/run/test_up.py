@@ -51,7 +51,6 @@ def test_a_second_stack_starts_nothing_and_killed_services_start_again(tmp_path:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (sets("board.port=0"), "board.port = 0"),
         (["--profile", "moon"], "known profiles are"),
         (["--profile", "slope", "--no-sim"], "leave --no-sim or --profile out"),
     ],
