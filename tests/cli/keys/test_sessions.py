@@ -3,7 +3,6 @@
 The rights of accepted clients are tested in ``tests/cli/keys/test_rights.py``.
 """
 
-import contextlib
 import json
 import time
 from collections.abc import Iterator
@@ -14,110 +13,83 @@ import msgspec
 import pytest
 import zenoh
 
-from cli.keys.ca import CertificateAuthority
-from cli.keys.member_list import DAY_S, profile
-from cli.keys.store import locked
-from common.bus.session import client_config, router
-from common.config import Sources, load
-from common.members import Members, Profile
-from common.settings import BusSettings, Shared
-from verification.harness.ports import free_port
+from cli.keys.store import Folder
+from common.bus.session import client_config
+from common.members import Profile
+from common.settings import BusSettings
+from verification.harness.certificates import Site, connecting
 from verification.harness.waiting import wait_until
 
-ROBOT = profile("robot", "001")
-DRIVER = profile("driver", "anna", ("001",))
-
-
-class Site:
-    """An authority in a folder, for certificates of any validity."""
-
-    def __init__(self, folder: Path) -> None:
-        self.now_s = time.time()
-        self.authority = CertificateAuthority.create(
-            "berlin", (self.now_s - DAY_S, self.now_s + DAY_S)
-        )
-        with locked(folder, create=True) as self.folder:
-            self.folder.create_authority(self.authority, Members(site="berlin"), b"")
-
-    def bus(self, who: Profile, begins_s: float = -60, ends_s: float = 3600) -> BusSettings:
-        """Return the settings of a member with a certificate of this validity, relative to now."""
-        valid = self.now_s + begins_s, self.now_s + ends_s
-        issued = self.authority.issue(who, valid)
-        listed = Members(site="berlin", members=(*self.folder.read().members, issued.member))
-        target = self.folder.write_machine(issued, listed, settings=True)
-        self.folder.write(listed)
-        return load(Shared, Sources(files=(target / "bus.toml",), environ={})).config.bus
+DRIVER = ("driver", "anna", "--robot", "001")
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Site:
-    return Site(tmp_path_factory.mktemp("site") / "keys")
+    made = Site(tmp_path_factory.mktemp("site") / "keys")
+    made.member("robot", "001", "--address", "127.0.0.1")
+    made.member(*DRIVER)
+    return made
 
 
 @pytest.fixture(scope="module")
-def stranger(tmp_path_factory: pytest.TempPathFactory) -> Site:
-    return Site(tmp_path_factory.mktemp("stranger") / "keys")
-
-
-@contextlib.contextmanager
-def listening(bus: BusSettings) -> Iterator[str]:
-    """Run a router with these settings on loopback; yield its endpoint."""
-    endpoint = f"tls/127.0.0.1:{free_port()}"
-    with router(msgspec.structs.replace(bus, listen=(endpoint,))):
-        yield endpoint
+def anna(site: Site) -> BusSettings:
+    return site.settings("driver", "anna")
 
 
 @pytest.fixture(scope="module")
 def endpoint(site: Site) -> Iterator[str]:
-    with listening(site.bus(ROBOT)) as where:
+    with site.router(site.settings("robot", "001")) as (where, _):
         yield where
 
 
 def connect(bus: BusSettings, endpoint: str, **tls: Any) -> zenoh.Session:
     """Open a session, with changed TLS settings; raise ``ZError`` if it is rejected."""
-    config = client_config(msgspec.structs.replace(bus, connect=(endpoint,)))
+    config = client_config(connecting(bus, endpoint))
     if tls:
         whole = json.loads(config.get_json("transport/link/tls")) | tls
         config.insert_json5("transport/link/tls", json.dumps(whole))
     return zenoh.open(config)
 
 
-def test_rejected_clients(site: Site, stranger: Site, endpoint: str) -> None:
+def test_rejected_clients(anna: BusSettings, endpoint: str, tmp_path: Path) -> None:
     """Without a certificate; of another authority with the same name, and trust in our router."""
-    ours = site.bus(DRIVER)
     with pytest.raises(zenoh.ZError):
-        connect(ours, endpoint, enable_mtls=False)
+        connect(anna, endpoint, enable_mtls=False)
+    stranger = Site(tmp_path / "keys").member(*DRIVER)
     with pytest.raises(zenoh.ZError):
-        connect(msgspec.structs.replace(stranger.bus(DRIVER), ca=ours.ca), endpoint)
-    with connect(ours, endpoint):  # a valid client is accepted
+        connect(msgspec.structs.replace(stranger, ca=anna.ca), endpoint)
+    with connect(anna, endpoint):  # a valid client is accepted
         pass
 
 
-def test_a_client_rejects_a_driver_as_router(site: Site) -> None:
-    guest = site.bus(profile("viewer", "guest"))
-    pretending = msgspec.structs.replace(site.bus(DRIVER), members="unused")
+def test_a_client_rejects_a_driver_as_router(site: Site, anna: BusSettings, endpoint: str) -> None:
+    guest = site.member("viewer", "guest")
     # Without address check: a driver's certificate has no address, and is for clients only.
-    with listening(pretending) as endpoint, pytest.raises(zenoh.ZError):
-        connect(guest, endpoint, verify_name_on_connect=False)
-    with (
-        listening(site.bus(ROBOT)) as endpoint,
-        connect(guest, endpoint, verify_name_on_connect=False),
-    ):
-        pass  # a valid client is accepted
+    with site.router(anna) as (pretending, _), pytest.raises(zenoh.ZError):
+        connect(guest, pretending, verify_name_on_connect=False)
+    with connect(guest, endpoint, verify_name_on_connect=False):
+        pass  # a router's certificate is accepted
 
 
-def test_a_client_rejects_a_router_at_another_address(site: Site) -> None:
-    issued = Profile(role="robot", name="002", robots=("002",), addresses=("192.0.2.7",))
-    with listening(site.bus(issued)) as endpoint:
+def issue(site: Site, who: Profile, ends_s: float) -> BusSettings:
+    """Issue a certificate that `t2 keys` does not: for this profile, valid until ``ends_s``."""
+    folder = Folder(site.folder)
+    issued = folder.authority(None, bytes).issue(who, (time.time() - 60, time.time() + ends_s))
+    folder.write_machine(issued, folder.read(), settings=True)
+    return site.settings(who.role, who.name)
+
+
+def test_a_client_rejects_a_router_at_another_address(site: Site, anna: BusSettings) -> None:
+    elsewhere = Profile(role="robot", name="002", robots=("002",), addresses=("192.0.2.7",))
+    with site.router(issue(site, elsewhere, 3600.0)) as (moved, _):
         with pytest.raises(zenoh.ZError):
-            connect(site.bus(DRIVER), endpoint)
-        with connect(site.bus(DRIVER), endpoint, verify_name_on_connect=False):
+            connect(anna, moved)
+        with connect(anna, moved, verify_name_on_connect=False):
             pass  # a valid client is accepted
 
 
 def test_a_link_ends_when_its_certificate_expires(site: Site, endpoint: str) -> None:
-    brief = Site.__new__(Site)
-    brief.now_s, brief.authority, brief.folder = time.time(), site.authority, site.folder
-    with connect(brief.bus(DRIVER, ends_s=3.0), endpoint) as session:
+    brief = issue(site, Profile(role="driver", name="brief", robots=("001",)), 3.0)
+    with connect(brief, endpoint) as session:
         assert list(session.info.routers_zid())
         wait_until(lambda: not list(session.info.routers_zid()), "the end of the link")
