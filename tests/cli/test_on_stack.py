@@ -3,19 +3,16 @@
 import contextlib
 import signal
 import subprocess
-import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from cli.inspect.diagnosis import BUMPER
-from common.cli_args import EXIT_LINK
 from common.messages import SONAR_NAMES
 from sim.requests import Bumper, Sonar
 from tests.cli.inspect.tool import Tool
-from tests.cli.processes import PATIENCE_S, ran, t2
-from verification.harness.ports import free_port
+from tests.cli.processes import PATIENCE_S, sets, t2
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
@@ -23,89 +20,54 @@ TRIES = 5  # safety stops on scheduling stalls; an operator tries again, too
 PHRASE = "wheels off the ground"
 
 
-class OperatorProcess:
-    """Process of the checkout; ``wait`` reads its output from the last match on."""
+class Operator:
+    """The operator of a running checkout, whose output goes to a file."""
 
-    def __init__(self, words: Sequence[str]) -> None:
-        self.process = subprocess.Popen(
-            t2("checkout", *words),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            bufsize=0,
-        )
-        self.shown = ""
-        self._read = 0
-        self._thread = threading.Thread(target=self._take, daemon=True)
-        self._thread.start()
+    def __init__(self, process: "subprocess.Popen[bytes]", output: Path) -> None:
+        self.process = process
+        self._output = output
+        self._read = 0  # characters
+
+    @property
+    def shown(self) -> str:
+        return self._output.read_text()
 
     def wait(self, *words: str) -> str:
         """Wait for one of these texts and return it; the output up to it counts as read."""
 
-        def found() -> bool:
-            assert self.process.poll() is None or any(w in self._news() for w in words), self.shown
-            return any(word in self._news() for word in words)
+        def found() -> str:
+            running, news = self.process.poll() is None, self.shown[self._read :]
+            here = [word for word in words if word in news]
+            assert running or here, self.shown
+            return min(here, key=news.index, default="")
 
-        try:
-            wait_until(found, f"one of {words}", PATIENCE_S)
-        except AssertionError as error:
-            raise AssertionError(f"{error}; its output:\n{self.shown}") from None
-        news = self._news()
-        first = min((w for w in words if w in news), key=news.index)
-        self._read += news.index(first) + len(first)
+        first = wait_until(found, f"one of {words}", PATIENCE_S)
+        self._read = self.shown.index(first, self._read) + len(first)
         return first
 
-    def type(self, line: str) -> None:
+    def type(self, *lines: str) -> None:
         assert self.process.stdin is not None
-        self.process.stdin.write(f"{line}\n".encode())
-
-    def signal(self, number: signal.Signals) -> None:
-        self.process.send_signal(number)
-
-    def begin(self, name: str = "Ada") -> None:
-        """Answer the questions before the first step."""
-        self.wait("Your name:")
-        self.type(name)
-        self.wait("The firmware")
-        self.type("")
-
-    def sign(self, name: str = "Ada") -> int:
-        """Sign, and return the exit code."""
-        self.wait("To sign this off")
-        self.type(name)
-        return self.end()
-
-    def end(self) -> int:
-        """Wait for the end, and return the exit code."""
-        code = self.process.wait(PATIENCE_S)
-        self._thread.join(PATIENCE_S)
-        return code
-
-    def kill(self) -> None:
-        """Kill it, in any state."""
-        self.process.kill()
-        self.process.wait()
-        self._thread.join(PATIENCE_S)
-        for pipe in (self.process.stdin, self.process.stdout):
-            assert pipe is not None
-            pipe.close()
-
-    def _news(self) -> str:
-        return self.shown[self._read :]
-
-    def _take(self) -> None:
-        assert self.process.stdout is not None
-        while part := self.process.stdout.read(4096):
-            self.shown += part.decode()
+        for line in lines:
+            self.process.stdin.write(f"{line}\n".encode())
 
 
 @contextlib.contextmanager
-def checkout(report: Path, *words: str) -> Iterator[OperatorProcess]:
-    it = OperatorProcess(["--report", str(report), *words])
-    try:
-        yield it
-    finally:
-        it.kill()
+def checkout(stack: RunningStack, report: Path, *words: str) -> Iterator[Operator]:
+    """Run a checkout and answer the questions before its first step."""
+    command = t2("checkout", "--report", str(report), *sets(f"bus.connect={stack.endpoint}"))
+    output = report.with_suffix(".log")
+    with (
+        output.open("wb") as file,
+        subprocess.Popen(
+            [*command, *words], stdin=subprocess.PIPE, stdout=file, stderr=file, bufsize=0
+        ) as process,
+    ):
+        try:
+            it = Operator(process, output)
+            it.type("Ada", "")
+            yield it
+        finally:
+            process.kill()
 
 
 @pytest.fixture
@@ -114,11 +76,7 @@ def stack(tmp_path: Path) -> Iterator[RunningStack]:
         yield it
 
 
-def at(stack: RunningStack) -> list[str]:
-    return ["--set", f"bus.connect={stack.endpoint}"]
-
-
-def passes(it: OperatorProcess) -> bool:
+def passes(it: Operator) -> bool:
     """Read a verdict; wait for the prompt after a failed one. A latch of a failed try is reset."""
     confirm = 'Type "reset"'
     found = it.wait("passed:", "failed:", confirm)
@@ -131,9 +89,9 @@ def passes(it: OperatorProcess) -> bool:
     return False
 
 
-def tries(it: OperatorProcess, title: str) -> Iterator[None]:
+def tries(it: Operator, title: str) -> Iterator[None]:
     """Begin a step and yield for each try; one of them must pass."""
-    it.wait(f"] {title}\n", f"] {title}\r\n")
+    it.wait(f"] {title}\n")
     it.wait("Press Enter to begin")
     it.type("")
     for _ in range(TRIES):
@@ -144,7 +102,7 @@ def tries(it: OperatorProcess, title: str) -> Iterator[None]:
     raise AssertionError(it.shown)
 
 
-def confirm(it: OperatorProcess) -> None:
+def confirm(it: Operator) -> None:
     """Confirm a motion; on a busy host a repeated emergency stop may arrive after its reset."""
     if it.wait(f'Type "{PHRASE}"', 'Type "reset"') == 'Type "reset"':
         it.type("reset")
@@ -152,7 +110,7 @@ def confirm(it: OperatorProcess) -> None:
     it.type(PHRASE)
 
 
-def hold_a_hand(stack: RunningStack, it: OperatorProcess) -> None:
+def hold_a_hand(stack: RunningStack, it: Operator) -> None:
     for name in SONAR_NAMES:
         it.wait(f"NOW the {name.replace('_', ' ')} sonar")
         stack.control.do(Sonar(name=name, range=0.3))  # type: ignore[arg-type]
@@ -170,9 +128,8 @@ def test_a_healthy_robot_and_a_complete_checkout(
         return {each["todo"] for each in lines if each["level"] == "wrong"}
 
     wait_until(lambda: not wrong(), "a healthy robot", PATIENCE_S)
-    report = tmp_path / "out" / "report.md"
-    with checkout(report, *at(stack)) as it:
-        it.begin()
+    report = tmp_path / "report.md"
+    with checkout(stack, report) as it:
         for _ in tries(it, "Link"):
             pass
         for _ in tries(it, "Sonars"):
@@ -188,7 +145,9 @@ def test_a_healthy_robot_and_a_complete_checkout(
         for title in ("Forward", "Turn"):
             for _ in tries(it, title):
                 confirm(it)
-        assert it.sign() == 0, it.shown
+        it.wait("To sign this off")
+        it.type("Ada")
+        assert it.process.wait(PATIENCE_S) == 0, it.shown
     text = report.read_text(encoding="utf-8")
     assert "**Passed.**" in text
     assert text.count(" passed |") == 6
@@ -207,8 +166,7 @@ def test_ctrl_c_stops_the_wheels_after_an_earlier_latch(
     stack.control.do(Bumper(pressed=False))
     report = tmp_path / "report.md"
     steps = [word for name in ("estop", "forward", "turn") for word in ("--only", name)]
-    with checkout(report, *at(stack), *steps) as it:
-        it.begin()
+    with checkout(stack, report, *steps) as it:
         it.wait("Press Enter to begin")
         it.type("nobody | near the switch")
         it.wait("Press Enter to begin")
@@ -226,20 +184,11 @@ def test_ctrl_c_stops_the_wheels_after_an_earlier_latch(
             it.type("")
         it.type(PHRASE)
         wait_until(lambda: abs(stack.speed()) > 0.02, "the wheels turn")
-        it.signal(signal.SIGINT)
-        assert it.end() == 1
+        it.process.send_signal(signal.SIGINT)
+        assert it.process.wait(PATIENCE_S) == 1
         wait_until(lambda: abs(stack.speed()) < 0.001, "the vehicle stands")
         wait_until(lambda: stack.last() in ("stop", "brake"), "STOP at the board")
     text = report.read_text(encoding="utf-8")
     assert "Ended early: interrupted by the operator." in text
     assert "| Emergency stop | skipped | nobody \\| near the switch |" in text
     assert "Not signed." in text
-
-
-def test_no_checkout_without_a_stack(tmp_path: Path) -> None:
-    report = tmp_path / "report.md"
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    result = ran("checkout", "--set", f"bus.connect={endpoint}", "--report", str(report))
-    assert result.returncode == EXIT_LINK
-    assert f"no router answers at {endpoint}" in result.stderr
-    assert not report.exists()
