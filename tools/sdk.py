@@ -1,12 +1,15 @@
 """The generated modules of the client library ``sdk/``: message types, client, table of keys."""
 
 import ast
+import re
 from pathlib import Path
 from types import ModuleType
 
 from common import client, keys, messages
 
 SDK = Path(__file__).parent.parent / "sdk" / "t2"
+# Messages that the library neither reads nor sends.
+OMITTED = {"Driver", "EstopKeepalive", "Motion", "Durations", "Health", "SwitchesRequest"}
 HEAD = '''"""Messages on the bus; generated from the stack's own by ``make docs``, do not edit.
 
 Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
@@ -16,8 +19,6 @@ forward, y left, counter-clockwise positive. Readers ignore unknown fields.
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
-
-Command = Literal["run", "stop", "brake"]
 '''
 CLIENT_HEAD = '''"""Client of safety; generated from ``common/client.py``, do not edit."""
 
@@ -50,16 +51,17 @@ def _body(module: ModuleType) -> str:
     lines = text.splitlines(keepends=True)
     for node in reversed(ast.parse(text).body):
         is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
+        is_omitted = isinstance(node, ast.ClassDef) and node.name in OMITTED
+        if is_docstring or is_omitted or isinstance(node, ast.Import | ast.ImportFrom):
             del lines[node.lineno - 1 : node.end_lineno]
-    return "".join(lines).strip("\n") + "\n"
+    return re.sub("\n{4,}", "\n\n\n", "".join(lines).strip("\n")) + "\n"
 
 
 def _keys() -> str:
-    topics = {name: topic for name, topic in vars(keys).items() if isinstance(topic, keys.Topic)}
     rows = [
         f'    "{name.lower()}": ("{topic.path}", m.{topic.message.__name__}),\n'
-        for name, topic in topics.items()
+        for name, topic in vars(keys).items()
+        if isinstance(topic, keys.Topic) and topic.message.__name__ not in OMITTED
     ]
     return (
         f'ROOT = "{keys.ROOT}"\n\n'

@@ -110,7 +110,7 @@ class Streams:
         description = self._publisher("robot_description", "std_msgs/msg/String", latched=True)
         description.put((urdf.describe(vehicle, prefix),))
         static = self._publisher("/tf_static", TRANSFORMS, latched=True)
-        static.put(translate.static_transforms(time.time_ns(), urdf.poses(vehicle), prefix))
+        static.put(translate.static_transforms(time.time_ns(), urdf.frames(vehicle), prefix))
 
     def _pass_on(
         self,

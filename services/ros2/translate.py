@@ -19,7 +19,6 @@ PLANAR = 1e-6  # variance of what a vehicle on a floor does not do: z, roll, pit
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
 STALE_NS = 3 * NS_PER_S
 ONCE = "t2: cmd_vel"  # noted on a change, not periodically
-NO_TURN = (0.0, 0.0, 0.0, 1.0)
 WORST: Mapping[str, int] = {"run": OK, "slow": WARN, "stop": WARN, "brake": ERROR}
 
 
@@ -68,10 +67,10 @@ def transform(message: m.Odometry, prefix: str) -> Value:
     return (((stamped, prefix + message.child_frame_id, where),),)
 
 
-def static_transforms(t_ns: int, joints: Iterator["tuple[str, Value]"], prefix: str) -> Value:
-    """Return a tf2_msgs/TFMessage from ``base_link`` to frames with their poses."""
+def static_transforms(t_ns: int, frames: Iterator[tuple[str, Value, float]], prefix: str) -> Value:
+    """Return a tf2_msgs/TFMessage from ``base_link`` to frames at positions with their yaw."""
     stamped = header(t_ns, f"{prefix}base_link")
-    return (tuple((stamped, prefix + frame, pose) for frame, pose in joints),)
+    return (tuple((stamped, prefix + name, (at, turned(yaw))) for name, at, yaw in frames),)
 
 
 def sonar_frame(mount: Mount) -> str:

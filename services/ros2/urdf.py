@@ -8,20 +8,22 @@ from collections.abc import Iterator
 from xml.sax.saxutils import quoteattr
 
 from common.settings import Vehicle, sonar_mounts
-from services.ros2.cdr import Value
-from services.ros2.translate import NO_TURN, sonar_frame, turned
+from services.ros2.translate import sonar_frame
 
 BODY_HEIGHT, CLEARANCE, WHEEL_RADIUS, WHEEL_WIDTH = 0.35, 0.15, 0.15, 0.08  # m
 SONAR_HEIGHT = 0.35  # m
 UPRIGHT = "1.5707963 0 0"  # roll, pitch, yaw of a wheel's cylinder
 
+Frame = tuple[str, tuple[float, float, float], float]  # name, position (m), yaw (rad)
 
-def poses(vehicle: Vehicle) -> Iterator[tuple[str, Value]]:
-    """Yield the frames and their poses in ``base_link``: translation, rotation."""
-    for name, x, y in _wheels(vehicle):
-        yield name, ((x, y, WHEEL_RADIUS), NO_TURN)
+
+def frames(vehicle: Vehicle) -> Iterator[Frame]:
+    """Yield the frames in ``base_link``: wheels, then sonars."""
+    for end, x in (("front", vehicle.wheelbase / 2), ("rear", -vehicle.wheelbase / 2)):
+        for side, y in (("left", vehicle.track / 2), ("right", -vehicle.track / 2)):
+            yield f"wheel_{end}_{side}", (x, y, WHEEL_RADIUS), 0.0
     for mount in sonar_mounts(vehicle):
-        yield sonar_frame(mount), ((mount.x, mount.y, SONAR_HEIGHT), turned(mount.yaw))
+        yield sonar_frame(mount), (mount.x, mount.y, SONAR_HEIGHT), mount.yaw
 
 
 def describe(vehicle: Vehicle, prefix: str) -> str:
@@ -30,21 +32,14 @@ def describe(vehicle: Vehicle, prefix: str) -> str:
     wheel = f'<cylinder radius="{WHEEL_RADIUS}" length="{WHEEL_WIDTH}"/>'
     height = CLEARANCE + BODY_HEIGHT / 2
     parts = [_link(f"{prefix}base_link", f"0 0 {height}", "0 0 0", body)]
-    for name, x, y in _wheels(vehicle):
-        parts.append(_link(prefix + name, "0 0 0", UPRIGHT, wheel))
-        parts.append(_joint(prefix, name, f"{x} {y} {WHEEL_RADIUS}", 0.0))
-    for mount in sonar_mounts(vehicle):
-        name = sonar_frame(mount)
-        parts.append(f"<link name={quoteattr(prefix + name)}/>")
-        parts.append(_joint(prefix, name, f"{mount.x} {mount.y} {SONAR_HEIGHT}", mount.yaw))
+    for name, (x, y, z), yaw in frames(vehicle):
+        if name.startswith("wheel"):
+            parts.append(_link(prefix + name, "0 0 0", UPRIGHT, wheel))
+        else:
+            parts.append(f"<link name={quoteattr(prefix + name)}/>")
+        parts.append(_joint(prefix, name, f"{x} {y} {z}", yaw))
     inner = "\n".join(f"  {part}" for part in parts)
     return f'<?xml version="1.0"?>\n<robot name="t2">\n{inner}\n</robot>\n'
-
-
-def _wheels(vehicle: Vehicle) -> Iterator[tuple[str, float, float]]:
-    for end, x in (("front", vehicle.wheelbase / 2), ("rear", -vehicle.wheelbase / 2)):
-        for side, y in (("left", vehicle.track / 2), ("right", -vehicle.track / 2)):
-            yield f"wheel_{end}_{side}", x, y
 
 
 def _link(name: str, xyz: str, rpy: str, geometry: str) -> str:

@@ -16,8 +16,8 @@ def numbers(text: str | None) -> list[float]:
 
 
 def test_wheels_are_at_the_corners_of_wheelbase_and_track() -> None:
-    poses = {name: where for name, (where, _) in urdf.poses(VEHICLE) if "wheel" in name}
-    assert poses == {
+    wheels = {name: where for name, where, _ in urdf.frames(VEHICLE) if "wheel" in name}
+    assert wheels == {
         "wheel_front_left": (0.3, 0.25, 0.15),
         "wheel_front_right": (0.3, -0.25, 0.15),
         "wheel_rear_left": (-0.3, 0.25, 0.15),
@@ -26,18 +26,17 @@ def test_wheels_are_at_the_corners_of_wheelbase_and_track() -> None:
 
 
 def test_sonars_point_outwards() -> None:
-    poses = dict(urdf.poses(VEHICLE))
-    assert len(poses) == 12
-    where, (x, y, z, w) = poses["sonar_rear_left"]
+    sonars = {name: (where, yaw) for name, where, yaw in urdf.frames(VEHICLE) if "sonar" in name}
+    assert len(sonars) == 8
+    where, yaw = sonars["sonar_rear_left"]
     assert where == (-0.6, 0.4, 0.35)
-    assert (x, y) == (0.0, 0.0)
-    assert 2 * math.atan2(z, w) == pytest.approx(math.radians(135))
+    assert yaw == pytest.approx(math.radians(135))
 
 
 def test_the_description_has_the_frames_and_poses_of_tf_static() -> None:
     root = ElementTree.fromstring(urdf.describe(VEHICLE, "r1/"))
     assert root.get("name") == "t2"
-    poses = dict(urdf.poses(VEHICLE))
+    poses = {name: (where, yaw) for name, where, yaw in urdf.frames(VEHICLE)}
     links = [link.get("name") for link in root.findall("link")]
     assert sorted(links, key=str) == sorted(["r1/base_link", *(f"r1/{name}" for name in poses)])
     joints = root.findall("joint")
@@ -49,9 +48,9 @@ def test_the_description_has_the_frames_and_poses_of_tf_static() -> None:
         assert origin is not None
         assert joint.get("type") == "fixed"
         assert parent.get("link") == "r1/base_link"
-        where, (_, _, z, w) = poses[str(child.get("link")).removeprefix("r1/")]
+        where, yaw = poses[str(child.get("link")).removeprefix("r1/")]
         assert numbers(origin.get("xyz")) == pytest.approx(where)
-        assert numbers(origin.get("rpy")) == pytest.approx([0.0, 0.0, 2 * math.atan2(z, w)])
+        assert numbers(origin.get("rpy")) == pytest.approx([0.0, 0.0, yaw])
 
 
 def test_the_body_has_the_vehicles_size() -> None:
