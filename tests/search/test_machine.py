@@ -26,9 +26,8 @@ from common import messages as m
 from common.motion import Command
 from sim import requests as q
 from tests.search.scripted_stack import ALL_SONARS, FAULT_MM, NO_ECHO_MM, ScriptedStack
-from verification.search.bus import CLEAR, ECHO_MS, HOLD_MS, MS, Disturbance
+from verification.search.bus import CLEAR, ECHO_MS, HOLD_MS, Disturbance
 from verification.search.condition_books import IGNORED, NEEDED
-from verification.search.oracle import STEP_NS
 from verification.search.stack import PENDANT
 
 PATIENCE = 3  # rules
@@ -408,7 +407,3 @@ def test_no_order_of_events_breaks_an_invariant(number: int) -> None:
 @pytest.mark.skipif(not EXAMPLES, reason="a longer search: say T2_EXAMPLES=3000, --timeout 0")
 def test_no_order_of_events_breaks_an_invariant_for_long() -> None:
     search(EXAMPLES, list(Phase), StackMachine)
-
-
-def test_time_goes_in_whole_steps() -> None:
-    assert all(delay_ms * MS % STEP_NS == 0 for delay_ms in (ECHO_MS, HOLD_MS))

@@ -1,18 +1,15 @@
-"""Rows of the fault campaign: reaction times, violations, the page."""
+"""Rows of the fault campaign: unrequested motion and violations."""
 
-import math
 from dataclasses import replace
 
 import pytest
 
 from common import motion
 from sim.trace import Command
-from verification.faults.__main__ import lines_of, page
 from verification.faults.fault import STALL_S, Fault, Outcome, Row, Sample, unrequested
 
 RUN, STOP, BRAKE = motion.Command
 FAULT = Fault("it", lambda _: 0, ("after a neutral",))
-DATE = "2026-01-02"
 
 
 def command(kind: motion.Command = RUN, linear: float = 0.8, angular: float = 0.0) -> Command:
@@ -49,11 +46,6 @@ def test_unrequested_motion(one: Command, is_unrequested: bool) -> None:
     assert unrequested([command(), one]) is is_unrequested
 
 
-def test_both_the_first_stop_and_the_last_move_count() -> None:
-    made = [sample(0.010, 0.0), sample(0.010, 0.030), sample(None, 0.0)]
-    assert [one.reaction_s for one in made] == [0.010, 0.030, math.inf]
-
-
 @pytest.mark.parametrize(
     ("made", "found"),
     [
@@ -76,17 +68,3 @@ def test_both_the_first_stop_and_the_last_move_count() -> None:
 )
 def test_violations(made: Row, found: list[str]) -> None:
     assert made.violations == found
-
-
-def test_the_page_has_the_rows_of_the_catalogue() -> None:
-    good = row(sample(0.001), sample(0.002)).line(DATE)
-    assert good == (
-        "| it | 2 | 20.0 ms | 1.0 ms | 2.0 ms | 0.0 ms | after a neutral | 2026-01-02 | ok |"
-    )
-    lines = {name: good.replace("it", name, 1) for name in ("estop", "contact")}
-    text = page(lines | {"no such row": good})
-    assert lines_of(text).items() >= lines.items()
-    assert "no such row" not in text
-    assert "All rows are within their limits." in text
-    wrong = row(sample(outcome=None)).line(DATE).replace("it", "estop", 1)
-    assert "Outside their limits: estop." in page(lines | {"estop": wrong})

@@ -1,10 +1,10 @@
-"""The gate: which tests belong to a core, which survivors it refuses, and one real run."""
+"""The gate: which survivors it refuses, and one real run."""
 
 from pathlib import Path
 
 import pytest
 
-from verification.mutation.selection import changed, cores
+from verification.mutation.selection import cores
 from verification.mutation.trial import Survivor, complaints, marked, run
 
 ROOT = Path(__file__).parents[3]
@@ -24,23 +24,6 @@ def _in_the_root(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
 
 
-def test_the_tests_of_a_core_are_those_of_its_folder_or_name() -> None:
-    found = cores()
-    folder = sorted(map(str, Path("tests/safety/core").glob("test_*.py")))
-    assert found["services/safety/core/policy.py"] == folder
-    assert found["common/motion.py"] == ["tests/common/test_motion.py"]
-    assert found["services/relay/core.py"][0] == "tests/relay/test_core.py"
-
-
-def test_only_changed_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    def git(*words: str) -> str:
-        return "services/safety/core/planning.py\ndocs/x.md" if words[0] == "diff" else "abc"
-
-    monkeypatch.setattr("verification.mutation.selection._git", git)
-    both = {"services/safety/core/planning.py": ["a"], "services/relay/core.py": ["b"]}
-    assert changed(both) == {"services/safety/core/planning.py": ["a"]}
-
-
 def test_as_many_survive_as_the_mark_gives() -> None:
     assert marked(SOURCE) == {"return x < 1": 2}
     assert complaints(SOURCE, [survivor(), survivor(outcome="endless")]) == []
@@ -49,10 +32,6 @@ def test_as_many_survive_as_the_mark_gives() -> None:
     other = [survivor(), survivor(), survivor("    return 0", "untested")]
     (complaint,) = complaints(SOURCE, other)
     assert complaint.startswith("1 survivors, 0 marked as equivalent: return 0\nuntested\n---")
-
-
-def test_a_mark_needs_a_reason() -> None:
-    assert not marked(SOURCE.replace(" x is never 1.", ""))
 
 
 @pytest.mark.campaign

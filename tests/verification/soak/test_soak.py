@@ -21,10 +21,6 @@ def wrong(record: Record) -> list[str]:
     return [what for what, _, fine in results(record) if not fine]
 
 
-def test_a_soak_that_observed_nothing() -> None:
-    assert set(wrong(Record())) == {"log", "faults"}
-
-
 RESOURCES = "safety: threads, descriptors"
 
 
