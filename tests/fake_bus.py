@@ -1,15 +1,20 @@
 """A bus without a router: records what is published and called, and injects messages."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from msgspec import Struct
 
 from common import clock
 from common.bus.bus import Arrival, Bus
+from common.config import Loaded
 from common.keys import Call, Topic
 from common.messages import Message
+from common.service import Node
+from common.settings import Shared
 from verification.harness.bus import at
+
+C = TypeVar("C", bound=Shared)
 
 
 class FakeBus(Bus):
@@ -17,6 +22,7 @@ class FakeBus(Bus):
 
     def __init__(self) -> None:
         self.handlers: dict[str, list[Callable[[Arrival[Any]], None]]] = {}
+        self.served: dict[str, Callable[[Any, Any], None]] = {}
         self.asked: list[tuple[str, Any]] = []
         self.answers: list[tuple[Callable[[Any], None], Callable[[str], None]]] = []
         self.estops = 0
@@ -26,6 +32,10 @@ class FakeBus(Bus):
         """Store the handler for ``deliver``; the depth is ignored."""
         names.pop("depth", None)
         self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
+
+    def serve(self, call: Call[Any, Any], handler: Any) -> None:
+        """Store the handler of a call."""
+        self.served[call.path] = handler
 
     def call(
         self, call: Call[Any, Any], request: Struct, on_reply: Any, on_refusal: Any,
@@ -52,3 +62,26 @@ class FakeBus(Bus):
         now_ns = clock.now_ns() if received_ns is None else received_ns
         for handler in self.handlers[declared or key]:
             handler(Arrival(message, key, now_ns, None))
+
+
+class FakeNode(Node[C]):
+    """A node on a ``FakeBus``; its loop does not run."""
+
+    def __init__(self, name: str, config: C) -> None:
+        self.events: list[str] = []
+        super().__init__(name, Loaded(config, {}))
+
+    def open_bus(self) -> FakeBus:
+        """Return the fake."""
+        self.fake = FakeBus()
+        return self.fake
+
+    def event(self, name: str, *args: Any, **about: Any) -> None:
+        """Record the name of an event, and publish it."""
+        self.events.append(name)
+        super().event(name, *args, **about)
+
+    def sent(self, topic: Topic[Any]) -> tuple[int, Any]:
+        """Return the number of messages sent on a topic, and the last one."""
+        publisher = next(each for each in self.bus.publishers if each.topic is topic)
+        return publisher._seq, publisher.last

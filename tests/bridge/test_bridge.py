@@ -6,7 +6,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -149,16 +148,6 @@ def test_a_killed_supervisor_leaves_a_vehicle_that_was_braked() -> None:
         assert made.times[-1] - killed_s < 5.0
 
 
-@pytest.fixture
-def _signals() -> Iterator[None]:
-    """Give the handlers back that ``serve`` replaces."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
-
-
-@pytest.mark.usefixtures("_signals")
 def test_a_bug_of_ours_leaves_a_break() -> None:
     def bug(_: int) -> None:
         made.wait_for(MotionKind.STOP)

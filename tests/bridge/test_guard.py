@@ -49,12 +49,8 @@ first = lives.read_text() == "x"
 @pytest.fixture
 def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Board]:
     monkeypatch.chdir(tmp_path)
-    numbers = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
-    before = {number: signal.getsignal(number) for number in numbers}
     with board() as it:
         yield it
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 def guard_of(made: Board, code: str) -> Guard:

@@ -63,12 +63,3 @@ def test_the_emergency_stop_goes_first_then_what_moves_the_wheels(topic: Topic[M
 def test_events_alone_have_a_history() -> None:
     """A motion that is replayed would move the robot on its own."""
     assert {topic.path for topic in TOPICS if topic.service.history} == {"evt/{service}"}
-
-
-def test_schemas_are_by_path_and_in_its_order() -> None:
-    by_path = {topic.path: topic for topic in TOPICS}
-    made = keys.schemas([by_path["tel/bridge/link"], by_path["tel/bridge/bumper"]])
-    assert list(made) == ["tel/bridge/bumper", "tel/bridge/link"]
-    bumper = made["tel/bridge/bumper"]["$defs"]["Bumper"]
-    assert bumper["properties"]["pressed"] == {"type": "boolean"}
-    assert "pressed" in bumper["required"]

@@ -96,14 +96,6 @@ def test_the_level_decides_and_of_libraries_warnings_count(
         assert entry["service"] == "bridge"
 
 
-def test_an_exception_is_one_field_of_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    try:
-        raise ValueError("broken")
-    except ValueError:
-        line = written(monkeypatch, Log(), "exception", library="asyncio")
-    assert json.loads(line)["exception"].endswith("ValueError: broken")
-
-
 def test_each_format_holds_every_value() -> None:
     line = log.Formatter("up", "json").format(record(logging.INFO, "Größe × 2 %s", at=Path("a")))
     assert json.loads(line) | {"timestamp": ""} == {

@@ -1,7 +1,6 @@
 """The loop: its timers, its sockets, what other threads post, and its end."""
 
 import contextlib
-import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -129,15 +128,6 @@ def test_a_stop_before_run_is_kept_and_it_runs_again_after_that(loop: Loop) -> N
     assert calls == [1]
 
 
-def test_a_stop_from_another_thread_ends_an_idle_loop(loop: Loop) -> None:
-    thread = threading.Thread(target=loop.run)
-    thread.start()
-    time.sleep(0.05)  # it sleeps
-    loop.stop()
-    thread.join(20)
-    assert not thread.is_alive()
-
-
 # --- other threads, sockets ---------------------------------------------------------------------
 
 
@@ -165,16 +155,3 @@ def test_posts_of_many_threads_arrive_all_and_in_order_in_one_thread() -> None:
     assert len(homes) == 1
     for sender in range(3):
         assert [number for who, number in seen if who == sender] == list(range(2000))
-
-
-def test_a_socket_is_read_when_there_is_something(loop: Loop) -> None:
-    ours, theirs = socket.socketpair()
-    got: list[bytes] = []
-    with ours, theirs:
-        loop.watch(ours, lambda _: got.append(ours.recv(100)))
-        turn(loop)
-        assert got == []
-        theirs.send(b"frame")
-        loop.every(0.01, lambda _: loop.stop() if got else None)
-        loop.run()
-    assert got == [b"frame"]

@@ -4,6 +4,8 @@ import contextlib
 import json
 import os
 import signal
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,10 +22,19 @@ from common.config import Sources, load
 from common.messages import MAX_TEXT, Event, Health
 from common.service import Node, run, serve
 from common.settings import Shared
+from tests.cli.processes import running, sets
 from tests.common.bus_fixture import BusFixture
-from tests.common.program import SPECIMEN, Program, on, program
 from tests.common.systemd_manager import Manager
-from verification.harness.waiting import wait_until
+from verification.harness.waiting import PATIENCE_S, wait_until
+
+
+def specimen(
+    log: Path, kind: str, endpoint: str, robot: str
+) -> contextlib.AbstractContextManager["subprocess.Popen[bytes]"]:
+    """Run the example service on a router, with its log in a file."""
+    given = sets(f"bus.connect={endpoint}", f"robot.id={robot}")
+    return running([sys.executable, "-m", "tests.common.example_service", kind, *given], log)
+
 
 # --- settings -----------------------------------------------------------------------------------
 
@@ -45,10 +56,11 @@ def test_a_wrong_setting_ends_it_before_anything_is_built(
     assert capsys.readouterr().err == f"odom: {text}\n"
 
 
-def test_what_cannot_be_opened_ends_it(shared_router: str) -> None:
-    with program(SPECIMEN, "refused", *on(shared_router, "refused")) as it:
-        assert it.code() == EXIT_LINK == 69
-        assert it.events() == ["port 4002 is taken"]
+def test_what_cannot_be_opened_ends_it(shared_router: str, tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with specimen(log, "refused", shared_router, "refused") as it:
+        assert it.wait(PATIENCE_S) == EXIT_LINK == 69
+    assert json.loads(log.read_text())["event"] == "port 4002 is taken"
 
 
 # --- on a router --------------------------------------------------------------------------------
@@ -71,18 +83,19 @@ class Witness:
         )
 
 
+Lived = tuple[BusFixture, Path, Witness]
+
+
 @pytest.fixture(scope="module")
-def lived(shared_router: str) -> Iterator[tuple[BusFixture, Program, Witness]]:
+def lived(shared_router: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lived]:
     """Run one service for all the tests that only look at it."""
+    log = tmp_path_factory.mktemp("lived") / "log"
     with BusFixture(shared_router) as buses:
         witness = Witness(buses.robot)
         buses.bus(witness.declare)
-        with program(SPECIMEN, "plain", *on(shared_router, buses.robot)) as it:
+        with specimen(log, "plain", shared_router, buses.robot):
             wait_until(lambda: len(witness.health) >= 2, "health")
-            yield buses, it, witness
-
-
-Lived = tuple[BusFixture, Program, Witness]
+            yield buses, log, witness
 
 
 def info(buses: BusFixture, part: str) -> dict[str, object]:
@@ -112,13 +125,13 @@ def test_its_health_comes_every_second(lived: Lived) -> None:
 
 
 def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
-    buses, it, _ = lived
+    buses, log, _ = lived
     witness = Witness(buses.robot)
     buses.bus(witness.declare)
     wait_until(lambda: witness.events, "the event")
     assert witness.events[0].name == "built"
     assert witness.events[0].about == {"count": 3}
-    logged = [json.loads(line) for line in it.lines if "event_name" in line]
+    logged = [json.loads(line) for line in log.read_text().splitlines() if "event_name" in line]
     assert [(e["event"], e["event_name"], e["level"]) for e in logged] == [
         ("all is built", "built", "info")
     ]
@@ -136,23 +149,27 @@ def test_its_schemas_settings_and_last_values_are_looked_up(lived: Lived) -> Non
     assert last[keys.HEALTH.on(buses.robot, service="specimen")]["service"] == "specimen"
 
 
-def test_a_bug_of_ours_ends_it_though_its_session_is_open(shared_router: str) -> None:
-    with program(SPECIMEN, "failing", *on(shared_router, "failing")) as it:
-        assert it.code() == 1
-        assert "RuntimeError: a bug of ours" in it.text
+def test_a_bug_of_ours_ends_it_though_its_session_is_open(
+    shared_router: str, tmp_path: Path
+) -> None:
+    log = tmp_path / "log"
+    with specimen(log, "failing", shared_router, "failing") as it:
+        assert it.wait(PATIENCE_S) == 1
+    assert "RuntimeError: a bug of ours" in log.read_text()
 
 
-def test_sigterm_ends_it_with_its_token_though_it_finds_no_rest(buses: BusFixture) -> None:
-    """On a terminal it writes text."""
+def test_sigterm_ends_it_with_its_token_though_it_finds_no_rest(
+    buses: BusFixture, tmp_path: Path
+) -> None:
+    log = tmp_path / "log"
     witness = Witness(buses.robot)
     buses.bus(witness.declare)
-    with program(SPECIMEN, "restless", *on(buses.endpoint, buses.robot), tty=True) as it:
+    with specimen(log, "restless", buses.endpoint, buses.robot) as it:
         wait_until(lambda: witness.tokens and witness.health, "the token")
         key = keys.live_key(buses.robot, "specimen", f"{witness.health[0].boot:x}")
-        it.process.send_signal(signal.SIGTERM)
-        assert it.code() == 0
-    assert it.text.index("stopping") < it.text.index("stopped")
-    assert not any(line.startswith("{") for line in it.lines)
+        it.terminate()
+        assert it.wait(PATIENCE_S) == 0
+    assert log.read_text().index("stopping") < log.read_text().index("stopped")
     wait_until(lambda: witness.tokens == [(key, True), (key, False)], "the token's end")
 
 
@@ -160,15 +177,11 @@ def test_sigterm_ends_it_with_its_token_though_it_finds_no_rest(buses: BusFixtur
 
 
 @pytest.fixture
-def node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Node[Shared]]:
-    """A service without a router; gives the handlers back that ``serve`` replaces."""
+def node(monkeypatch: pytest.MonkeyPatch) -> Node[Shared]:
+    """A service without a router."""
     monkeypatch.delenv(RUNTIME_ENV, raising=False)
-    numbers = signal.SIGINT, signal.SIGTERM
-    before = {number: signal.getsignal(number) for number in numbers}
-    sets = ["bus.connect=tcp/127.0.0.1:1"]
-    yield Node("teleop", load(Shared, Sources(environ={}, sets=sets)))
-    for number, handler in before.items():
-        signal.signal(number, handler)
+    given = ["bus.connect=tcp/127.0.0.1:1"]
+    return Node("teleop", load(Shared, Sources(environ={}, sets=given)))
 
 
 @pytest.mark.parametrize("first", ["a bug", "a signal"])

@@ -14,22 +14,11 @@ from verification.harness.bus import bus_on, running
 from verification.harness.waiting import wait_until
 
 
-@pytest.fixture
-def bus() -> FakeBus:
-    return FakeBus()
-
-
-def test_the_newest_heartbeat_is_echoed(bus: FakeBus) -> None:
-    source = DriveSource(bus, "demo")
-    for heartbeat in (7, 8):
-        bus.deliver(keys.SAFETY, safety_state(heartbeat=heartbeat))
-    assert source.request(0.0, 0.0).echo == 8
-
-
 @pytest.mark.parametrize(("passed_on", "denied"), [(False, True), (True, False), (None, False)])
 def test_who_may_only_watch_is_denied(
-    bus: FakeBus, monkeypatch: pytest.MonkeyPatch, passed_on: bool | None, denied: bool
+    monkeypatch: pytest.MonkeyPatch, passed_on: bool | None, denied: bool
 ) -> None:
+    bus = FakeBus()
     monkeypatch.setattr(Publisher, "passed_on", passed_on)
     reported: list[str] = []
     source = DriveSource(bus, "demo", lambda: reported.append("denied"))

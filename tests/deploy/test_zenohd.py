@@ -137,7 +137,7 @@ def test_the_newest_message_is_read_over_http(stack: RunningStack, tmp_path: Pat
 
 
 @contextmanager
-def secured(folder: Path, *words: str) -> Iterator[tuple[str, list[str], Site]]:
+def secured(folder: Path) -> Iterator[tuple[str, list[str], Site]]:
     """Run zenohd with a site's access rules; yield its TLS, and the puts on board."""
     site = Site(folder / "keys")
     site.member("viewer", "rest")
@@ -145,7 +145,7 @@ def secured(folder: Path, *words: str) -> Iterator[tuple[str, list[str], Site]]:
     own = site.member("robot", "001", "--address", "127.0.0.1")
     outside, onboard = f"tls/127.0.0.1:{free_port()}", f"unixsock-stream/{folder}/bus.sock"
     given = [f"bus.{name}={getattr(own, name)}" for name in (*FILES, "members")]
-    started = [*command(folder, [*given, f"bus.listen={outside},{onboard}"]), *words]
+    started = command(folder, [*given, f"bus.listen={outside},{onboard}"])
     puts: list[str] = []
 
     def declare(bus: Bus) -> None:
@@ -176,13 +176,3 @@ def test_permissions_over_http_are_those_of_the_certificate(tmp_path: Path) -> N
                 if role == "driver":
                     wait_until(lambda: puts, "a driver's emergency stop")
             assert puts == [keys.estop_key("001")] * (role == "driver")
-
-
-def test_a_plugin_of_the_router_bypasses_its_access_control(tmp_path: Path) -> None:
-    """The reason for a separate zenohd for REST; when this fails, it is not needed any more."""
-    port = free_port()
-    plugin = f'{{__required__: true, http_port: "127.0.0.1:{port}"}}'
-    with secured(tmp_path, f"--cfg=plugins/rest:{plugin}") as (_, puts, _):
-        wait_until(lambda: rows(port, INFO), "an answer")
-        http(port, keys.MOTION.on("001"), "PUT")
-        wait_until(lambda: puts, "a motion, which only safety may publish")

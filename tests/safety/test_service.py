@@ -21,6 +21,7 @@ from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
 from services.safety.service import SafetyService
+from tests.common.bus_fixture import until_received
 from tests.factories import safety_state
 from verification.harness.bus import at, joined, running
 from verification.harness.waiting import wait_until
@@ -86,23 +87,13 @@ def safety(shared_router: str) -> Iterator[Safety]:
             yield made
 
 
-def repeat_until(do: Callable[[], object], true: Callable[[], object], what: str) -> None:
-    """Do it repeatedly: samples right after a declaration may be lost."""
-
-    def tried() -> object:
-        do()
-        return true()
-
-    wait_until(tried, what)
-
-
 def test_it_stops_from_the_beginning_judges_a_hit_and_answers_calls(safety: Safety) -> None:
     wait_until(lambda: len(safety.motions) > 20 and len(safety.states) > 5, "a stream of both")
     assert "run" not in {motion.command for motion in safety.motions}
     beats = [state.heartbeat for state in safety.states]
     assert beats == sorted(set(beats))
     bumper, velocity = (safety.drive.publisher(each) for each in (keys.BUMPER, keys.VELOCITY))
-    repeat_until(
+    until_received(
         lambda: (velocity.put(Velocity(linear=0.0, angular=0.0)), bumper.put(Bumper(pressed=True))),
         lambda: safety.brakes,
         "the brake",
@@ -122,7 +113,7 @@ def test_refused_requests_are_counted_by_their_reason(safety: Safety) -> None:
     drive, other = (safety.bus.publisher(keys.DRIVE, source=name) for name in ("demo", "nobody"))
     key = keys.DRIVE.on(ROBOT, source="demo")
     wanted = {"refused_late", "refused_unknown_source", "refused_not_a_request"}
-    repeat_until(
+    until_received(
         lambda: (
             drive.put(Drive(linear=0.0, angular=0.0, echo=-1)),
             other.put(Drive(linear=0.0, angular=0.0, echo=-1)),
@@ -136,7 +127,7 @@ def test_refused_requests_are_counted_by_their_reason(safety: Safety) -> None:
 
 @pytest.mark.parametrize("robots", [ROBOT, "berlin-$*", "*"])
 def test_an_estop_by_delete_for_one_a_site_or_all_latches(safety: Safety, robots: str) -> None:
-    repeat_until(
+    until_received(
         lambda: safety.session.delete(keys.estop_key(robots)),
         lambda: safety.states and "estop" in safety.states[-1].latched,
         "a latched emergency stop",
@@ -145,7 +136,7 @@ def test_an_estop_by_delete_for_one_a_site_or_all_latches(safety: Safety, robots
 
 def test_what_the_bridge_measures_is_not_taken_from_the_router(safety: Safety) -> None:
     measured = [topic for topic in keys.TOPICS if topic.publisher == "bridge"]
-    repeat_until(
+    until_received(
         lambda: [
             safety.session.put(topic.on(ROBOT, side=side), b"\xc1")
             for topic in measured
@@ -156,7 +147,7 @@ def test_what_the_bridge_measures_is_not_taken_from_the_router(safety: Safety) -
     )
     assert safety.node.bus.counters["undecodable"] == 0
     bumper = safety.drive.publisher(keys.BUMPER)
-    repeat_until(
+    until_received(
         lambda: bumper.put(Bumper(pressed=True)),
         lambda: safety.brakes,
         "what comes by the drive link",

@@ -17,7 +17,7 @@ from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from tests.factories import contact_state
 from tests.teleop.inputs import answer
-from tests.teleop.support import FakeNode
+from tests.teleop.support import TeleopNode
 from verification.harness.waiting import PATIENCE_S
 
 
@@ -35,7 +35,7 @@ class Screen:
     """A node with its controller and screen."""
 
     def __init__(self) -> None:
-        self.node = FakeNode()
+        self.node = TeleopNode()
         self.controller = Controller(self.node, self.node.event_log)
         self.ended = False
         self.now_ns = 100 * NS_PER_S
@@ -50,11 +50,11 @@ class Screen:
         """Run the controller's ticks and return the requested speeds in order."""
         sent = []
         for _ in range(count):
-            before, _ = self.node.requests
+            before, _ = self.node.sent(keys.DRIVE)
             self.answer()
             self.controller.tick(self.now_ns)
             self.now_ns += NS_PER_S // 20
-            after, last = self.node.requests
+            after, last = self.node.sent(keys.DRIVE)
             if after > before and last is not None:
                 sent.append(last.linear)
         return sent
@@ -73,19 +73,6 @@ class Screen:
         """Return the text of a panel; empty before it exists."""
         panels = self.app.query(Panel).filter(f"#{name}")
         return "".join(panel.shown.plain for panel in panels if panel.shown)
-
-    def fits(self, *names: str) -> bool:
-        """Return whether these panels are shown without clipping."""
-        for name in names:
-            panel, lines = self.app.query_one(f"#{name}", Panel), self.text_of(name).split("\n")
-            room = panel.content_size
-            if (
-                not self.app.screen.region.contains_region(panel.region)
-                or len(lines) > room.height
-                or max(map(len, lines)) > room.width
-            ):
-                return False
-        return True
 
     @asynccontextmanager
     async def shown(self, size: tuple[int, int] = (80, 24)) -> AsyncIterator[Pilot[None]]:

@@ -3,11 +3,9 @@
 from typing import Any
 
 from common import keys
-from common.config import Loaded
 from common.freshness import NS_PER_S
 from common.messages import Drive, SafetyState
 from common.motion import Twist
-from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
 from services.teleop.core.controls import Stick
@@ -15,35 +13,17 @@ from services.teleop.core.hold import Press
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import EventLog, View
 from tests.factories import contact_state, safety_state
-from tests.fake_bus import FakeBus
+from tests.fake_bus import FakeNode
 from tests.teleop.inputs import PERIOD_NS, answer
 
 
-class FakeNode(Node[TeleopConfig]):
-    """A node on a ``FakeBus``; its logs go to an event log, its loop does not run."""
+class TeleopNode(FakeNode[TeleopConfig]):
+    """A node whose logs go to an event log."""
 
     def __init__(self) -> None:
         self.event_log = EventLog()
-        config = TeleopConfig()
-        super().__init__("teleop", Loaded(config, {}))
-        self.event_log.capture_logs(config.log)
-
-    def open_bus(self) -> FakeBus:
-        """Return the fake."""
-        self.fake = FakeBus()
-        return self.fake
-
-    @property
-    def requests(self) -> tuple[int, Drive | None]:
-        """The number of drive requests sent, and the last one."""
-        publisher = next(p for p in self.bus.publishers if p.topic is keys.DRIVE)
-        return publisher._seq, publisher.last
-
-    @property
-    def events(self) -> int:
-        """The number of events published."""
-        publisher = next(p for p in self.bus.publishers if p.topic is keys.EVENTS)
-        return publisher._seq
+        super().__init__("teleop", TeleopConfig())
+        self.event_log.capture_logs(self.config.log)
 
 
 def view(**fields: Any) -> View:
@@ -73,7 +53,7 @@ class Operator:
     """A controller with a simulated clock that advances by ticks."""
 
     def __init__(self) -> None:
-        self.node = FakeNode()
+        self.node = TeleopNode()
         self.controller = Controller(self.node, self.node.event_log)
         self.now_ns = 100 * NS_PER_S
         self.near = True  # the terminal answers at once
@@ -100,9 +80,9 @@ class Operator:
     def ticks(self, count: int) -> list[Drive | None]:
         sent = []
         for _ in range(count):
-            before, _ = self.node.requests
+            before, _ = self.node.sent(keys.DRIVE)
             self.controller.tick(self.now_ns)
-            after, last = self.node.requests
+            after, last = self.node.sent(keys.DRIVE)
             assert after - before <= 1
             sent.append(last if after > before else None)
             self.now_ns += PERIOD_NS

@@ -1,13 +1,14 @@
 """Publish and subscribe over a real router: what arrives, and what is refused."""
 
 import threading
+from collections import Counter
 from collections.abc import Callable
 
 import msgpack
 import zenoh
 
 from common import clock, keys
-from common.bus.bus import Arrival, Bus
+from common.bus.bus import Arrival, Bus, OverwritingQueue
 from common.errors import MessageError
 from common.messages import Bumper, Drive, Event, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
@@ -121,6 +122,24 @@ def test_a_handler_that_is_behind_gets_the_newest(buses: BusFixture) -> None:
     assert received[-depth:] == list(range(last - depth + 1, last + 1))
     publisher.put(Bumper(pressed=False))
     wait_until(lambda: received[-1] == last + 1, "the one after")
+
+
+def test_an_item_that_comes_during_a_turn_is_of_the_next_turn() -> None:
+    """Also the newest one is never left in the queue, and a flood does not hold the owner."""
+    taken: list[int] = []
+    posted: list[Callable[[], None]] = []
+
+    def take(item: int) -> None:
+        taken.append(item)
+        if item < 3:
+            queue.put(item + 1)
+
+    queue = OverwritingQueue(3, take, posted.append, Counter())
+    queue.put(0)
+    for turn in range(4):
+        posted.pop()()
+        assert taken == list(range(turn + 1))
+    assert not posted
 
 
 def test_any_put_and_any_delete_is_an_emergency_stop(buses: BusFixture) -> None:

@@ -160,12 +160,3 @@ def test_a_request_without_payload_is_one_of_defaults(
     assert msgpack.unpackb(reply.ok.payload.to_bytes())["text"] == "done"
     assert str(reply.ok.encoding) == "application/msgpack;t2.v1.ResetDone"
     assert server.requests[-1] == ResetRequest()
-
-
-def test_information_answers_any_query(buses: BusFixture) -> None:
-    key = keys.info_key(buses.robot, "bridge", "config")
-    buses.bus(lambda bus: bus.answer(key, lambda: b'{"a": 1}', "application/json"))
-    (reply,) = buses.session().get(keys.info_key(buses.robot, "*", "*"))
-    assert reply.ok is not None
-    assert reply.ok.payload.to_bytes() == b'{"a": 1}'
-    assert (str(reply.ok.key_expr), str(reply.ok.encoding)) == (key, "application/json")

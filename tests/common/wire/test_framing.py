@@ -20,10 +20,6 @@ NAMES = [type(frame).__name__ for _, frame in EACH]
 garbage = st.binary(max_size=12).filter(lambda raw: b"G" not in raw)
 
 
-def read(raw: bytes, kinds: Kinds) -> list[Received | Rejected]:
-    return read_all(raw, kinds)
-
-
 def header(size: int, command: int, crc: int) -> bytes:
     return HEADER.pack(OPENING.pack(MAGIC, size, command), crc)
 
@@ -42,7 +38,7 @@ def rejected(parts: Sequence[Received | Rejected]) -> list[Reason]:
 @given(commands, reports)
 def test_every_frame_comes_back(command: Frame, report: Frame) -> None:
     for frame, kinds in (command, TO_BOARD), (report, FROM_BOARD):
-        assert frames(read(framing.pack(frame), kinds)) == [frame]
+        assert frames(read_all(framing.pack(frame), kinds)) == [frame]
 
 
 @given(st.lists(st.tuples(garbage, reports), max_size=6), garbage)
@@ -50,7 +46,7 @@ def test_frames_with_garbage_between_are_all_found(
     pieces: list[tuple[bytes, Frame]], tail: bytes
 ) -> None:
     raw = b"".join(rubbish + framing.pack(frame) for rubbish, frame in pieces) + tail
-    parts = read(raw, FROM_BOARD)
+    parts = read_all(raw, FROM_BOARD)
     assert frames(parts) == [frame for _, frame in pieces]
     runs = sum(bool(rubbish) for rubbish, _ in pieces) + bool(tail)
     assert rejected(parts) == [Reason.NO_MAGIC] * runs
@@ -63,7 +59,7 @@ def test_frames_with_garbage_between_are_all_found(
 def test_every_truncation_is_refused(kinds: Kinds, frame: Frame) -> None:
     raw = framing.pack(frame)
     for length in range(1, len(raw)):
-        parts = read(raw + raw[:length], kinds)
+        parts = read_all(raw + raw[:length], kinds)
         assert frames(parts) == [frame]
         assert rejected(parts) == [Reason.NO_MAGIC if length < 2 else Reason.TRUNCATED]
 
@@ -74,7 +70,7 @@ def test_every_flipped_bit_of_a_payload_is_refused(kinds: Kinds, frame: Frame) -
     for bit in range(HEADER.size * 8, len(raw) * 8):
         damaged = bytearray(raw)
         damaged[bit // 8] ^= 1 << bit % 8
-        parts = read(bytes(damaged), kinds)
+        parts = read_all(bytes(damaged), kinds)
         assert parts[0].raw.startswith(MAGIC)
         assert not frames(parts)
         assert rejected(parts)[0] is Reason.BAD_CRC
@@ -91,7 +87,7 @@ headers = st.builds(
 
 @given(st.lists(headers, max_size=4), st.booleans())
 def test_almost_frames_never_raise_and_no_byte_is_lost(raw: list[bytes], to_board: bool) -> None:
-    read(b"".join(raw), TO_BOARD if to_board else FROM_BOARD)
+    read_all(b"".join(raw), TO_BOARD if to_board else FROM_BOARD)
 
 
 # --- each reason ----------------------------------------------------------------------------
@@ -131,15 +127,15 @@ REASONS = [
 @pytest.mark.parametrize(("raw", "reason", "detail"), REASONS)
 def test_each_reason_is_named_with_its_detail(raw: bytes, reason: Reason, detail: str) -> None:
     rejected = Rejected(reason, raw, detail)
-    assert read(raw, TO_BOARD) == [rejected]
+    assert read_all(raw, TO_BOARD) == [rejected]
     whole = framing.pack(DistanceQuery())
-    assert read(whole + raw, TO_BOARD) == [Received(DistanceQuery(), whole), rejected]
+    assert read_all(whole + raw, TO_BOARD) == [Received(DistanceQuery(), whole), rejected]
 
 
 def test_reading_goes_on_at_the_next_magic_inside_a_bad_frame() -> None:
     inner = framing.pack(DistanceQuery())
     outer = frame_bytes(0x1234, inner)
-    parts = read(outer, TO_BOARD)
+    parts = read_all(outer, TO_BOARD)
     assert rejected(parts) == [Reason.UNKNOWN_ID]
     assert frames(parts) == [DistanceQuery()]
 
@@ -147,11 +143,11 @@ def test_reading_goes_on_at_the_next_magic_inside_a_bad_frame() -> None:
 def test_a_magic_inside_a_good_payload_is_payload() -> None:
     frame = MotionCommand(MotionKind.RUN, int.from_bytes(b"GS", "little"), 0)
     assert MAGIC in frame.to_bytes()
-    assert frames(read(framing.pack(frame), TO_BOARD)) == [frame]
+    assert frames(read_all(framing.pack(frame), TO_BOARD)) == [frame]
 
 
 def test_a_frame_of_the_other_direction_is_refused() -> None:
-    assert rejected(read(framing.pack(LedReport(True)), TO_BOARD)) == [Reason.BAD_SIZE]
+    assert rejected(read_all(framing.pack(LedReport(True)), TO_BOARD)) == [Reason.BAD_SIZE]
 
 
 # --- CRC ------------------------------------------------------------------------------------

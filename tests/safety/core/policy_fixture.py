@@ -14,11 +14,11 @@ from common.messages import (
     Driver,
     EstopKeepalive,
     Limit,
-    Link,
     Message,
     Mileage,
     Motion,
     RangeStatus,
+    Release,
     ReleaseRequest,
     ResetRequest,
     SafetyState,
@@ -38,8 +38,9 @@ from services.safety.core.inputs import (
     Trigger,
 )
 from services.safety.core.policy import Policy
-from services.safety.core.state import Verdict
+from services.safety.core.state import Reply, Verdict
 from services.safety.report import state_message, text
+from tests.factories import link
 
 TICK_S = 0.02
 FREE: tuple[float | None, ...] = (None,) * 8
@@ -48,22 +49,13 @@ NO_ECHO_TEXT = (
     "`echo`."
 )
 HOLD_TEXT = "The bumper was hit. Hold release to move off, forward or backward."
+UNKNOWN_TEXT = (
+    "Safety has restarted: the travel of an earlier release is unknown. Push the vehicle off by "
+    "hand, then reset."
+)
 USED_UP_TEXT = "The distance for moving off is used up. Push the vehicle off by hand, then reset."
 DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
 NO_ECHO: tuple[RangeStatus, ...] = ("no_echo",) * 8
-
-
-def link(state: str = "up", armed: bool = True) -> Link:
-    return Link(
-        state=state,  # type: ignore[arg-type]
-        board="127.0.0.1:4003",
-        epoch=0,
-        armed=armed,
-        waiting="" if armed else "a neutral motion from safety is due",
-        rates={},
-        rejected={},
-        round_trip=None,
-    )
 
 
 class PolicyFixture:
@@ -225,11 +217,8 @@ class PolicyFixture:
 
     def reset(self, *causes: int, echo: int | None = None) -> str:
         """Reset these causes, all by default; return the reason of a refusal."""
-        reply = self.decide(
-            ResetRequest(echo=echo or self.echo, causes=causes or self.latched())
-        ).reply
-        assert reply
-        return "" if reply.done else reply.text
+        self.decide(ResetRequest(echo=echo or self.echo, causes=causes or self.latched()))
+        return "" if self.reply().done else self.reply().text
 
     def hold(
         self, direction: Direction = "backward", ticks: int = 0, source: str = "teleop"
@@ -252,6 +241,17 @@ class PolicyFixture:
     def published(self) -> SafetyState:
         """Return the published state."""
         return state_message(self.policy, self.state, self.now_ns)
+
+    def release(self) -> Release:
+        """Return the published release of a latched contact."""
+        release = self.published().release
+        assert release is not None
+        return release
+
+    def reply(self) -> Reply:
+        """Return the reply to the call of the last decision."""
+        assert self.verdict.reply is not None
+        return self.verdict.reply
 
     def text(self, name: str) -> str:
         """Return the published text of a held cause."""

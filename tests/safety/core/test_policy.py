@@ -4,12 +4,10 @@ from collections.abc import Callable
 
 import pytest
 from msgspec.structs import replace
-from msgspec.structs import replace as with_fields
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import (
     Bumper,
-    Direction,
     Limits,
     SafetyState,
     Switches,
@@ -19,7 +17,8 @@ from common.motion import Twist
 from services.safety.config import Safety
 from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
 from services.safety.core.inputs import Inputs
-from tests.safety.core.policy_fixture import TICK_S, PolicyFixture, hit, link
+from tests.factories import link
+from tests.safety.core.policy_fixture import DIRECTIONS, TICK_S, UNKNOWN_TEXT, PolicyFixture, hit
 
 
 @pytest.mark.parametrize(
@@ -125,8 +124,8 @@ def test_inputs_that_fail_again_and_again_latch() -> None:
 
 
 SETTLING: list[tuple[str, Trip, Trip]] = [
-    ("link", _set("link", link("lost")), _set("link", link())),
-    ("link", _set("link", link("never")), _set("link", link())),
+    ("link", _set("link", link(state="lost")), _set("link", link())),
+    ("link", _set("link", link(state="never")), _set("link", link())),
     ("unarmed", _set("link", link(armed=False)), _set("link", link())),
     (
         "switches",
@@ -166,7 +165,7 @@ def test_a_lost_input_inhibits_until_it_settled_and_a_neutral_request(
 
 def test_settling_takes_half_a_second_of_good_inputs() -> None:
     fixture = PolicyFixture().ready()
-    fixture.link = link("lost")
+    fixture.link = link(state="lost")
     fixture.tick()
     fixture.link = link()
     fixture.tick(round(0.5 / TICK_S) - 1)
@@ -368,18 +367,13 @@ def test_a_velocity_is_unknown_until_its_first_sample() -> None:
 
 
 OLD, OWN = 5, 6
-DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
-UNKNOWN = (
-    "Safety has restarted: the travel of an earlier release is unknown. Push the vehicle off by "
-    "hand, then reset."
-)
 
 
 def successor(latched_by: int | None) -> PolicyFixture:
     """Start a service beside a bridge that remembers this."""
     fixture = PolicyFixture()
     fixture.inputs = replace(fixture.inputs, boot=OWN)
-    fixture.link = with_fields(fixture.link, latched_by=latched_by)
+    fixture.link = replace(fixture.link, latched_by=latched_by)
     return fixture
 
 
@@ -401,10 +395,10 @@ def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
     motion = fixture.motions[-1]
     assert (motion.latched, motion.predecessor) == (True, OLD)
     assert fixture.reset() == "Still present: Safety restarted while a reset was due."
-    fixture.link = with_fields(fixture.link, latched_by=OWN)  # the bridge has received our latch
+    fixture.link = replace(fixture.link, latched_by=OWN)  # the bridge has received our latch
     fixture.tick(100)
     assert fixture.reset() == ""
-    fixture.link = with_fields(fixture.link, latched_by=None)
+    fixture.link = replace(fixture.link, latched_by=None)
     fixture.drive(0.0)
     assert fixture.drive(0.5).command == "run"
 
@@ -418,19 +412,17 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
     fixture.muted = set()
     fixture.tick(50)
     assert latched(fixture.state.latches) == ("contact", "predecessor")
-    fixture.link = with_fields(fixture.link, latched_by=OWN)
+    fixture.link = replace(fixture.link, latched_by=OWN)
     fixture.tick(10)
     assert fixture.reset() == ""
-    assert fixture.verdict.reply is not None
-    assert fixture.verdict.reply.text == f"Reset, but still latched: The bumper was hit. {UNKNOWN}"
+    assert fixture.reply().text == f"Reset, but still latched: The bumper was hit. {UNKNOWN_TEXT}"
     for direction in DIRECTIONS:
         fixture.let_go()
-        assert fixture.hold(direction) == UNKNOWN
+        assert fixture.hold(direction) == UNKNOWN_TEXT
     fixture.let_go()
-    release = fixture.published().release
-    assert release is not None
+    release = fixture.release()
     assert release.left == 0.0
-    assert fixture.reset() == f"Still present: The bumper was hit. {UNKNOWN}"
+    assert fixture.reset() == f"Still present: The bumper was hit. {UNKNOWN_TEXT}"
 
 
 def test_a_motion_carries_its_verdict() -> None:

@@ -9,19 +9,16 @@ from common.freshness import NS_PER_S
 from common.messages import Direction, ReleaseRequest
 from services.safety.core.causes import BY_NAME, latched
 from services.safety.core.operator_requests import BUMPER_FREE, LET_GO, room
+from tests.factories import link
 from tests.safety.core.policy_fixture import (
     DIRECTIONS,
+    UNKNOWN_TEXT,
     USED_UP_TEXT,
     PolicyFixture,
     hit,
-    link,
 )
 
 BOTH = "The bumper was pressed in both directions. Push the vehicle off by hand, then reset."
-UNKNOWN = (
-    "Safety has restarted: the travel of an earlier release is unknown. Push the vehicle off by "
-    "hand, then reset."
-)
 PROGRAM = "nav may not release: only a source that an operator holds may."
 MOVES = "The vehicle still moves."
 LOST = "The link to the board is lost."
@@ -100,13 +97,13 @@ CASES: dict[str, tuple[Given, Direction, str]] = {
     "forward": (nothing, "forward", ""),
     "an emergency stop": (lambda f: f.estop(), "backward", "Emergency stop."),
     "a stop to reset": (stopped, "backward", "Emergency stop. Reset first."),
-    "no link": (feed(link=link("lost")), "backward", LOST),
+    "no link": (feed(link=link(state="lost")), "backward", LOST),
     "motion": (feed(linear=0.3), "backward", MOVES),
     "an old velocity": (silent, "backward", "No recent data: velocity."),
     "two publishers": (two_publishers, "backward", "Two publishers use teleop."),
     "a free bumper": (freed, "backward", BUMPER_FREE),
     "a new press": (press_anew, "backward", LET_GO),
-    "an earlier safety": (with_release(unknown=True), "backward", UNKNOWN),
+    "an earlier safety": (with_release(unknown=True), "backward", UNKNOWN_TEXT),
     "all used": (used, "backward", USED_UP_TEXT),
     "both forbidden": (with_release(forbidden=frozenset(DIRECTIONS)), "backward", BOTH),
     "forbidden": (with_release(forbidden=frozenset({"forward"})), "forward", forbidden("forward")),
@@ -170,7 +167,7 @@ def test_a_key_that_was_held_into_the_contact_moves_nothing(held: Direction) -> 
 @pytest.mark.parametrize(
     ("given", "over"),
     [
-        (feed(link=link("lost")), settled),
+        (feed(link=link(state="lost")), settled),
         (silent, settled),
         (press_anew, nothing),
         (freed, feed(pressed=True)),
@@ -313,8 +310,7 @@ def test_pressed_again_while_it_moves_off_it_goes_no_farther_that_way() -> None:
         fixture.let_go()
         assert fixture.hold() == forbidden("backward")
         assert fixture.tick().command == "brake"
-    release = fixture.published().release
-    assert release is not None
+    release = fixture.release()
     assert (release.believed_free, release.forbidden) == (None, ("backward",))
     assert 0 < release.left < 0.1
     fixture.let_go()
@@ -352,8 +348,7 @@ def test_a_reset_and_a_new_contact_have_the_way_anew() -> None:
     assert fixture.reset() == ""
     assert fixture.published().release is None
     feed(pressed=True)(fixture)
-    release = fixture.published().release
-    assert release is not None
+    release = fixture.release()
     assert release.forbidden == ()
     assert release.left == pytest.approx(0.15 - 0.025 - 0.1**2 / 1.2)
     fixture.let_go(2)
@@ -371,8 +366,7 @@ def test_a_rebound_before_the_bumper_does_not_choose_the_direction() -> None:
     fixture.tick()
     fixture.linear = 0.0
     fixture.tick(40)
-    release = fixture.published().release
-    assert release is not None
+    release = fixture.release()
     assert release.believed_free == "backward"
     assert release.travelled == pytest.approx(0.75, abs=0.03)
     assert release.age == pytest.approx(0.86, abs=0.05)
@@ -386,8 +380,7 @@ def test_a_contact_after_an_hour_reports_the_age_and_nothing_moves_by_itself() -
     assert fixture.reset() == ""  # an emergency stop may have been missed
     fixture.pressed = True
     fixture.let_go(40)
-    release = fixture.published().release
-    assert release is not None
+    release = fixture.release()
     assert release.believed_free == "backward"
     assert release.age is not None
     assert release.age > 3600
@@ -406,8 +399,7 @@ def test_a_second_contact_looks_at_the_travel_between() -> None:
     fixture.linear = None
     fixture.pressed = True
     fixture.tick(2)
-    release = fixture.published().release
-    assert release is not None
+    release = fixture.release()
     assert release.believed_free == "forward"
     assert release.travelled == pytest.approx(-1.03, abs=0.01)
 

@@ -11,7 +11,8 @@ from common.freshness import NS_PER_S
 from common.messages import ResetRequest
 from services.safety.core.causes import GOOD_SAMPLES, latched
 from services.safety.core.state import Reply
-from tests.safety.core.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit, link
+from tests.factories import link
+from tests.safety.core.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit
 
 UNKNOWN = "Standstill is not confirmed: no velocity is received."
 
@@ -77,11 +78,6 @@ def blink(fixture: PolicyFixture) -> int:
     return fixture.state.latches["driver_left"].id
 
 
-def answer(fixture: PolicyFixture) -> Reply:
-    assert fixture.verdict.reply is not None
-    return fixture.verdict.reply
-
-
 def test_a_reset_of_nothing_is_refused() -> None:
     assert PolicyFixture().ready().reset() == "Nothing is latched."
     fixture = stopped()
@@ -113,7 +109,7 @@ def test_a_contact_that_is_free_and_others_stay_latched_by_their_texts() -> None
     driver = blink(fixture)
     texts = f"The bumper was hit. {fixture.state.latches['estop'].text}"
     assert fixture.reset(driver) == ""
-    assert answer(fixture).text == f"Reset, but still latched: {texts}"
+    assert fixture.reply().text == f"Reset, but still latched: {texts}"
 
 
 @pytest.mark.parametrize(("ticks", "age"), [(50, ""), (51, "1.0"), (150, "3.0")])
@@ -140,11 +136,11 @@ def test_a_reset_clears_what_it_names_and_says_what_stays() -> None:
     driver = blink(fixture)
     fault = fixture.state.latches["driver_left"].text
     assert fixture.reset(estop) == ""
-    assert answer(fixture) == Reply(True, f"Reset, but still latched: {fault}", (estop,))
+    assert fixture.reply() == Reply(True, f"Reset, but still latched: {fault}", (estop,))
     assert latched(fixture.state.latches) == ("driver_left",)
     assert fixture.reset(estop, driver).startswith("A cause that the reset names")  # half of it
     assert fixture.reset(driver) == ""
-    assert answer(fixture) == Reply(
+    assert fixture.reply() == Reply(
         True, "Reset: a neutral request is due before the vehicle moves.", (driver,)
     )
     assert fixture.drive().command == "run"
@@ -182,7 +178,7 @@ class Latches(RuleBasedStateMachine):
     def trip(self, causes: set[str], ticks: int) -> None:
         self.fixture.pressed, self.fixture.left_bits = "contact" in causes, int("driver" in causes)
         self.fixture.estop_connection = int("reader" not in causes)
-        self.fixture.link = link("lost" if "link" in causes else "up")
+        self.fixture.link = link(state="lost" if "link" in causes else "up")
         self.fixture.estop() if "estop" in causes else self.fixture.tick()
         brakes = causes & {"estop", "contact", "reader"}
         if causes:
@@ -240,8 +236,7 @@ def test_at_a_pressed_bumper_a_reset_clears_the_others_and_a_release_comes_next(
     assert fixture.reset() == "Motion is requested: release the controls first."
     fixture.let_go()
     assert fixture.reset() == ""
-    assert fixture.verdict.reply is not None
-    assert fixture.verdict.reply.text == f"Reset, but still latched: {HOLD_TEXT}"
+    assert fixture.reply().text == f"Reset, but still latched: {HOLD_TEXT}"
     assert latched(fixture.state.latches) == ("contact",)
     assert fixture.drive(0.5).command == "brake"
     assert fixture.drive(0.0).command == "brake"
@@ -280,8 +275,7 @@ def test_a_reset_on_a_pressed_bumper_leaves_what_is_not_gone() -> None:
     fixture.tick(3)
     fault = fixture.state.latches["driver_left"].text
     assert fixture.reset() == ""
-    assert fixture.verdict.reply is not None
-    assert fixture.verdict.reply.text == f"Reset, but still latched: The bumper was hit. {fault}"
+    assert fixture.reply().text == f"Reset, but still latched: The bumper was hit. {fault}"
     assert latched(fixture.state.latches) == ("contact", "driver_left")
     fixture.tick()
     assert fixture.hold() == fault

@@ -190,12 +190,22 @@ FILTER = SonarFilter(axes(Vehicle()), age_s=0.3)
 STEP_NS = NS_PER_S // 20
 
 
-def sample(seq: int, front: float | None = None, boot: int = 1) -> Latest[Ultrasonic]:
+def sample(seq: int, **readings: float) -> Latest[Ultrasonic]:
+    """Return a sample in which some sonars have a reading, and the others no echo."""
     ranges, status = list(FREE), list(NO_ECHO)
-    if front is not None:
-        ranges[2], status[2] = front, "ok"
-    message = Ultrasonic(ranges=tuple(ranges), status=tuple(status), seq=seq, boot=boot)
+    for name, reading in readings.items():
+        n = SONAR_NAMES.index(name)
+        ranges[n], status[n] = reading, "ok"
+    message = Ultrasonic(ranges=tuple(ranges), status=tuple(status), seq=seq, boot=1)
     return Latest(message, seq * STEP_NS)
+
+
+def drive(count: int, twist: Twist, **readings: float) -> SonarArray:
+    """Repeat a sample for ``count`` times."""
+    array = SonarArray()
+    for seq in range(1, count + 1):
+        array = FILTER.update(array, sample(seq, **readings), twist, seq * STEP_NS)
+    return array
 
 
 def doubts(array: SonarArray) -> str:
@@ -205,15 +215,8 @@ def doubts(array: SonarArray) -> str:
     return text
 
 
-def after_samples(count: int, front: float | None = None, linear: float = 0.0) -> SonarArray:
-    array = SonarArray()
-    for seq in range(1, count + 1):
-        array = FILTER.update(array, sample(seq, front), Twist(linear), seq * STEP_NS)
-    return array
-
-
 def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> None:
-    array, old = after_samples(3), sample(3)
+    array, old = drive(3, Twist()), sample(3)
     limit_ns = 3 * STEP_NS + round(0.3 * NS_PER_S)
     assert doubts(FILTER.update(array, old, Twist(), limit_ns)) == ""
     array = FILTER.update(array, old, Twist(), limit_ns + 1)
@@ -224,22 +227,9 @@ def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> Non
 
 def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
     assert SonarArray().unseen == frozenset()
-    array = FILTER.update(after_samples(2), sample(2), Twist(), NS_PER_S)
+    array = FILTER.update(drive(2, Twist()), sample(2), Twist(), NS_PER_S)
     assert doubts(array) == "all silent"
     assert array.unseen == frozenset()
-
-
-def drive(count: int, twist: Twist, **readings: float) -> SonarArray:
-    """Repeat a reading of some sonars for ``count`` samples; the others have no echo."""
-    array = SonarArray()
-    ranges, status = list(FREE), list(NO_ECHO)
-    for name, reading in readings.items():
-        n = SONAR_NAMES.index(name)
-        ranges[n], status[n] = reading, "ok"
-    for seq in range(1, count + 1):
-        message = Ultrasonic(ranges=tuple(ranges), status=tuple(status), seq=seq, boot=1)
-        array = FILTER.update(array, Latest(message, seq * STEP_NS), twist, seq * STEP_NS)
-    return array
 
 
 AHEAD, BACK = Twist(0.5), Twist(-0.5)
@@ -323,8 +313,8 @@ def test_it_is_remembered_until_a_sonar_sees_farther() -> None:
 
 def test_each_sample_counts_once_and_a_silence_keeps_the_saturation() -> None:
     array = SonarArray(saturation=known())
-    once = FILTER.update(array, sample(1, 2.0), None, STEP_NS)
-    assert FILTER.update(once, sample(1, 2.0), None, STEP_NS) is once
+    once = FILTER.update(array, sample(1, front=2.0), None, STEP_NS)
+    assert FILTER.update(once, sample(1, front=2.0), None, STEP_NS) is once
     assert FILTER.update(array, None, None, STEP_NS).saturation == known()
 
 
