@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cli.commission import stop_command
-from cli.commission.operator import prompt, show
 from cli.commission.report import Report, Row, Verdict, render
 from cli.commission.session import CheckoutSession, checkout_session
-from cli.commission.steps import STEPS, Step
+from cli.commission.steps import STEPS, Step, prompt, show
 from cli.inspect.diagnosis import NEEDED
 from cli.settings import Everything
 from common import keys

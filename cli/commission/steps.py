@@ -1,13 +1,15 @@
 """Steps of the checkout on the bus, in their order, with the instructions to the operator."""
 
+import sys
+import termios
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
 
 from cli.commission.latches import LatchTest, judge_latch
 from cli.commission.link import CRC_FRAMES, NONZERO_FRAMES, judge_link
 from cli.commission.motion import Run, judge_motion
-from cli.commission.operator import confirm, show
 from cli.commission.report import Verdict, failed
 from cli.commission.session import CheckoutSession
 from cli.commission.sonar import (
@@ -19,8 +21,10 @@ from cli.commission.sonar import (
     words,
 )
 from common import clock, keys
+from common.errors import RobotError
 from common.messages import SONAR_NAMES
 from common.motion import Command, Twist
+from common.text import printable
 
 LINK_S = 5.0
 FRAMES_S = 30.0  # at most, for enough frames
@@ -32,6 +36,37 @@ CLEAR_S = 0.3  # the bridge needs three clear samples, and safety three samples 
 DRIVE_S = 2.0
 FORWARD, TURN = Twist(linear=0.1), Twist(angular=0.2)
 RESET_PHRASE, PHRASE = "reset", "wheels off the ground"
+
+
+# --- dialogue ----------------------------------------------------------------------------------
+
+
+def show(text: str) -> None:
+    """Print lines without buffering."""
+    print(printable(text, "\n"), flush=True)
+
+
+def prompt(question: str) -> str:
+    """Return one stripped line; input typed before the question is discarded.
+
+    Raise ``RobotError`` at the end of the input.
+    """
+    if sys.stdin.isatty():
+        with suppress(termios.error):
+            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+    print(question, end=" ", flush=True)
+    line = sys.stdin.readline()
+    if not line:
+        raise RobotError("standard input has ended before all questions were answered")
+    return line.strip()
+
+
+def confirm(fact: str, phrase: str) -> bool:
+    """Return whether the operator types the phrase."""
+    return prompt(f'{fact}\nType "{phrase}" to confirm:').lower() == phrase
+
+
+# --- steps --------------------------------------------------------------------------------------
 
 
 def link(session: CheckoutSession) -> Verdict:

@@ -9,7 +9,7 @@ from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
 from cli.inspect.session import add_end, add_options, open_session, until_interrupt
 from common.codec import Sample
-from common.errors import MessageError, RobotError
+from common.errors import RobotError
 from common.freshness import NS_PER_S
 from common.messages import Event
 from common.text import printable
@@ -59,19 +59,11 @@ def show(sample: Sample, robot: str, options: argparse.Namespace) -> None:
     """Print one sample in the format of the options."""
     reading = read(sample.payload, sample.encoding)
     if options.field:
-        output.value(field(reading, sample, options.field), as_json=options.json)
+        output.value(at(reading.value, options.field), as_json=options.json)
     elif options.json:
         output.line(as_json(sample, reading, robot))
     else:
         print(printable(as_text(sample, reading, robot), "\n"), flush=True)
-
-
-def field(reading: Reading, sample: Sample, path: str) -> Any:
-    """Return one field; raise ``MessageError`` naming the existing fields."""
-    try:
-        return at(reading.value, path)
-    except MessageError as error:
-        raise MessageError(f"--field {path} of {sample.key} ({reading.kind}): {error}") from None
 
 
 def as_json(sample: Sample, reading: Reading, robot: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cli.inspect import output
-from cli.inspect.addressing import EVERYTHING, add_key, chunks, expression, short, topic_of
+from cli.inspect.addressing import EVERYTHING, add_key, chunks, expression, short
 from cli.inspect.payload import read
 from cli.inspect.session import (
     BusSession,
@@ -74,17 +74,16 @@ def list_keys(session: BusSession, options: argparse.Namespace) -> int:
         raise RobotError(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
     found = discover(session.probe, session.robot)
     warn_if_closed(found)
-    rows = []
-    for key, count in sorted(counts.items()):
-        topic = topic_of(key)
-        rows.append({
+    rows = [
+        {
             "key": short(key, session.robot),
             "type": kinds[key],
             "hz": count / span_s,
-            "expected_hz": topic.rate_hz if topic else None,
             "publishers": [each.name for each in found if declares(each.publishes, key)],
             "readers": [each.name for each in found if declares(each.reads, key)],
-        })  # fmt: skip
+        }
+        for key, count in sorted(counts.items())
+    ]
     output.rows(rows, as_json=options.json)
     return 0
 
