@@ -7,18 +7,23 @@ import zenoh
 from cli.keys import access
 from cli.keys.access import Rights, Verb
 from common import keys
-from common.members import OPERATORS_SOURCES
+from common.members import OPERATORS_SOURCES, Profile, Role
 from services.ros2 import names
 from services.ros2.config import Ros2
 
 MINE, OTHER = "001", "002"  # a driver's robot, and another robot
 
+
+def _laptop(role: Role, *sources: str) -> Rights:
+    return access.laptop(Profile(role=role, name="x", robots=(MINE,), sources=sources))
+
+
 ROLES: Mapping[str, Rights] = {
-    "viewer": access.viewer(),
-    "driver of 001": access.driver((MINE,), OPERATORS_SOURCES),
-    "driver of 001 as nav": access.driver((MINE,), ("nav",)),
-    "device lidar of 001": access.device((MINE,), ("lidar",)),
-    "fleet": access.fleet(),
+    "viewer": _laptop("viewer"),
+    "driver of 001": _laptop("driver", *OPERATORS_SOURCES),
+    "driver of 001 as nav": _laptop("driver", "nav"),
+    "device lidar of 001": _laptop("device", "lidar"),
+    "fleet": _laptop("fleet"),
     "site's router": access.site(),
     "router of 001": access.robot(MINE),
     "ros of 001": access.ros(Ros2()),

@@ -6,10 +6,10 @@ a set of Zenoh messages in each direction. The router drops all other messages w
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from common import keys
-from common.members import OPERATORS_SOURCES, Member
+from common.members import OPERATORS_SOURCES, Member, Profile
 from services.ros2 import names
 from services.ros2.config import Ros2
 
@@ -52,6 +52,10 @@ QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
 LAPTOP_SERVICES = ("dashboard", "metrics")
 DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
 
+COMMANDS: Mapping[str, Sequence[keys.Topic[Any]]] = {  # besides the emergency stop
+    "driver": (keys.DRIVE, keys.ESTOP_KEEPALIVE),
+    "device": (keys.LIMIT, keys.ESTOP_KEEPALIVE),
+}
 PROGRAMS_CALLS = (keys.SET_LED, keys.SET_POSE)  # without an operator's source
 ROS_TWISTS = ("TwistStamped", "Twist")
 ROS_CALLS = ("hardware/e_stop_trigger", "hardware/e_stop_reset")
@@ -104,63 +108,36 @@ def _rules(name: str, given: Rights) -> Iterator[dict[str, object]]:
                 }
 
 
-def rights(member: Member, router: RouterSettings) -> Rights:
+def rights(member: Profile, router: RouterSettings) -> Rights:
     """Return the rights of a member at a router of its site."""
     if member.role == "ros":
         return ros(router.ros2) if {router.robot, ANY} & {*member.robots} else {}
     if member.role == "robot":
         return robot(member.name)
-    if member.role == "site":
-        return site()
-    if member.role == "driver":
-        return driver(member.robots, member.sources)
-    if member.role == "device":
-        return device(member.robots, member.sources)
-    return fleet() if member.role == "fleet" else viewer()
+    return site() if member.role == "site" else laptop(member)
 
 
-def viewer(services: Sequence[str] = LAPTOP_SERVICES) -> Rights:
-    """Return the rights to see everything and command nothing."""
+def laptop(member: Profile) -> Rights:
+    """Return the rights to see everything; a driver drives, a device limits, all but a viewer stop.
+
+    Drivers and devices do so for their robots, as their sources. Only an operator also resets.
+    """
+    role, sources = member.role, member.sources
+    robots = {"viewer": (), "fleet": (ANY,)}.get(role, member.robots)
+    calls: Sequence[keys.Call[Any, Any]] = ()
+    if role == "driver":
+        calls = keys.CALLS if {*OPERATORS_SOURCES} & {*sources} else PROGRAMS_CALLS
+    own = publishing(DRIVER_SERVICES if role == "driver" else LAPTOP_SERVICES)
+    topics = COMMANDS.get(role, ())
+    commands = (topic.on(each, source=s) for topic in topics for each in robots for s in sources)
     return {
+        **own,
         "read": EVERYTHING,
         "know": (EVERY_KEY, KEPT),
         "recall": RECALLED,
-        "ask": QUERYABLE,
-        **publishing(services),
+        "ask": (*QUERYABLE, *(call.on(each) for each in robots for call in calls)),
+        "write": (*own["write"], *commands, *map(keys.estop_key, robots)),
     }
-
-
-def driver(robots: Iterable[str], sources: Sequence[str]) -> Rights:
-    """Return the rights to see everything, drive and stop these robots; an operator also resets."""
-    own_robots = tuple(robots)
-    viewing = viewer(DRIVER_SERVICES)
-    own_calls = keys.CALLS if {*OPERATORS_SOURCES} & {*sources} else PROGRAMS_CALLS
-    calls = (call.on(each) for each in own_robots for call in own_calls)
-    actuation = (key for each in own_robots for key in actuation_keys(each, sources))
-    return {
-        **viewing,
-        "ask": (*viewing["ask"], *calls),
-        "write": (*viewing["write"], *actuation),
-    }
-
-
-def device(robots: Iterable[str], sources: Sequence[str]) -> Rights:
-    """Return the rights to see everything, to stop and limit, and to keep a stop alive."""
-    own_robots, viewing = tuple(robots), viewer()
-    given = (
-        topic.on(each, source=source)
-        for topic in (keys.LIMIT, keys.ESTOP_KEEPALIVE)
-        for each in own_robots
-        for source in sources
-    )
-    stops = (keys.estop_key(each) for each in own_robots)
-    return {**viewing, "write": (*viewing["write"], *given, *stops)}
-
-
-def fleet() -> Rights:
-    """Return the rights to see everything, and to stop any robot."""
-    viewing = viewer()
-    return {**viewing, "write": (*viewing["write"], keys.estop_key(ANY))}
 
 
 def site() -> Rights:
@@ -170,7 +147,13 @@ def site() -> Rights:
         "know": EVERYTHING,
         "recall": RECALLED,
         "ask": (*QUERYABLE, *(call.on(ANY) for call in keys.CALLS)),
-        "write": (*actuation_keys(ANY), keys.LIMIT.on(ANY, source=ANY)),
+        "write": (
+            *(
+                topic.on(ANY, source=ANY)
+                for topic in (keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE)
+            ),
+            keys.estop_key(ANY),
+        ),
     }
 
 
@@ -208,16 +191,6 @@ def ros(settings: Ros2) -> Rights:
         "write": tuple(key("cmd_vel", f"geometry_msgs/msg/{kind}") for kind in ROS_TWISTS),
         "live": tuple(f"{names.LIVELINESS}/{domain}{'/*' * chunks}" for chunks in ROS_TOKENS),
     }
-
-
-def actuation_keys(robot: str, sources: Sequence[str] = (ANY,)) -> tuple[str, ...]:
-    """Return the keys that move and stop a robot, without those reserved for safety."""
-    driven = (
-        topic.on(robot, source=source)
-        for topic in (keys.DRIVE, keys.ESTOP_KEEPALIVE)
-        for source in sources
-    )
-    return (*driven, keys.estop_key(robot))
 
 
 def publishing(services: Sequence[str]) -> dict[Verb, Sequence[str]]:
