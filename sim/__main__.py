@@ -12,9 +12,9 @@ from typing import BinaryIO
 import msgspec
 
 from common import clock, log, realtime
-from common.cli_args import EXIT_CONFIG, EXIT_LINK, add_sources, sources
+from common.cli_args import add_sources, run_program, sources
 from common.config import load
-from common.errors import ConfigError, LinkError
+from common.errors import ConfigError
 from common.freshness import NS_PER_S
 from common.log import Logger
 from common.loop import Loop
@@ -110,7 +110,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Simulate until SIGINT or SIGTERM; raise ``ConfigError`` before anything opens."""
+    """Simulate until SIGINT or SIGTERM; raise ``ConfigError`` or ``LinkError`` at the start."""
     if options.list_profiles:
         print(profile_list())
         return 0
@@ -122,34 +122,25 @@ def run(options: argparse.Namespace) -> int:
     if config.robot.realtime:
         realtime.request(realtime.BOARD)
     log.configure(config.log, "sim")
-    with trace_file(options.trace) as trace:
-        try:
-            process = Process(config, model, plan, trace)
-        except LinkError as error:
-            Logger().error(str(error))
-            return EXIT_LINK
-        with closing(process):
-            for name in (signal.SIGINT, signal.SIGTERM):
-                signal.signal(name, lambda *_: process.loop.stop())
-            Logger().info(
-                "started",
-                world=plan.title,
-                profiles=options.profile,
-                board=f"{config.board.address}:{config.board.port}",
-            )
-            process.run()
+    with (
+        trace_file(options.trace) as trace,
+        closing(Process(config, model, plan, trace)) as process,
+    ):
+        for name in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(name, lambda *_: process.loop.stop())
+        Logger().info(
+            "started",
+            world=plan.title,
+            profiles=options.profile,
+            board=f"{config.board.address}:{config.board.port}",
+        )
+        process.run()
     return 0
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run with these arguments and return the exit code."""
-    parser = argparse.ArgumentParser(prog="sim", description=__doc__)
-    add_arguments(parser)
-    try:
-        return run(parser.parse_args(argv))
-    except ConfigError as error:
-        print(f"sim: {error}", file=sys.stderr)
-        return EXIT_CONFIG
+    return run_program("sim", add_arguments, run, argv, __doc__)
 
 
 if __name__ == "__main__":

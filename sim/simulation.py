@@ -83,7 +83,6 @@ class Simulation:
         self._motors = Motors(model.drive, model.vehicle.track)
         self._rebound = model.body.rebound
         self._switch = Switch(model.bumper.bounce, seed)
-        self._commanded_ns = now_ns
         self._records: list[t.Line] = []
         self._steps = 0
         self._driven = 0.0
@@ -246,7 +245,7 @@ class Simulation:
         return wait_ns > 0 and self._steps % max(1, round(wait_ns / STEP_NS)) == 0
 
     def _update_watchdog(self) -> None:
-        silence_s = (self.now_ns - self._commanded_ns) / NS_PER_S
+        silence_s = (self.now_ns - self._command.mono_ns) / NS_PER_S
         if 0 < self._output.firmware.watchdog < silence_s:
             self.board.command = STOP
 
@@ -278,8 +277,7 @@ class Simulation:
             if isinstance(part.frame, MotionCommand):
                 self._hold(part.frame, now_ns)
                 self._records.append(self._command)
-                self._commanded_ns = now_ns
-                if self._command.kind in self._output.firmware.ignores:
+                        if self._command.kind in self._output.firmware.ignores:
                     continue
             answer = self.board.answer(part.frame)
             if answer is not None:

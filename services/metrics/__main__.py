@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from collections.abc import Sequence
 
 from common.cli_args import add_setting, add_sources, run_program, sources
 from common.service import run_optional_service
@@ -31,10 +30,5 @@ def run(options: argparse.Namespace) -> int:
     )
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run with these arguments; return the exit code."""
-    return run_program("metrics", add_arguments, run, argv)
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_program("metrics", add_arguments, run, None))
