@@ -277,7 +277,7 @@ class Simulation:
             if isinstance(part.frame, MotionCommand):
                 self._hold(part.frame, now_ns)
                 self._records.append(self._command)
-                        if self._command.kind in self._output.firmware.ignores:
+                if self._command.kind in self._output.firmware.ignores:
                     continue
             answer = self.board.answer(part.frame)
             if answer is not None:
