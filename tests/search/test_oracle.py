@@ -13,24 +13,6 @@ def check_it_drives(stack: ScriptedStack) -> None:
     assert stack.oracle.violations == []
 
 
-def test_a_motion_without_a_command_wants_a_reset_of_the_next_safety() -> None:
-    stack = driving()
-    stack.request(0.0, 1500)
-    stack.kill("safety", 3000)
-    stack.run(1000)
-    stack.measure(0.3, 600)
-    stack.measure(None, 3000)
-    assert stack.seen is not None
-    assert "predecessor" in [cause.name for cause in stack.seen.causes]
-    runs = stack.oracle.runs
-    stack.request(0.5, 1000)
-    assert stack.oracle.runs == runs
-    stack.request(0.0, 700)
-    assert stack.reset().done
-    stack.run(700)
-    check_it_drives(stack)
-
-
 @pytest.mark.parametrize("hung_ms", [0, 60])
 def test_a_fault_that_is_over_at_once_latches_however_late_it_is_read(hung_ms: int) -> None:
     stack = driving()

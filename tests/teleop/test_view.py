@@ -3,7 +3,6 @@
 import pytest
 
 from common.log import Logger
-from common.messages import MAX_TEXT
 from common.settings import Log
 from services.teleop.view import EventLog
 
@@ -36,12 +35,3 @@ def test_a_repeated_line_is_kept_once_with_its_last_time() -> None:
         (3, "refused"),
         (4, "stop"),
     ]
-
-
-def test_control_characters_of_an_event_are_escaped() -> None:
-    event_log = EventLog()
-    event_log.add("odom\x1b", "info", "\x1b]0;title\x07\x1b[2J\u202e急停\n" * 500, t_ns=1)
-    (line,) = event_log.lines()
-    assert line.service == "odom\\u001b"
-    assert line.text.startswith("\\u001b]0;title\\u0007\\u001b[2J\\u202e急停\\n")
-    assert len(line.text) == MAX_TEXT

@@ -323,38 +323,25 @@ def test_each_query_finds_its_tick() -> None:
     assert commands.BumperQuery() in frames(bench.tick(11 * MS)), "at the nearest tick"
 
 
-def test_counters_alone_that_were_silent_went_on(bench: Bench) -> None:
-    bench.answer(DistanceReport(1000, 0))
-    for _ in range(40):
-        bench.now_ns += 100 * MS
-        bench.receive(STANDS)
-    assert "board_restarted" not in events(bench.answer(DistanceReport(4200, 0)))
-
-
-def test_a_gap_before_the_last_sample_is_no_gap_behind_it(bench: Bench) -> None:
-    bench.receive(STANDS)
-    bench.now_ns += 100 * MS
-    bench.answer(DistanceReport(100, 0))
-    bench.now_ns += 20 * MS
-    assert "board_restarted" not in events(bench.answer(DistanceReport(30, 0)))
-    bench.now_ns += 61 * MS
-    bench.receive(STANDS)
-    assert "board_restarted" not in events(bench.answer(DistanceReport(30, 0)))
-    bench.now_ns += 100 * MS
-    bench.receive(STANDS)
-    bench.answer(DistanceReport(400, 0))
-    bench.now_ns += 100 * MS
-    bench.receive(STANDS)
-    assert "board_restarted" in events(bench.answer(DistanceReport(100, 0)))
-
-
-def test_the_frame_that_ends_a_gap_may_be_the_one_that_shows_a_restart(bench: Bench) -> None:
-    bench.answer(DistanceReport(400, 0))
-    bench.now_ns += 60 * MS
-    assert "board_restarted" not in events(bench.answer(DistanceReport(60, 0))), "driven"
-    bench.answer(DistanceReport(400, 0))
-    bench.now_ns += 61 * MS
-    assert "board_restarted" in events(bench.answer(DistanceReport(60, 0)))
+@pytest.mark.parametrize(
+    "steps",  # wait (ms), mileage (mm) or a velocity, whether that shows a restart
+    [
+        # Counters alone that were silent went on.
+        [(0, 1000, False), *[(100, None, False)] * 40, (0, 4200, False)],
+        # A gap before the last sample is no gap behind it.
+        [(0, None, False), (100, 100, False), (20, 30, False), (61, None, False), (0, 30, False),
+         (100, None, False), (0, 400, False), (100, None, False), (0, 100, True)],
+        # The frame that ends a gap may be the one that shows a restart; before, it was driven.
+        [(0, 400, False), (60, 60, False), (0, 400, False), (61, 60, True)],
+    ],
+)  # fmt: skip
+def test_a_restart_shows_in_counters_behind_a_gap(
+    bench: Bench, steps: list[tuple[int, int | None, bool]]
+) -> None:
+    for wait_ms, millimetres, restarted in steps:
+        bench.now_ns += wait_ms * MS
+        frame = VelocityReport(0, 0) if millimetres is None else DistanceReport(millimetres, 0)
+        assert ("board_restarted" in events(bench.answer(frame))) is restarted
 
 
 def test_the_frame_that_ends_a_lost_link_is_judged_as_such(bench: Bench) -> None:

@@ -2,14 +2,12 @@
 
 import json
 import socket
-import time
 from pathlib import Path
 
 import pytest
 import zenoh
 
 from common import keys, settings
-from common.bus import session as session_module
 from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
 from common.bus.session import (
@@ -23,7 +21,7 @@ from common.bus.session import (
 from common.errors import LinkError
 from common.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
-from verification.harness.bus import Lines, at, listening, router_process
+from verification.harness.bus import at, listening, router_process
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
@@ -31,37 +29,6 @@ from verification.harness.waiting import wait_until
 def nowhere() -> str:
     """Return an endpoint where nobody listens."""
     return f"tcp/127.0.0.1:{free_port()}"
-
-
-@pytest.fixture
-def tries(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Shorten the pause between connection attempts; return their times."""
-    made: list[float] = []
-
-    def config(where: settings.BusSettings, turn: int) -> zenoh.Config:
-        made.append(time.monotonic())
-        quick = client_config(where, turn)
-        quick.insert_json5("connect/timeout_ms", "50")
-        return quick
-
-    monkeypatch.setattr(session_module, "client_config", config)
-    monkeypatch.setattr(session_module, "RETRY_PERIOD_S", 0.01)
-    return made
-
-
-def test_without_a_router_it_warns_once_a_period(
-    monkeypatch: pytest.MonkeyPatch, lines: Lines, tries: list[float]
-) -> None:
-    monkeypatch.setattr(session_module, "WARN_PERIOD_S", 0.2)
-    where = nowhere()
-    bus = Bus(at(where), "001", lambda call: call())
-    bus.open()
-    wait_until(lambda: len(lines) >= 3, "three lines")
-    assert not bus.connected
-    bus.close()
-    text = "waiting for a router; run `t2 doctor`"
-    assert lines == [("warning", text, {"endpoints": [where]})] * len(lines)
-    assert len(lines) <= 1 + (tries[-1] - tries[0]) / 0.2
 
 
 def test_a_router_behind_one_that_is_silent_is_found(buses: BusFixture) -> None:
