@@ -13,5 +13,5 @@ from services.bridge.config import BridgeConfig
 from services.bridge.core.motion_output import MotionOutput
 
 if __name__ == "__main__":
-    with patch.object(MotionOutput, "on_hit", lambda *_: iter(())):
+    with patch.multiple(MotionOutput, reflex=lambda *_: (), on_hit=lambda *_: ()):
         sys.exit(run("bridge", BridgeConfig, Bridge, priority=realtime.BRIDGE))

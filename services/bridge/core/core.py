@@ -47,6 +47,7 @@ Handler = Callable[[Any, bytes, int], Outputs]  # frame, raw bytes, receive time
 TICK_S = 0.02  # the lease, the silence of the board and the guard's patience are ten ticks each
 LINK_NS = NS_PER_S * 19 // 100  # half a tick less than 0.2 s: the tick that is due may come early
 PRESSED = reports.BumperReport(True)
+HIT = framing.pack(PRESSED)  # a datagram as the board sends it
 # Lower rates would delay the detection of a short hit, a near wall and a restarted board.
 QUERIES: tuple[tuple[str, Frame, float], ...] = (
     ("bumper", commands.BumperQuery(), keys.BUMPER.rate_hz),
@@ -106,6 +107,8 @@ class Core:
 
     def datagram(self, datagram: bytes, port: int, now_ns: int) -> Outputs:
         """Process a datagram: BRAKE for a new hit, its report, then the other frames."""
+        if datagram == HIT and not self._bumper.pressed:
+            yield from self.motions.reflex(now_ns)
         parts = framing.read(datagram, reports.FROM_BOARD)
         hits = [one for one in parts if isinstance(one, Received) and one.frame == PRESSED]
         hit = hits[0] if hits and not self._bumper.pressed else None

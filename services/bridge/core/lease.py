@@ -175,9 +175,9 @@ def _order(lease: Lease, motion: Motion) -> tuple[Command, Refusal | None]:
     return STOP, missing
 
 
-def on_hit(lease: Lease, seq: int, now_ns: int) -> tuple[Lease, Command]:
-    """Brake for the first sample of a bumper hit: the reflex."""
-    return replace(lease, hit=seq, sent_ns=now_ns), BRAKE
+def on_hit(lease: Lease, seq: int, now_ns: int) -> Lease:
+    """Hold the BRAKE that was sent for the first sample of a bumper hit: the reflex."""
+    return replace(lease, hit=seq, sent_ns=now_ns)
 
 
 def on_estop(lease: Lease, received_ns: int) -> tuple[Lease, Command | None]:

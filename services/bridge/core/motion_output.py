@@ -18,15 +18,21 @@ from collections import Counter
 
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Mileage, Motion, Velocity
-from common.motion import BRAKE, STOP, Command, Twist
+from common.motion import BRAKE, RUN, STOP, Command, Twist
 from common.standstill import Displacement, stopping_ns
 from common.wire import framing
+from common.wire.commands import MotionCommand, MotionKind
 from services.bridge.config import Bridge as Settings
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease, Refusal
 from services.bridge.core.output import Event, Outputs, Reacted, Send
 from services.bridge.core.translate import Translator
 
+# Packed once: BRAKE must not wait for it.
+RESTING = {
+    STOP: framing.pack(MotionCommand(MotionKind.STOP)),
+    BRAKE: framing.pack(MotionCommand(MotionKind.BREAK)),
+}
 STOP_TIMEOUT_NS = NS_PER_S  # until a stopping bridge no longer waits for standstill
 
 
@@ -78,12 +84,16 @@ class MotionOutput:
             text = "a second sender on @cmd/motion is refused"
             yield Event("second_authority", "error", text, {"boot": motion.boot})
 
-    def on_hit(self, seq: int, now_ns: int) -> Outputs:
-        """Brake for a hit, in the sample that will be published as ``seq``: the reflex."""
+    def reflex(self, now_ns: int) -> tuple[Send, Reacted]:
+        """Brake for a hit before its datagram is processed; then ``on_hit``."""
         self._hit_ns = now_ns
-        self.lease, order = leases.on_hit(self.lease, seq, now_ns)
-        yield self.order(order)
-        yield Reacted("reflex", now_ns)
+        return self.order(BRAKE), Reacted("reflex", now_ns)
+
+    def on_hit(self, seq: int, now_ns: int) -> Outputs:
+        """Hold BRAKE for a hit until safety has judged the sample that is published as ``seq``."""
+        if self._hit_ns != now_ns:  # its datagram holds more than the hit
+            yield from self.reflex(now_ns)
+        self.lease = leases.on_hit(self.lease, seq, now_ns)
 
     def on_estop(self, received_ns: int) -> Outputs:
         """Process an emergency stop."""
@@ -159,9 +169,10 @@ class MotionOutput:
         return self.order(STOP if stands else BRAKE)
 
     def order(self, order: Command, motion: Motion | None = None) -> Send:
-        """Return the frame of an order, from the command port."""
-        datagram = framing.pack(self._translator.command(order, motion))
-        return Send(datagram, self.port, order)
+        """Return the frame of an order, from the command port; a RUN needs its motion."""
+        if order is RUN and motion is not None:
+            return Send(framing.pack(self._translator.run(motion)), self.port, order)
+        return Send(RESTING[order], self.port, order)
 
     def _is_at_standstill(self, now_ns: int) -> bool:
         """Return whether standstill was measured after ``stop``."""

@@ -9,7 +9,7 @@ import math
 
 from common.errors import WireError
 from common.messages import Driver, Mileage, Motion, RangeStatus, Ultrasonic, Velocity
-from common.motion import BRAKE, RUN, STOP, Command, Twist, clamp
+from common.motion import Twist, clamp
 from common.settings import Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import MAGNITUDE_MAX
@@ -28,11 +28,6 @@ PLAUSIBLE_MPS = 5.0
 PLAUSIBLE_RADPS = 10.0
 
 FAULT_NAMES = ("over_current", "over_voltage", "encoder", "under_voltage", "overload")
-KINDS = {
-    STOP: MotionKind.STOP,
-    RUN: MotionKind.RUN,
-    BRAKE: MotionKind.BREAK,
-}
 # Maximum motion between two samples. A board that was just powered on counts from zero, so the
 # limit for a step to zero is much lower, after any time: it is very unlikely to drive to within
 # 5 mm of the power-on position while nothing is received.
@@ -54,10 +49,8 @@ class Translator:
         self._max_linear = max_linear
         self._max_angular = max_angular
 
-    def command(self, order: Command, motion: Motion | None = None) -> MotionCommand:
-        """Return the frame for an order; a RUN carries the motion, slowed on its curve."""
-        if order is not RUN or motion is None:
-            return MotionCommand(KINDS[order])
+    def run(self, motion: Motion) -> MotionCommand:
+        """Return the frame of a RUN, slowed on its curve."""
         twist = Twist(motion.linear, motion.angular).within(self._max_linear, self._max_angular)
         angular = clamp(twist.angular * self._commanded_per_radian, MAGNITUDE_MAX)
         return MotionCommand(MotionKind.RUN, round(twist.linear * MM), round(angular))

@@ -182,6 +182,7 @@ class Supervisor:
         now_ns: int,
     ) -> Standstill:
         displacement = before.displacement.with_velocity(velocity).with_mileage(mileage)
+        # 1 equivalent mutant: None is as false as False.
         after = replace(before, displacement=displacement, has_left=False)
         if not commanded:
             return after.moving(now_ns)

@@ -362,7 +362,7 @@ class Events(RuleBasedStateMachine):
         changes: dict[str, Callable[[], Lease]] = {
             "ready": lambda: on_ready(self.lease, True),
             "not ready": lambda: on_ready(self.lease, False),
-            "hit": lambda: on_hit(self.lease, 10, self.now_ns)[0],
+            "hit": lambda: on_hit(self.lease, 10, self.now_ns),
             "estop": lambda: on_estop(self.lease, NOW)[0],
             "moved": lambda: on_uncommanded(self.lease, self.now_ns, OWN_BOOT)[0],
         }

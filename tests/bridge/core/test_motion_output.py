@@ -8,6 +8,8 @@ from common.freshness import NS_PER_S
 from common.messages import Mileage, Motion, Velocity
 from common.motion import BRAKE, STOP, Command
 from common.settings import Vehicle, Wire
+from common.wire import framing
+from common.wire.commands import MotionCommand, MotionKind
 from services.bridge.config import Bridge
 from services.bridge.core.lease import Lease
 from services.bridge.core.motion_output import MotionOutput
@@ -91,6 +93,22 @@ def test_it_must_stand_by_then(
 def test_without_a_velocity_it_is_taken_to_stand(output: Output) -> None:
     for after_s in (0, 2, 4):
         assert output.tick(END + after_s * NS_PER_S) == [STOP]
+
+
+@pytest.mark.parametrize("order", [STOP, BRAKE])
+def test_an_order_without_numbers_ignores_those_of_its_motion(
+    output: Output, order: Command
+) -> None:
+    kind = MotionKind.STOP if order is STOP else MotionKind.BREAK
+    sent = output.made.order(order, Motion(command=order, linear=1.0, angular=1.0))
+    assert sent == Send(framing.pack(MotionCommand(kind, 0, 0)), 0, order)
+
+
+def test_a_hit_brakes_once_for_its_datagram(output: Output) -> None:
+    for at_ns, braked in ((NOW + MS, []), (NOW + 2 * MS, [BRAKE])):
+        assert [one.order for one in output.made.reflex(NOW + MS) if isinstance(one, Send)]
+        outputs = list(output.made.on_hit(1, at_ns))
+        assert [one.order for one in outputs if isinstance(one, Send)] == braked
 
 
 def test_a_hit_counts_for_the_period_of_stop(output: Output) -> None:

@@ -55,7 +55,7 @@ def run(linear: float, angular: float) -> Motion:
 def test_run_carries_the_motion_slowed_to_the_limits(
     by_manual: Translator, motion: Motion, linear_mmps: int, angular_raw: int
 ) -> None:
-    frame = by_manual.command(Command.RUN, motion)
+    frame = by_manual.run(motion)
     assert frame == MotionCommand(MotionKind.RUN, linear_mmps, angular_raw)
     assert b"\x00\x80" not in frame.to_bytes()
 
@@ -69,29 +69,15 @@ def test_each_way_has_a_unit_of_its_own(
 ) -> None:
     wire = Wire(command_angular_unit=command, feedback_angular_unit=feedback)
     mixed = Translator(wire, Vehicle(), 1.0, 1.0)
-    assert mixed.command(Command.RUN, run(0.0, 0.3)).angular_raw == raw
+    assert mixed.run(run(0.0, 0.3)).angular_raw == raw
     assert mixed.velocity(VelocityReport(0, 300)).angular == pytest.approx(angular)
-
-
-@pytest.mark.parametrize(
-    ("order", "motion", "kind"),
-    [
-        (Command.STOP, run(1.0, 1.0), MotionKind.STOP),
-        (Command.BRAKE, run(1.0, 1.0), MotionKind.BREAK),
-        (Command.RUN, None, MotionKind.RUN),
-    ],
-)
-def test_what_carries_no_velocity(
-    by_manual: Translator, order: Command, motion: Motion | None, kind: MotionKind
-) -> None:
-    assert by_manual.command(order, motion) == MotionCommand(kind, 0, 0)
 
 
 @given(st.integers(-5000, 5000), st.integers(-5729, 5729))
 def test_velocities_come_back_as_they_went(linear_mmps: int, angular_raw: int) -> None:
     free = Translator(Wire(), Vehicle(), 100.0, 100.0)
     velocity = free.velocity(VelocityReport(linear_mmps, angular_raw))
-    frame = free.command(Command.RUN, run(velocity.linear, velocity.angular))
+    frame = free.run(run(velocity.linear, velocity.angular))
     assert (frame.linear_mmps, frame.angular_raw) == (linear_mmps, angular_raw)
 
 

@@ -11,6 +11,7 @@ from common.motion import STILL, Twist
 from common.standstill import GRACE_NS
 from services.safety.config import Safety
 from services.safety.core.motion_watch import (
+    CONFIRM_NS,
     Bounds,
     MotionWatch,
     Phase,
@@ -217,6 +218,29 @@ def test_a_motion_between_begins_the_confirmation_anew() -> None:
     board.run(0.1)
     assert board.state.phase is Phase.STANDING
     assert board.state.displacement.integrated == STILL
+
+
+def test_standstill_is_confirmed_after_0_2_s() -> None:
+    board = stopping(0.3)
+    still_ns = board.step(0.0).still_ns
+    assert still_ns == board.now_ns
+    while board.step(0.0).phase is Phase.STOPPING:
+        assert board.now_ns < still_ns + NS_PER_S
+    assert board.now_ns == still_ns + CONFIRM_NS
+
+
+def test_a_command_to_move_ends_the_measured_standstill() -> None:
+    board = stopping(0.3)
+    assert board.step(0.0).still_ns is not None
+    assert board.step(0.0, moves=True).still_ns is None
+
+
+def test_a_vehicle_that_left_its_place_has_a_new_limit() -> None:
+    board = standing()
+    while not board.step(0.3).has_left:
+        assert board.state.phase is Phase.STANDING
+    assert board.state.phase is Phase.STOPPING
+    assert board.state.due_ns == board.now_ns + NS_PER_S
 
 
 @pytest.mark.parametrize(
