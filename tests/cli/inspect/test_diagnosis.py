@@ -11,6 +11,7 @@ from cli.inspect.diagnosis import Finding, Observation, diagnose
 from common import keys
 from common import messages as m
 from services.safety.core.causes import RULES
+from tests import factories
 from tests.cli.inspect.tool import health
 
 CLEAR: Any = ("ok",) * 8
@@ -24,9 +25,7 @@ def healths(*messages: m.Health) -> dict[str, m.Message]:
 
 
 def link(state: Any = "up", **given: Any) -> m.Link:
-    healthy: dict[str, Any] = {"board": "10.7.5.224:4002", "epoch": 0, "armed": True, "waiting": "",
-                            "rates": {}, "rejected": {}, "round_trip": 0.002}  # fmt: skip
-    return m.Link(state=state, **(healthy | given))
+    return factories.link(state=state, **given)
 
 
 def relay(state: Any = "up", **given: Any) -> m.Link:
@@ -36,15 +35,9 @@ def relay(state: Any = "up", **given: Any) -> m.Link:
 
 def state(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
     texts = {rule.name: (rule.action, rule.text) for rule in RULES}
-    causes = tuple(
-        m.Cause(name=n, action=action, age=1.0, text=text)
-        for n in names
-        for action, text in [texts.get(n, ("stop", n))]
-    )
-    return m.SafetyState(
-        verdict="stop", latched=latched, causes=causes, source=None, heartbeat=1,
-        limits=m.Limits(forward=1, backward=1, angular=1), text="All is well.",
-    )  # fmt: skip
+    found = [(name, *texts.get(name, ("stop", name))) for name in names]
+    causes = tuple(m.Cause(name=n, action=action, age=1.0, text=text) for n, action, text in found)
+    return factories.safety_state(verdict="stop", latched=latched, causes=causes)
 
 
 def seen(*messages: m.Message, **given: Any) -> Observation:
@@ -109,21 +102,17 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
     ("check", "given", "expected"),
     [
         (d.router, {"routers": ["1.9.0"]}, [("note", "Zenoh 1.9.0, on this laptop 1.10.2")]),
-        (d.router, {"routers": []}, [("note", "admin space is closed")]),
         (d.versions, {"newest": healths(health("bridge", version="0"))},
          [("note", "bridge is T2 0, this laptop 1")]),
         (d.versions, {"undecodable": {"tel/x": "not a Bumper"}},
          [("ok", "everywhere"), ("wrong", "tel/x: not a Bumper")]),
         (d.rights, {"may_drive": False}, [("note", "does not receive its driving")]),
-        (d.rights, {"may_drive": False, "may_call": False}, [("note", "driving and calls")]),
         (d.rights, {"may_drive": None, "may_call": None}, [("unknown", "require safety")]),
         (d.rights, {"instances": {}}, [("unknown", "no service found")]),
         (d.rights, {"rates": {}}, [("wrong", "no message arrives")]),
         (d.clock, {"delays_s": []}, [("unknown", "no message arrived")]),
         (d.clock, {"delays_s": [5.0]}, [("note", "5.0 s ahead of")]),
-        (d.clock, {"delays_s": [-5.0]}, [("note", "5.0 s behind")]),
         (d.clock, {"delays_s": [0.0, 0.3]}, [("note", "0.30 s longer"), ("ok", "agree to 0 ms")]),
-        (d.clock, {"one_clock": True}, [("ok", "on this host")]),
     ],
 )  # fmt: skip
 def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, str]]) -> None:
@@ -142,18 +131,13 @@ def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, s
             ("wrong", "the left sonar is faulty", d.SONARS["fault"][1]),
             ("wrong", "the front left sonar is covered: an object is below its minimum range",
              d.SONARS["too_near"][1])]),
-        (m.Driver(faults=("encoder", "bit_9"), bits=0x204), [
-            ("wrong", "the left motor driver reports encoder: invalid encoder signal: "
-             "the encoder's cable", d.DRIVER),
-            ("wrong", "the left motor driver reports bit_9: not documented in the manual",
-             d.DRIVER)]),
+        (m.Driver(faults=("bit_9",), bits=0x200),
+         [("wrong", "the left motor driver reports bit_9: not documented in the manual",
+           d.DRIVER)]),
         (m.Switches(ultrasonic_brake=False, bumper_brake=True),
          [("wrong", "the board's ultrasonic brake is off", d.SWITCHES)]),
-        (m.Switches(ultrasonic_brake=True),
-         [("wrong", "the board's bumper brake is not confirmed", d.SWITCHES)]),
         (link(armed=False, waiting="link lost"),
          [("note", "the bridge accepts no motion now: link lost", "")]),
-        (relay(), []),
         (relay("lost"), [("wrong", "the relay is silent", d.RELAY)]),
         (relay("never", version=""), [("wrong", "no report of the relay received", d.RELAY)]),
         (relay(braking="silent"),
@@ -164,7 +148,6 @@ def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, s
             ("note", "Waiting for a neutral request: release the controls, then drive. (stop)",
              "")]),
         (state("smoke", latched=("smoke",)), [("wrong", "smoke (stop, latched)", d.RESET)]),
-        (state("smoke"), [("wrong", "smoke (stop)", "")]),
     ],
 )  # fmt: skip
 def test_problems(message: m.Message, expected: list[tuple[str, str, str]]) -> None:
@@ -181,9 +164,6 @@ def test_without_messages_the_rest_is_unknown() -> None:
     nothing = Observation(zenoh="1", t2="1", instances=dict.fromkeys(d.NEEDED, 1), rates={"x": 1.0})
     levels = {each.where: each.level for each in diagnose(nothing, "001")}
     assert (levels["link"], levels["safety"]) == ("unknown", "unknown")
-    left = keys.DRIVER.path.format(side="left")
-    absent = dict.fromkeys((keys.BUMPER.path, keys.ULTRASONIC.path, left), NO_MESSAGE)
-    assert problems(seen(newest=absent)) == []
 
 
 def test_frames_rejected_and_unsent_during_the_observation() -> None:
@@ -194,7 +174,6 @@ def test_frames_rejected_and_unsent_during_the_observation() -> None:
         ("note", "the bridge rejects frames of the board: 5 bad_crc"),
         ("wrong", "the system failed to send 3 datagrams to the board"),
     ]
-    assert problems(seen(now, first={keys.LINK.path: NO_MESSAGE})) == []
 
 
 def test_streams_that_are_slow_missing_or_downsampled() -> None:
