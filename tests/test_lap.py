@@ -1,5 +1,6 @@
 """The demo's lap with the shipped settings, in simulated time."""
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -37,6 +38,21 @@ def test_the_lap_is_driven_as_it_should_be() -> None:
     (stop,) = stops(trace)
     assert stop.reaction_s is not None
     assert stop.reaction_s < 0.02
+
+
+def test_a_lap_without_a_reaction_to_the_bumper_is_not_good() -> None:
+    trace = trace_of(driven()[0])
+    hit_ns = next(hit.mono_ns for hit in trace.bumper if hit.pressed)
+    moving = [x for x in trace.truth if x.mono_ns <= hit_ns or abs(x.linear) > 0.001]
+    for changed, wrong in (
+        (replace(trace, commands=[]), "contact 1: frame to BRAKE frame"),
+        (replace(trace, truth=moving), "contact 1: stopped within"),
+        (replace(trace, truth=trace.truth[: len(trace.truth) // 2]), "distance from the start"),
+        (replace(trace, bumper=[]), ""),
+    ):
+        rows = results(changed)
+        assert not good(rows)
+        assert any(what.startswith(wrong) and not fine for what, _, fine in rows) or not wrong
 
 
 def test_safety_answers_as_the_steps_expect() -> None:

@@ -51,3 +51,8 @@ def test_the_same_seed_gives_the_same_trace_and_the_same_bytes() -> None:
     first = lap(1)
     assert first == lap(1)
     assert first[1] != lap(2)[1]
+
+
+def test_an_incomplete_last_line_is_ignored() -> None:
+    line = msgspec.json.encode(t.BumperSent(mono_ns=1, pressed=True)) + b"\n"
+    assert t.read(line + b'{"event":"tru') == [t.BumperSent(mono_ns=1, pressed=True)]
