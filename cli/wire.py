@@ -18,11 +18,12 @@ from typing import Any, get_args
 
 import msgspec
 
+from cli.settings import Everything
 from common.cli_args import add_sources, sources
 from common.config import load
 from common.errors import RobotError
 from common.messages import SONAR_NAMES, FaultName
-from common.settings import AngularUnit, Shared, Wire
+from common.settings import AngularUnit, Wire
 from common.wire import framing
 from common.wire.commands import TO_BOARD, MotionCommand
 from common.wire.frame import Frame, Kinds
@@ -41,12 +42,6 @@ UNITS = {"_mmps": "mm/s", "_mm": "mm", "_ddeg": "deg", "_raw": ""}
 Datagram = tuple[str, bytes]  # its place in the source, its bytes
 
 
-class WireConfig(Shared, frozen=True, kw_only=True):
-    """The configuration sections for decoding."""
-
-    wire: Wire = Wire()
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the subcommand."""
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
@@ -58,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the frames of the datagrams; return 1 if a run of bytes is invalid."""
-    wire = load(WireConfig, sources(options)).config.wire
+    wire = load(Everything, sources(options)).config.wire
     bad = 0
     for where, data in datagrams(options.source):
         offset = 0

@@ -58,6 +58,6 @@ def _until_reset(test: LatchTest) -> Iterator[str]:
     if others := sorted({command.upper() for command in braked if command is not Command.BRAKE}):
         yield f"Before the reset, safety sent {', '.join(others)} instead of BRAKE."
     if not test.reset.granted:
-        yield f"The reset was refused: {test.reset.text}"
+        yield f"The reset failed: {test.reset.text}"
     elif test.reset.latched:
         yield f"Still latched after the reset: {', '.join(test.reset.latched)}."

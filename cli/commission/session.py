@@ -98,14 +98,12 @@ class CheckoutSession(SafetyClient):
             seen = self.fresh_state()
             requested_ns = self.mark()
             answers = self.call(keys.RESET, reset_request(seen))
+            if not self.is_reset(seen, answers):
+                raise RobotError("safety's state does not show it")
         except RobotError as error:
             return Reset(requested_ns, False, str(error), self.latched())
-        if refusals := [answer.refusal for answer in answers if answer.refusal]:
-            return Reset(requested_ns, False, " ".join(refusals), self.latched())
-        granted = self.is_reset(seen, answers)
-        texts = [done.text for done in decoded(answers, ResetDone)]
-        text = " ".join(texts) if granted else "safety's state does not show it"
-        return Reset(requested_ns, granted, text, self.latched())
+        text = " ".join(done.text for done in decoded(answers, ResetDone))
+        return Reset(requested_ns, True, text, self.latched())
 
     def drive(self, requested: Twist, seconds: float) -> int | None:
         """Request a motion, then zero until the vehicle stands.

@@ -171,7 +171,7 @@ def _unlatch(session: CheckoutSession) -> str:
     if not confirm(fact, RESET_PHRASE):
         return "The earlier latch of safety was not reset."
     done = session.reset()
-    return "" if done.granted and not done.latched else f"The reset was refused: {done.text}"
+    return "" if done.granted and not done.latched else f"The reset failed: {done.text}"
 
 
 def _latch_test(session: CheckoutSession, cause: str, at_ns: int) -> LatchTest:

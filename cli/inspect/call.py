@@ -15,7 +15,6 @@ from cli.inspect.client import SafetyClient
 from cli.inspect.payload import read
 from cli.inspect.session import add_options, open_session
 from common import codec, keys
-from common.bus.probe import Answer
 from common.client import reset_request
 from common.errors import RobotError
 from common.keys import CALLS, Call
@@ -69,18 +68,10 @@ def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace
         request = filled(call, request, seen)
     typed = msgspec.convert(request, call.request)
     answers = client.call(call, typed)
-    show(answers, as_json=options.json)
+    for answer in answers:
+        output.value(read(answer.payload, answer.encoding).value, as_json=options.json)
     if seen and call is keys.RESET and not client.is_reset(seen, answers):
         raise RobotError("not confirmed: safety's state does not show this reset; run `t2 doctor`")
-
-
-def show(answers: list[Answer], *, as_json: bool) -> None:
-    """Print the replies; raise ``RobotError`` with the refusals."""
-    for answer in answers:
-        if not answer.refusal:
-            output.value(read(answer.payload, answer.encoding).value, as_json=as_json)
-    if refusals := [answer.refusal for answer in answers if answer.refusal]:
-        raise RobotError(f"refused: {' '.join(refusals)}")
 
 
 def known(path: str) -> Call[Any, Any]:

@@ -116,11 +116,13 @@ class SafetyClient:
         return self.state
 
     def call(self, call: Call[Any, Any], request: Struct, timeout_s: float = 2.0) -> list[Answer]:
-        """Return the answers to a call; raise ``RobotError`` without any."""
+        """Return the answers to a call; raise ``RobotError`` if it is refused or not answered."""
         key = call.on(self.robot)
         answers = self.probe.query(key, codec.encode(request), timeout_s)
         if not answers:
             raise RobotError(f"{key}: {self._why_unanswered(call, key)}")
+        if refusals := [answer.refusal for answer in answers if answer.refusal]:
+            raise RobotError(f"refused: {' '.join(refusals)}")
         return answers
 
     def is_reset(self, seen: SafetyState, answers: Iterable[Answer]) -> bool:

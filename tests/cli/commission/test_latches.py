@@ -58,7 +58,7 @@ def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
         ({"motions": [motion(0.01, Command.STOP)]}, "Safety did not command BRAKE."),
         ({"motions": [motion(0.6, Command.BRAKE)]}, "Safety took 0.60 s to command BRAKE"),
         ({"motions": [motion(0.01, Command.BRAKE), motion(0.03, Command.RUN)]}, "safety sent RUN"),
-        ({"reset": RESET._replace(granted=False, text="It moves.")}, "was refused: It moves."),
+        ({"reset": RESET._replace(granted=False, text="It moves.")}, "failed: It moves."),
         ({"reset": RESET._replace(latched=("estop",))}, "Still latched after the reset: estop."),
     ],
 )
