@@ -5,7 +5,7 @@ and ``neutral`` do not count: the vehicle stands because nothing requests motion
 controls must be released first.
 
 Times are seconds since the recording's first message, on the recorder's wall clock. A series holds
-NaN in a gap and for a non-finite value, so that no line is drawn through it.
+NaN in a gap, so that no line is drawn through it.
 """
 
 import math
@@ -115,13 +115,13 @@ class Series:
     times: list[float] = field(default_factory=list)  # s
     values: list[float] = field(default_factory=list)
 
-    def add(self, at_s: float, value: float | None) -> None:
+    def add(self, at_s: float, value: float) -> None:
         """Add a value; mark a gap before it with NaN."""
         if self.times and at_s - self.times[-1] > GAP_S:
             self.times.append(self.times[-1])
             self.values.append(NAN)
         self.times.append(at_s)
-        self.values.append(value if value is not None and math.isfinite(value) else NAN)
+        self.values.append(value)
 
 
 @dataclass(slots=True)

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -111,12 +110,6 @@ OTHER.p, OTHER.data = 6, tcp.TCP()
 )
 def test_the_payload_of_each_udp_packet(content: bytes, found: list[int]) -> None:
     assert list(from_pcap("trip", content)) == [(f"packet {n} {ENDS}", RUN) for n in found]
-
-
-def test_a_missing_library_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "dpkt", None)
-    with pytest.raises(RobotError, match="\\[inspect\\]"):
-        list(from_pcap("trip", as_pcap(on_ethernet(packet(RUN)))))
 
 
 flips = st.lists(st.tuples(st.integers(4, 10_000), st.integers(1, 255)), max_size=3)

@@ -1,6 +1,5 @@
 """zenoh-cli with T2's codec publishes and queries keys, as ``docs/inspect.md`` shows."""
 
-import json
 import shlex
 import subprocess
 import sys
@@ -8,9 +7,6 @@ from pathlib import Path
 
 import msgpack
 
-from common import keys
-from common.messages import Done
-from tests.cli.inspect.tool import pretend
 from tests.cli.processes import PATIENCE_S
 from tests.common.bus_fixture import BusFixture
 from verification.harness.waiting import wait_until
@@ -44,11 +40,3 @@ def test_put(buses: BusFixture) -> None:
     message = msgpack.unpackb(received[0])
     assert (message["celsius"], message["seq"]) == (21.5, 1)
     subscriber.undeclare()
-
-
-def test_get(buses: BusFixture) -> None:
-    pretend(
-        buses, "bridge", {},
-        lambda bus: bus.serve(keys.SET_LED, lambda _, caller: caller.reply(Done(text="lit"))),
-    )  # fmt: skip
-    assert json.loads(ran("get", buses)) == {"text": "lit", "boot": 0}

@@ -5,7 +5,6 @@ import re
 from xml.etree import ElementTree as ET
 
 from cli.recordings import figures
-from common.messages import Drive
 from tests import factories
 from tests.cli.recordings.drive_fixture import at, drive, state, timeline_of
 
@@ -32,14 +31,3 @@ def test_a_single_point_makes_no_path() -> None:
     drawn = figures.path(timeline) + figures.speeds(timeline)
     assert re.findall(r' d="M[^"L]*"', drawn)
     assert re.findall(r' d="[^"]*L *"', drawn) == []
-
-
-def test_non_finite_values_are_left_out() -> None:
-    inf = math.inf
-    timeline = timeline_of(
-        at("tel/odom/odometry", factories.odometry(x=inf), 0.0),
-        at("@cmd/drive/teleop", Drive(linear=inf, angular=inf, echo=1), 0.1),
-        at("tel/safety/state", state(False), 0.2),
-    )
-    assert timeline.path == []
-    assert "requested by teleop" in figures.speeds(timeline)

@@ -123,14 +123,6 @@ def test_a_service_that_starts_ends_the_replay(
     assert f"robot {buses.robot} has a running safety" in result.err
 
 
-def test_a_truncated_recording_is_played_up_to_its_end(path: Path, tool: Tool) -> None:
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) - 20])
-    result = tool("replay", str(path), *FAST)
-    assert result.code == 0
-    assert "the recording is truncated" in result.err
-
-
 PATHS = [topic.path.format(service="odom", side="left", source="web") for topic in keys.TOPICS]
 
 

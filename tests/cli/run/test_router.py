@@ -40,15 +40,6 @@ def test_the_router_has_threads_for_dead_links() -> None:
         wait_until(lambda: readers() >= 32, "threads that read")
 
 
-def test_an_open_network_endpoint_needs_insecure(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert main(["router", *sets("bus.listen=tcp/0.0.0.0:7447")]) == EXIT_CONFIG
-    message = capsys.readouterr().err
-    assert "listen tcp/0.0.0.0:7447 lets everybody on the network drive" in message
-    assert "--insecure to accept all" in message
-
-
 def test_print_the_configuration_for_zenohd(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
