@@ -222,6 +222,7 @@ def test_a_motion_between_begins_the_confirmation_anew() -> None:
 
 def test_standstill_is_confirmed_after_0_2_s() -> None:
     board = stopping(0.3)
+    board.step(0.0)
     still_ns = board.step(0.0).still_ns
     assert still_ns == board.now_ns
     while board.step(0.0).phase is Phase.STOPPING:
@@ -231,7 +232,8 @@ def test_standstill_is_confirmed_after_0_2_s() -> None:
 
 def test_a_command_to_move_ends_the_measured_standstill() -> None:
     board = stopping(0.3)
-    assert board.step(0.0).still_ns is not None
+    board.run(0.1)
+    assert board.state.still_ns is not None
     assert board.step(0.0, moves=True).still_ns is None
 
 
