@@ -1,4 +1,4 @@
-"""The generated modules of the client library ``sdk/``: message types, client, table of keys."""
+"""The generated modules of the client library ``sdk/``: messages with their keys, and client."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ from common import client, keys, messages
 SDK = Path(__file__).parent.parent / "sdk" / "t2"
 # Messages that the library neither reads nor sends.
 OMITTED = {"Driver", "EstopKeepalive", "Motion", "Durations", "Health", "SwitchesRequest"}
-HEAD = '''"""Messages on the bus; generated from the stack's own by ``make docs``, do not edit.
+HEAD = '''"""Messages and keys; generated from the stack's own by ``make docs``, do not edit.
 
 Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
 forward, y left, counter-clockwise positive. Readers ignore unknown fields.
@@ -29,19 +29,13 @@ from msgspec import Struct
 from t2.messages import Drive, ReleaseRequest, ResetDone, ResetRequest, SafetyState
 
 '''
-KEYS_HEAD = '''"""Keys on the bus; generated from the stack's own by ``make docs``, do not edit."""
-
-from t2 import messages as m
-
-'''
 
 
 def generated() -> dict[Path, str]:
     """Return the text of each generated module."""
     return {
-        SDK / "messages.py": f"{HEAD}\n{_body(messages)}",
+        SDK / "messages.py": f"{HEAD}\n{_body(messages)}{_keys()}",
         SDK / "client.py": CLIENT_HEAD + _body(client),
-        SDK / "keys.py": KEYS_HEAD + _keys(),
     }
 
 
@@ -59,12 +53,12 @@ def _body(module: ModuleType) -> str:
 
 def _keys() -> str:
     rows = [
-        f'    "{name.lower()}": ("{topic.path}", m.{topic.message.__name__}),\n'
+        f'    "{name.lower()}": ("{topic.path}", {topic.message.__name__}),\n'
         for name, topic in vars(keys).items()
         if isinstance(topic, keys.Topic) and topic.message.__name__ not in OMITTED
     ]
     return (
-        f'ROOT = "{keys.ROOT}"\n\n'
+        f'\n\n# --- keys {"-" * 83}\n\nROOT = "{keys.ROOT}"\n\n'
         "# By name: the path below the robot, and the type of the message.\n"
-        "TOPICS: dict[str, tuple[str, type[m.Message]]] = {\n" + "".join(rows) + "}\n"
+        "TOPICS: dict[str, tuple[str, type[Message]]] = {\n" + "".join(rows) + "}\n"
     )

@@ -1,4 +1,4 @@
-"""Messages on the bus; generated from the stack's own by ``make docs``, do not edit.
+"""Messages and keys; generated from the stack's own by ``make docs``, do not edit.
 
 Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
 forward, y left, counter-clockwise positive. Readers ignore unknown fields.
@@ -291,3 +291,23 @@ class ResetDone(Done, frozen=True, kw_only=True):
 
     heartbeat: int = 0  # the first ``SafetyState.heartbeat`` that shows the effect
     cleared: Annotated[tuple[int, ...], Few] = ()  # ``Cause.id`` of each cause that was cleared
+
+
+# --- keys -----------------------------------------------------------------------------------
+
+ROOT = "t2/v1"
+
+# By name: the path below the robot, and the type of the message.
+TOPICS: dict[str, tuple[str, type[Message]]] = {
+    "velocity": ("tel/bridge/velocity", Velocity),
+    "mileage": ("tel/bridge/mileage", Mileage),
+    "ultrasonic": ("tel/bridge/ultrasonic", Ultrasonic),
+    "bumper": ("tel/bridge/bumper", Bumper),
+    "switches": ("tel/bridge/switches", Switches),
+    "link": ("tel/bridge/link", Link),
+    "odometry": ("tel/odom/odometry", Odometry),
+    "safety": ("tel/safety/state", SafetyState),
+    "events": ("evt/{service}", Event),
+    "drive": ("@cmd/drive/{source}", Drive),
+    "limit": ("@cmd/limit/{source}", Limit),
+}

@@ -17,8 +17,8 @@ from t2.client import (
 )
 from t2.drive import Drive
 from t2.errors import NoData, NotAllowed, NotConfirmed, Refused
-from t2.keys import ROOT, TOPICS
 from t2.limit import SpeedLimit
+from t2.messages import ROOT, TOPICS
 from t2.motion import finite
 from t2.publisher import PERIOD_S, DrivePublisher
 from t2.stream import Stream, check_process

@@ -13,8 +13,7 @@ import msgspec
 import zenoh
 
 from t2.errors import LinkError, NoData
-from t2.keys import ROOT
-from t2.messages import Message
+from t2.messages import ROOT, Message
 
 M = TypeVar("M", bound=Message)
 
