@@ -1,7 +1,6 @@
 """Decoding of any payload: by its encoding, else as MessagePack, else as bytes. Never raises."""
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import msgspec
@@ -10,6 +9,9 @@ from msgspec import Struct
 from common import codec, keys
 from common.errors import MessageError
 
+_CALLED: list[type[Struct]] = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
+_PUBLISHED: list[type[Struct]] = [topic.message for topic in keys.TOPICS]
+KINDS = {kind.__name__: kind for kind in (*_PUBLISHED, *_CALLED)}
 UNREADABLE = (msgspec.MsgspecError, RecursionError, UnicodeDecodeError, ValueError)
 
 
@@ -39,14 +41,6 @@ def read(payload: bytes, encoding: str) -> Reading:
     return Reading(name or "msgpack", value, _complaint(value, name))
 
 
-@cache
-def kinds() -> dict[str, type[Struct]]:
-    """Return every message, request and reply of the bus by its name."""
-    of_calls: list[type[Struct]] = [k for call in keys.CALLS for k in (call.request, call.reply)]
-    of_topics: list[type[Struct]] = [topic.message for topic in keys.TOPICS]
-    return {kind.__name__: kind for kind in (*of_topics, *of_calls)}
-
-
 def at(value: Any, path: str) -> Any:
     """Return the value at ``causes.0.name``; raise ``MessageError`` naming the existing fields."""
     here = value
@@ -65,7 +59,7 @@ def _complaint(value: Any, name: str) -> str:
     """Check a decoded value against the type that its encoding names."""
     if not name:
         return ""
-    kind = kinds().get(name)
+    kind = KINDS.get(name)
     if kind is None:
         return f"unknown type {name}"
     try:

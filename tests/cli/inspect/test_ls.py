@@ -21,7 +21,7 @@ def bridge(buses: BusFixture) -> Bus:
     return pretend(buses, "bridge", {keys.BUMPER: lambda: Bumper(pressed=True)})
 
 
-def test_keys_with_type_rate_publishers_and_readers(
+def test_keys_and_services_with_publishers_and_readers(
     buses: BusFixture, bridge: Bus, tool: Tool
 ) -> None:
     pretend(buses, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
@@ -38,15 +38,11 @@ def test_keys_with_type_rate_publishers_and_readers(
     assert shown[0].split() == ["key", "type", "hz", "publishers", "readers"]
     assert shown[1].split()[0] == "tel/bridge/bumper"
     assert shown[1].split()[3:] == ["bridge", "safety"]
-
-
-def test_services(buses: BusFixture, bridge: Bus, tool: Tool) -> None:
-    pretend(buses, "safety", {}, lambda bus: bus.subscribe(keys.BUMPER, lambda _: None))
     found = {line["name"]: line for line in tool("ls", "--services").lines}
     assert found["bridge"]["publishes"] == ["tel/bridge/bumper"]
     assert found["safety"]["reads"] == ["tel/bridge/bumper"]
-    shown = tool("ls", "--services", text=True).out
-    assert f"bridge  (instance {bridge.boot:x})\n  publishes  tel/bridge/bumper\n" in shown
+    text = tool("ls", "--services", text=True).out
+    assert f"bridge  (instance {bridge.boot:x})\n  publishes  tel/bridge/bumper\n" in text
 
 
 def test_services_of_a_robot_that_dials_a_site(capsys: pytest.CaptureFixture[str]) -> None:
@@ -64,13 +60,6 @@ def test_services_of_a_robot_that_dials_a_site(capsys: pytest.CaptureFixture[str
         wait_until(lambda: found(own) == found(site) == alone, "the bridge alone")
 
 
-def test_nothing_to_list(tool: Tool) -> None:
-    for words, reason in (((), "no active key on"), (("--services",), "no service found")):
-        result = tool("ls", "--duration", "0.2", *words)
-        assert (result.code, result.out) == (1, "")
-        assert reason in result.err
-
-
 def test_figures_of_a_key(bridge: Bus, tool: Tool) -> None:
     result = tool("hz", "tel/**", "--count", "20")
     assert (result.code, result.err) == (0, "")
@@ -84,7 +73,11 @@ def test_figures_of_a_key(bridge: Bus, tool: Tool) -> None:
     assert len(row.split()) == len(head.split()) == len(line)
 
 
-def test_silence_is_reported_once_a_second(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silence_is_reported(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
+    for words, reason in (((), "no active key on"), (("--services",), "no service found")):
+        result = tool("ls", "--duration", "0.2", *words)
+        assert (result.code, result.out) == (1, "")
+        assert reason in result.err
     monkeypatch.setattr(hz, "REPORT_S", 0.05)
     result = tool("hz", "tel/none", "--duration", "0.3")
     assert (result.code, result.out) == (1, "")

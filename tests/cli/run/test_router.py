@@ -43,12 +43,10 @@ def test_the_router_has_threads_for_dead_links() -> None:
 def test_print_the_configuration_for_zenohd(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["router", "--print", "--insecure", *sets("bus.listen=tcp/0.0.0.0:7447")]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert (printed["mode"], printed["listen"]) == ("router", {"endpoints": ["tcp/0.0.0.0:7447"]})
-    zenoh.Config.from_json5(json.dumps(printed))  # rejects unknown settings
     assert main(["router", "--print", str(tmp_path / "router.json5")]) == 0
-    assert json.loads((tmp_path / "router.json5").read_text())["mode"] == "router"
+    printed = (tmp_path / "router.json5").read_text()
+    zenoh.Config.from_json5(printed)  # rejects unknown settings
+    assert json.loads(printed)["mode"] == "router"
     assert main(["router", "--print", str(tmp_path / "none" / "x")]) == EXIT_CONFIG
     assert "/none/x: cannot be written: No such file" in capsys.readouterr().err
 
