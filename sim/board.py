@@ -9,8 +9,8 @@ brake               while active, the board does BRAKE instead of the command
 =================== ===============================================================================
 ultrasonic (0x7603) a sonar in the direction of motion, measured or commanded, is nearer than the
                     brake range, or too near to measure
-bumper (0x7604)     the bumper is pressed; but ``toward`` allows a RUN that backs off, against
-                    the direction in which the vehicle last moved when it was pressed
+bumper (0x7604)     the bumper is pressed, except for a RUN that backs off, against the direction
+                    in which the vehicle last moved when it was pressed
 =================== ===============================================================================
 
 A faulty sonar brakes nothing. A motion command has no answer: the velocity is sent continuously
@@ -32,6 +32,8 @@ from sim.sonar import Ranges
 RADIANS = {"decidegree": math.radians(0.1), "milliradian": 0.001}
 FORWARD_SONARS, BACKWARD_SONARS = (1, 2, 3), (5, 6, 7)
 S32_SPAN = 2**32
+# Closer than safety's margin of 0.20 m: the sonar brake is the second line of defence.
+BRAKE_RANGE_MM = 150
 ROLLING = 0.005  # m/s, slower counts as standing
 EVEN = 0.5  # chance that a bouncing switch is closed
 
@@ -178,11 +180,11 @@ class Board:
             if way in self._ways()
             for index in sonars
         ]
-        return any(self._ranges[index] < self._model.brake_range * 1000 for index in watched)
+        return any(self._ranges[index] < BRAKE_RANGE_MM for index in watched)
 
     def _hit(self) -> bool:
         backs_off = self._pressed_way != 0 and self._ways() == {-self._pressed_way}
-        return self.pressed and not (backs_off and self._model.bumper_brake == "toward")
+        return self.pressed and not backs_off
 
 
 def _sign(linear: float) -> int:

@@ -13,7 +13,6 @@ from common.freshness import NS_PER_S
 from sim.model import Line
 
 QUEUE = 65536  # bytes that may wait for a limited rate; more are dropped
-REORDER_S = 0.03  # long enough that datagrams sent at 50 Hz overtake
 NONE = Line()
 
 
@@ -49,7 +48,8 @@ class Cable:
         for _ in range(2 if self._happens(faults.duplicate) else 1):
             left_ns = self._leaves_ns(faults, len(datagram.payload), now_ns)
             if left_ns is not None:
-                due_ns = left_ns + round(self._delay_s(faults) * NS_PER_S)
+                late = self._random.uniform(0.0, faults.jitter) if faults.jitter else 0.0
+                due_ns = left_ns + round((faults.delay + late) * NS_PER_S)
                 heapq.heappush(self._under_way, (due_ns, self._order, datagram))
                 self._order += 1
 
@@ -84,10 +84,6 @@ class Cable:
     def _happens(self, chance: float) -> bool:
         # Nothing is drawn for what cannot happen: switching one fault on leaves the others' draws.
         return chance > 0 and self._random.random() < chance
-
-    def _delay_s(self, faults: Line) -> float:
-        late = self._random.uniform(0.0, faults.jitter) if faults.jitter else 0.0
-        return faults.delay + late + (REORDER_S if self._happens(faults.reorder) else 0.0)
 
     def _flip(self, payload: bytes) -> bytes:
         if not payload:

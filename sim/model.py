@@ -112,7 +112,6 @@ class Line(Section, frozen=True, kw_only=True):
     port: Literal["first", "second", "both"] = "both"  # of the PC's two, the one with these faults
     drop: Chance = 0.0
     duplicate: Chance = 0.0
-    reorder: Chance = 0.0  # delayed until later datagrams have overtaken it
     corrupt: Chance = 0.0  # one to three bits flipped
     delay: Delay = 0.0  # s
     jitter: Delay = 0.0  # s, maximum additional delay
@@ -129,10 +128,6 @@ class Cable(Section, frozen=True, kw_only=True):
 class Model(Section, frozen=True, kw_only=True):
     """One vehicle with its board and cable."""
 
-    # How the board's own emergency brakes work is unknown. Its sonar brake acts closer than
-    # safety's margin of 0.20 m: it is the second line of defence.
-    brake_range: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.15  # m
-    bumper_brake: Literal["toward", "all"] = "toward"  # what it refuses while pressed
     sonar: Sonar = Sonar()
     bumper: Bumper = Bumper()
     body: Body = Body()

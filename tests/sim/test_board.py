@@ -30,9 +30,9 @@ def near(*sonars: int, millimetres: int = 100) -> Ranges:
     return tuple(millimetres if k in sonars else 5000 for k in range(8))
 
 
-def hit(way: float = 0.5, **parameters: Any) -> Board:
+def hit(way: float) -> Board:
     """Return a board with its bumper brake on that was hit while moving that way."""
-    some = board(**parameters)
+    some = board()
     some.answer(c.BumperBrakeSet(True))
     some.sense(Twist(way), CLEAR, pressed=False)
     some.sense(Twist(), CLEAR, pressed=True)
@@ -131,7 +131,7 @@ def test_wheels_of_another_size_count_another_distance_and_turn() -> None:
 def test_the_sonar_brake_watches_the_direction_of_motion(
     command: c.MotionCommand, rolling: float, sonar: int, millimetres: int, brakes: bool
 ) -> None:
-    some = board(brake_range=0.15)
+    some = board()
     some.answer(c.UltrasonicBrakeSet(True))
     some.answer(command)
     some.sense(Twist(rolling), near(sonar, millimetres=millimetres), pressed=False)
@@ -169,9 +169,6 @@ def test_the_bumper_brake_remembers_the_way_of_the_hit_until_the_release() -> No
     assert some.braking()
     some.sense(Twist(), CLEAR, pressed=False)
     assert some.drive() == FORWARD
-    some = hit(0.5, bumper_brake="all")
-    some.answer(BACKWARD)
-    assert some.drive() == BREAK
 
 
 def test_velocities_with_noise_and_bias() -> None:

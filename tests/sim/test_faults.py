@@ -33,12 +33,6 @@ def test_dropping_and_duplicating() -> None:
     assert through(MANY[:2], duplicate=1.0) == [MANY[0], MANY[0], MANY[1], MANY[1]]
 
 
-def test_reordering_loses_nothing_and_changes_the_order() -> None:
-    arrived = through(reorder=0.2)
-    assert arrived != MANY
-    assert sorted(arrived, key=MANY.index) == MANY
-
-
 def test_corrupting_flips_one_to_three_bits() -> None:
     for before, after in zip(MANY, through(corrupt=1.0), strict=True):
         flipped = int.from_bytes(before.payload, "big") ^ int.from_bytes(after.payload, "big")

@@ -172,7 +172,7 @@ def test_the_trace_knows_when_the_first_frame_said_so() -> None:
 LAP = (
     (0.8, 0.0, 1.0), (0.0, 1.0, 1.0), (0.6, 0.4, 1.0), (-0.3, -0.5, 2.0), (1.2, 0.1, 2.0),
 )  # fmt: skip
-LOSSY = Wire(drop=0.1, duplicate=0.1, reorder=0.1, corrupt=0.1, delay=0.02)
+LOSSY = Wire(drop=0.1, duplicate=0.1, corrupt=0.1, delay=0.02, jitter=0.03)
 REQUESTS: tuple[Asked, ...] = Wire(), LOSSY, LOSSY, PowerCycle(), LOSSY
 
 
