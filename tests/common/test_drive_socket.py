@@ -67,41 +67,22 @@ def test_its_directory_is_made_for_this_user_alone(tmp_path: Path) -> None:
     prepare(path)
 
 
-def _mode(folder: Path) -> None:
-    folder.chmod(0o710)
-
-
-def _owner(folder: Path) -> None:
-    if os.getuid() != 0:
-        pytest.skip("only root can give a directory away")
-    os.chown(folder, 1234, -1)
-
-
-def _link(folder: Path) -> None:
-    folder.rename(folder.parent / "other")
-    folder.symlink_to(folder.parent / "other")
-
-
-def _file(folder: Path) -> None:
-    (folder / "drive.sock").write_text("important")
-
-
-def _link_at_its_place(folder: Path) -> None:
-    (folder / "drive.sock").symlink_to(folder / "elsewhere")
+NEEDS_ROOT = pytest.mark.skipif(os.getuid() != 0, reason="only root can give a directory away")
 
 
 @pytest.mark.parametrize(
     ("given", "refusal"),
     [
-        (_mode, "{folder} must .* it has mode 710"),
-        (_owner, "owner 1234"),
-        (_link, "must be a directory"),
-        (_file, "{folder}/drive.sock exists and is not a socket"),
-        (_link_at_its_place, "is not a socket"),
+        (lambda folder: folder.chmod(0o710), "{folder} must .* it has mode 710"),
+        pytest.param(lambda folder: os.chown(folder, 1234, -1), "owner 1234", marks=NEEDS_ROOT),
+        (lambda folder: folder.symlink_to(folder.rename(f"{folder}2")), "must be a directory"),
+        (lambda folder: (folder / "drive.sock").write_text("important"),
+         "{folder}/drive.sock exists and is not a socket"),
+        (lambda folder: (folder / "drive.sock").symlink_to("elsewhere"), "is not a socket"),
     ],
-)
+)  # fmt: skip
 def test_what_others_can_enter_or_is_not_ours_is_refused_and_stays(
-    tmp_path: Path, given: Callable[[Path], None], refusal: str
+    tmp_path: Path, given: Callable[[Path], object], refusal: str
 ) -> None:
     folder = tmp_path / "t2"
     folder.mkdir(mode=0o700)
