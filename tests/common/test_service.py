@@ -22,9 +22,10 @@ from common.config import Sources, load
 from common.messages import MAX_TEXT, Event, Health
 from common.service import Node, run, serve
 from common.settings import Shared
-from tests.cli.processes import running, sets
+from tests.cli.processes import running
 from tests.common.bus_fixture import BusFixture
 from tests.common.systemd_manager import Manager
+from verification.harness.bus import set_options
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 
@@ -32,7 +33,7 @@ def specimen(
     log: Path, kind: str, endpoint: str, robot: str
 ) -> contextlib.AbstractContextManager["subprocess.Popen[bytes]"]:
     """Run the example service on a router, with its log in a file."""
-    given = sets(f"bus.connect={endpoint}", f"robot.id={robot}")
+    given = set_options(f"bus.connect={endpoint}", f"robot.id={robot}")
     return running([sys.executable, "-m", "tests.common.example_service", kind, *given], log)
 
 

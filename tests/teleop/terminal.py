@@ -57,7 +57,6 @@ class Terminal:
         env: Mapping[str, str] = os.environ,
         *,
         delay_s: float = 0.0,
-        answers: bool = True,
     ) -> None:
         self.fd, inner = os.openpty()
         fcntl.ioctl(inner, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
@@ -75,7 +74,6 @@ class Terminal:
         os.close(inner)
         os.set_blocking(self.fd, False)
         self.shown = b""
-        self._answers = answers
         self._keys, self._output = DelayLine(delay_s), DelayLine(delay_s)
         self._seen = 0  # bytes of ``shown`` that were searched for queries
         self._closed = threading.Event()
@@ -125,18 +123,15 @@ class Terminal:
         self.shown += part
         for query in QUERY.finditer(self.shown, self._seen):
             self._seen = query.end()
-            if self._answers:
-                row, column = query.groups()
-                self._keys.put(b"\x1b[%s;%sR" % (row, column))
+            row, column = query.groups()
+            self._keys.put(b"\x1b[%s;%sR" % (row, column))
 
 
 @contextlib.contextmanager
-def terminal(
-    endpoint: str, *program: str, delay_s: float = 0.0, answers: bool = True
-) -> Iterator[Terminal]:
+def terminal(endpoint: str, *program: str, delay_s: float = 0.0) -> Iterator[Terminal]:
     """Run a module with its arguments in a terminal while the context lasts."""
     module = [sys.executable, "-m", *(program or TELEOP), "--set", f"bus.connect={endpoint}"]
-    with at_terminal(Terminal(module, delay_s=delay_s, answers=answers)) as it:
+    with at_terminal(Terminal(module, delay_s=delay_s)) as it:
         yield it
 
 

@@ -71,7 +71,7 @@ class PolicyFixture:
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
         self.driver_boot, self.driver_seq = 99, 0
-        self.keepalive_boot, self.keepalive_seq = 66, 0
+        self.keepalive_seq = 0
         self.limit_boot, self.limit_seq = 55, 0
         self.pressed, self.lost = False, 0
         self.ranges, self.status = FREE, NO_ECHO
@@ -79,7 +79,6 @@ class PolicyFixture:
         self.angular: float | None = None
         self.distance = 100.0  # by the counters, which follow what is measured
         self.heading = 0.0
-        self.epoch = 0
         self.left_bits, self.right_bits = 0, 0
         self.switches = Switches(ultrasonic_brake=True, bumper_brake=True)
         self.link = link()
@@ -108,7 +107,7 @@ class PolicyFixture:
             self.heading = math.remainder(self.heading + angular * TICK_S, math.tau)
         samples: dict[str, Message] = {
             "velocity": Velocity(linear=linear, angular=angular),
-            "mileage": Mileage(distance=self.distance, heading=self.heading, epoch=self.epoch),
+            "mileage": Mileage(distance=self.distance, heading=self.heading, epoch=0),
             "ultrasonic": Ultrasonic(ranges=self.ranges, status=self.status),
             "bumper": Bumper(pressed=self.pressed, lost=self.lost),
             "left": Driver(faults=(), bits=self.left_bits),
@@ -176,7 +175,7 @@ class PolicyFixture:
         message = EstopKeepalive(
             echo=self.echo if echo is None else echo,
             seq=self.keepalive_seq,
-            boot=self.keepalive_boot,
+            boot=66,
         )
         return self.decide(KeepaliveRequest(source, message, self.now_ns))
 
