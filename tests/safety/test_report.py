@@ -1,5 +1,7 @@
 """Reports: texts, causes, limits, events on transitions only."""
 
+from collections.abc import Callable
+
 import pytest
 from msgspec import ValidationError, convert
 from msgspec.structs import replace
@@ -17,23 +19,12 @@ from services.safety.report import (
 from tests.safety.core.policy_fixture import PolicyFixture
 
 
-def noted(fixture: PolicyFixture, event: Trigger | None = None) -> list[str]:
+def noted(fixture: PolicyFixture, step: Callable[[], object] | Trigger) -> list[str]:
+    """Take a step, or decide on a trigger; return the events."""
     before = fixture.state
-    fixture.decide(event)
-    return [note.name for note in transitions(before, fixture.state, event)]
-
-
-def held(fixture: PolicyFixture) -> list[str]:
-    """Hold the release; return the events."""
-    before = fixture.state
-    fixture.hold()
-    return [note.name for note in transitions(before, fixture.state, None)]
-
-
-def ticked(fixture: PolicyFixture) -> list[str]:
-    before = fixture.state
-    fixture.tick()
-    return [note.name for note in transitions(before, fixture.state, None)]
+    trigger = None if callable(step) else step
+    step() if callable(step) else fixture.decide(step)
+    return [note.name for note in transitions(before, fixture.state, trigger)]
 
 
 def test_nothing_is_allowed_while_a_cause_is_latched() -> None:
@@ -72,20 +63,20 @@ def test_one_sentence_says_why() -> None:
 
 def test_a_release_reports_its_beginning_its_first_refusal_and_its_success() -> None:
     fixture = PolicyFixture().ready()
-    assert held(fixture) == ["release_refused"]
+    assert noted(fixture, fixture.hold) == ["release_refused"]
     fixture.pressed = True
-    assert ticked(fixture) == ["contact"]  # and another text, which the state publishes
-    assert held(fixture) == []
+    assert noted(fixture, fixture.tick) == ["contact"]  # and another text
+    assert noted(fixture, fixture.hold) == []
     fixture.linear = 0.0
     fixture.let_go(40)
-    assert held(fixture) == ["release"]
-    assert held(fixture) == []
+    assert noted(fixture, fixture.hold) == ["release"]
+    assert noted(fixture, fixture.hold) == []
     fixture.pressed = False
-    assert ticked(fixture) == ["release_end", "release_free"]
-    assert held(fixture) == []
+    assert noted(fixture, fixture.tick) == ["release_end", "release_free"]
+    assert noted(fixture, fixture.hold) == []
     assert fixture.published().release_refusal == BUMPER_FREE
     fixture.let_go()
-    assert held(fixture) == ["release_free"]
+    assert noted(fixture, fixture.hold) == ["release_free"]
     before = signature(fixture.state)
     fixture.let_go()
     assert signature(fixture.state) != before
@@ -106,19 +97,19 @@ def test_a_repeated_emergency_stop_is_one_event() -> None:
 
 def test_transitions_are_reported_once() -> None:
     fixture = PolicyFixture().running()
-    assert ticked(fixture) == []
+    assert noted(fixture, fixture.tick) == []
     fixture.pressed = True
-    assert ticked(fixture) == ["contact"]  # it is the stop, and the end of control
+    assert noted(fixture, fixture.tick) == ["contact"]  # it is the stop, and the end of control
     fixture.linear = 0.0
-    assert ticked(fixture) == []
+    assert noted(fixture, fixture.tick) == []
     fixture.left_bits = 3
-    assert ticked(fixture) == ["driver_fault"]
+    assert noted(fixture, fixture.tick) == ["driver_fault"]
     assert noted(fixture, Estop()) == ["estop"]
     assert noted(fixture, ResetRequest()) == ["reset_refused"]
     fixture.pressed, fixture.left_bits = False, 0
     fixture.tick(30)
     fixture.pressed = True
-    assert ticked(fixture) == ["contact"]  # another press, although the first is still latched
+    assert noted(fixture, fixture.tick) == ["contact"]  # another press beside the first
     fixture.pressed = False
     fixture.tick(30)
     assert noted(fixture, ResetRequest(echo=fixture.echo, causes=fixture.latched())) == ["reset"]
@@ -128,8 +119,8 @@ def test_transitions_are_reported_once() -> None:
 def test_a_change_of_source_is_reported() -> None:
     fixture = PolicyFixture().ready()
     for _ in range(15):
-        assert ticked(fixture) == []
-    assert ticked(fixture) == ["stop", "source"]
+        assert noted(fixture, fixture.tick) == []
+    assert noted(fixture, fixture.tick) == ["stop", "source"]
 
 
 def test_changes_are_published_at_once_and_distances_are_not_a_change() -> None:

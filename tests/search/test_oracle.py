@@ -49,21 +49,16 @@ def test_a_restarted_part_drives_after_a_neutral_request_and_not_before(name: st
 def test_the_oracle_objects_to_a_missing_protection(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """And to nothing in the same scenario with the protection."""
     (owner, attribute, broken), scenario, objection = MUTATIONS[name]
     change = monkeypatch.setitem if isinstance(owner, dict) else monkeypatch.setattr
-    change(owner, attribute, broken)
-    stack = driving()
-    assert stack.oracle.violations == []
-    for step in scenario:
-        step(stack)
-    stack.run(2000)
-    assert any(objection in one for one in stack.oracle.violations), stack.oracle.violations[:5]
-
-
-@pytest.mark.parametrize("name", MUTATIONS)
-def test_the_same_scenario_is_harmless_with_the_protection(name: str) -> None:
-    stack = driving()
-    for step in MUTATIONS[name][1]:
-        step(stack)
-    stack.run(2000)
-    assert stack.oracle.violations == []
+    for is_missing in (False, True):
+        if is_missing:
+            change(owner, attribute, broken)
+        stack = driving()
+        assert stack.oracle.violations == []
+        for step in scenario:
+            step(stack)
+        stack.run(2000)
+        found = stack.oracle.violations
+        assert any(objection in one for one in found) if is_missing else found == [], found[:5]
