@@ -150,10 +150,6 @@ def _log(message: Event, service: str) -> View:
     return "log", LOG, {**fields, "file": "", "line": 0}
 
 
-def _vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> dict[str, float]:
-    return {"x": x, "y": y, "z": z}
-
-
 def _pose(x: float, y: float, heading: float) -> dict[str, dict[str, float]]:
     rotation = {"z": math.sin(heading / 2), "w": math.cos(heading / 2)}
-    return {"position": _vector(x, y), "orientation": {"x": 0.0, "y": 0.0, **rotation}}
+    return {"position": {"x": x, "y": y, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, **rotation}}

@@ -11,7 +11,6 @@ Fields = tuple[tuple[str, str], ...]
 
 FIELDS: dict[str, Fields] = {
     "builtin_interfaces/msg/Time": (("sec", "int32"), ("nanosec", "uint32")),
-    "builtin_interfaces/msg/Duration": (("sec", "int32"), ("nanosec", "uint32")),
     "std_msgs/msg/Header": (("stamp", "builtin_interfaces/msg/Time"), ("frame_id", "string")),
     "std_msgs/msg/Bool": (("data", "bool"),),
     "std_msgs/msg/String": (("data", "string"),),
