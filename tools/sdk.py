@@ -1,15 +1,12 @@
 """The generated modules of the client library ``sdk/``: messages with their keys, and client."""
 
 import ast
-import re
 from pathlib import Path
 from types import ModuleType
 
 from common import client, keys, messages
 
 SDK = Path(__file__).parent.parent / "sdk" / "t2"
-# Messages that the library neither reads nor sends.
-OMITTED = {"Driver", "EstopKeepalive", "Motion", "Durations", "Health", "SwitchesRequest"}
 HEAD = '''"""Messages and keys; generated from the stack's own by ``make docs``, do not edit.
 
 Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
@@ -19,6 +16,8 @@ forward, y left, counter-clockwise positive. Readers ignore unknown fields.
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
+
+Command = Literal["run", "stop", "brake"]
 '''
 CLIENT_HEAD = '''"""Client of safety; generated from ``common/client.py``, do not edit."""
 
@@ -45,17 +44,16 @@ def _body(module: ModuleType) -> str:
     lines = text.splitlines(keepends=True)
     for node in reversed(ast.parse(text).body):
         is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        is_omitted = isinstance(node, ast.ClassDef) and node.name in OMITTED
-        if is_docstring or is_omitted or isinstance(node, ast.Import | ast.ImportFrom):
+        if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
             del lines[node.lineno - 1 : node.end_lineno]
-    return re.sub("\n{4,}", "\n\n\n", "".join(lines).strip("\n")) + "\n"
+    return "".join(lines).strip("\n") + "\n"
 
 
 def _keys() -> str:
     rows = [
         f'    "{name.lower()}": ("{topic.path}", {topic.message.__name__}),\n'
         for name, topic in vars(keys).items()
-        if isinstance(topic, keys.Topic) and topic.message.__name__ not in OMITTED
+        if isinstance(topic, keys.Topic)
     ]
     return (
         f'\n\n# --- keys {"-" * 83}\n\nROOT = "{keys.ROOT}"\n\n'

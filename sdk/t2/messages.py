@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
+Command = Literal["run", "stop", "brake"]
+
 # In the manual's order: counted clockwise from the left.
 SONAR_NAMES = (
     "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left",
@@ -84,6 +86,13 @@ class Bumper(Message, frozen=True, kw_only=True):
 
     pressed: bool
     lost: int = 0  # bumper polls of the last 0.2 s that the board did not answer
+
+
+class Driver(Message, frozen=True, kw_only=True):
+    """Faults of one motor driver (manual 2.7)."""
+
+    faults: Annotated[tuple[Name, ...], Few]  # names of the known bits, "bit_N" for reserved ones
+    bits: int  # all 32, as the board sent them
 
 
 class Switches(Message, frozen=True, kw_only=True):
@@ -234,6 +243,24 @@ class Limit(SourceMessage, frozen=True, kw_only=True):
     reason: Reason = ""  # for the operator, such as "person at 2 m"
 
 
+class EstopKeepalive(SourceMessage, frozen=True, kw_only=True):
+    """A sign of life of an emergency stop; without it safety brakes and latches."""
+
+
+class Motion(Message, frozen=True, kw_only=True):
+    """The motion that safety allows; the bridge obeys only this, for 200 ms."""
+
+    command: Command
+    linear: Number = 0.0  # m/s
+    angular: Number = 0.0  # rad/s
+    source: Name | None = None
+    judged: int = 0  # ``seq`` of the newest bumper sample in the verdict
+    judged_boot: int = 0  # ``boot`` of the bridge that sent that sample
+    latched: bool = False  # whether an operator's reset is needed
+    predecessor: int | None = None  # the newest ``Link.latched_by`` in the verdict
+    estop: int | None = None  # the newest ``Link.estop`` in the verdict, which has latched it
+
+
 # --- evt, health ----------------------------------------------------------------------------
 
 
@@ -246,7 +273,37 @@ class Event(Message, frozen=True, kw_only=True):
     about: Annotated[dict[Name, Text | int | Number | bool | None], Few] = {}
 
 
+class Durations(Struct, frozen=True, kw_only=True):
+    """Histogram of durations since the service's start."""
+
+    bounds: Annotated[tuple[Number, ...], Few]  # s, rising; upper bounds of the counts
+    counts: Annotated[tuple[int, ...], Few]  # one for each bound, and one above
+    worst: Number  # s, 0 without any
+
+
+class Health(Message, frozen=True, kw_only=True):
+    """Health of a service, once a second."""
+
+    service: Name
+    version: Name
+    uptime: Number  # s
+    rates: Annotated[dict[Name, Number], Few]  # messages by key, in the last second, Hz
+    counters: Counts  # since start
+    lateness: Number  # s, maximum lateness of the loop's timers in the last second
+    rss: int  # bytes
+    priority: int = 0  # of SCHED_FIFO; 0 for normal priority
+    reactions: Annotated[dict[Name, Durations], Few] = {}  # reaction times, by name
+
+
 # --- srv ------------------------------------------------------------------------------------
+
+
+class SwitchesRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Set the board's emergency brakes; None leaves one as it is."""
+
+    ultrasonic_brake: bool | None = None
+    bumper_brake: bool | None = None
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 
 class LedRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -303,11 +360,15 @@ TOPICS: dict[str, tuple[str, type[Message]]] = {
     "mileage": ("tel/bridge/mileage", Mileage),
     "ultrasonic": ("tel/bridge/ultrasonic", Ultrasonic),
     "bumper": ("tel/bridge/bumper", Bumper),
+    "driver": ("tel/bridge/driver/{side}", Driver),
     "switches": ("tel/bridge/switches", Switches),
     "link": ("tel/bridge/link", Link),
     "odometry": ("tel/odom/odometry", Odometry),
     "safety": ("tel/safety/state", SafetyState),
+    "health": ("tel/{service}/health", Health),
     "events": ("evt/{service}", Event),
     "drive": ("@cmd/drive/{source}", Drive),
     "limit": ("@cmd/limit/{source}", Limit),
+    "estop_keepalive": ("@cmd/estop_keepalive/{source}", EstopKeepalive),
+    "motion": ("@cmd/motion", Motion),
 }
