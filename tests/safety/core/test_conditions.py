@@ -1,0 +1,221 @@
+"""Conditions: what each input and each state raises, exactly."""
+
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from common.freshness import NS_PER_S, Latest
+from common.messages import Bumper, Driver, Switches, Ultrasonic, Velocity
+from common.motion import Twist
+from common.settings import Vehicle
+from common.standstill import Displacement
+from services.safety.config import LimitSource, Safety
+from services.safety.core.causes import Held, Observation
+from services.safety.core.conditions import observe_inputs
+from services.safety.core.inputs import Estop, Inputs
+from services.safety.core.motion_watch import MotionWatch, Phase, Standstill
+from services.safety.core.policy import Policy
+from services.safety.core.sources import (
+    Arbiter,
+    DriveChannel,
+    Keepalives,
+    LimitChannel,
+    SpeedLimits,
+)
+from services.safety.core.state import State, Verdict
+from tests.factories import link, safety_state
+
+NOW_NS = 100 * NS_PER_S
+BOOT, SEQ, OWN = 7, 40, 5
+STAMP: dict[str, int] = {"boot": BOOT, "seq": SEQ}
+SETTINGS = Safety()
+LIDAR = LimitSource(lease=0.5, silence="stop")
+
+
+def newest(message: Any, age_s: float = 0.0) -> Latest[Any]:
+    return Latest(message, NOW_NS - round(age_s * NS_PER_S))
+
+
+GOOD = Inputs(
+    velocity=newest(Velocity(linear=0.0, angular=0.0)),
+    ultrasonic=newest(Ultrasonic(ranges=(1.0,) * 8, status=("ok",) * 8)),
+    bumper=newest(Bumper(pressed=False, **STAMP)),
+    left=newest(Driver(faults=(), bits=0, **STAMP)),
+    right=newest(Driver(faults=(), bits=0, **STAMP)),
+    switches=newest(Switches(ultrasonic_brake=True, bumper_brake=True)),
+    link=newest(link(boot=BOOT)),
+    estop_connection=1,
+    estop_path=newest(safety_state()),
+    boot=OWN,
+)
+STATE = Policy(SETTINGS, Vehicle()).start()
+
+
+def observed(
+    inputs: Inputs, state: State = STATE, settings: Safety = SETTINGS
+) -> list[Observation]:
+    """Return the observations, absent ones without their text, which nobody reads."""
+    return [
+        one if one.present is True else replace(one, text="")
+        for one in observe_inputs(inputs, settings, state, NOW_NS)
+    ]
+
+
+def test_good_inputs_raise_nothing() -> None:
+    sample = (BOOT, SEQ)
+    assert observed(GOOD) == [
+        Observation("contact", False, sample),
+        Observation("estop", False),
+        Observation("estop_reader", False),
+        Observation("driver_left", False, sample),
+        Observation("driver_right", False, sample),
+        *(Observation(name, False) for name in (
+            "leaving", "starting", "link", "unarmed", "predecessor", "switches", "bumper",
+            "bumper_lossy", "silent", "runaway", "uncommanded_motion", "not_stopping",
+            "two_publishers",
+        )),
+    ]  # fmt: skip
+
+
+def test_without_inputs_the_first_samples_are_due() -> None:
+    due = (
+        "Waiting for the first sample of: velocity, ultrasonic, bumper, left driver, right driver, "
+        "link, switches, emergency stop."
+    )
+    assert observed(Inputs()) == [
+        Observation(name, name == "starting", text=due if name == "starting" else "")
+        for name in (
+            "contact", "estop", "estop_reader", "driver_left", "driver_right", "leaving",
+            "starting", "switches", "bumper", "bumper_lossy", "silent", "runaway",
+            "uncommanded_motion", "not_stopping", "two_publishers",
+        )
+    ]  # fmt: skip
+
+
+def bumper(age_s: float = 0.0, **fields: Any) -> dict[str, Any]:
+    return {"bumper": newest(Bumper(**{"pressed": False, **STAMP, **fields}), age_s)}
+
+
+def driver(side: str, *faults: str, bits: int = 0, age_s: float = 0.0) -> dict[str, Any]:
+    return {side: newest(Driver(faults=faults, bits=bits, **STAMP), age_s)}
+
+
+def linked(age_s: float = 0.0, **fields: Any) -> dict[str, Any]:
+    return {"link": newest(link(boot=BOOT, **fields), age_s)}
+
+
+def switched(ultrasonic: bool | None, strip: bool | None, age_s: float = 0.0) -> dict[str, Any]:
+    return {"switches": newest(Switches(ultrasonic_brake=ultrasonic, bumper_brake=strip), age_s)}
+
+
+# Inputs that differ from the good ones, the observed cause, and its text; None: it is absent.
+BY_INPUTS: list[tuple[dict[str, Any], str, str | None]] = [
+    (bumper(pressed=True), "contact", ""),
+    ({"event": Estop()}, "estop", ""),
+    (linked(estop=3), "estop", ""),
+    (driver("left", "over_current", "bit_31", bits=9), "driver_left",
+     "The left motor driver reports: over current, bit 31."),
+    (driver("right", bits=16), "driver_right", "The right motor driver reports: bits 0x10."),
+    (driver("right", "encoder"), "driver_right", "The right motor driver reports: encoder."),
+    ({"leaving": True}, "leaving", ""),
+    ({"estop_connection": 0}, "starting", "Waiting for the first sample of: emergency stop."),
+    ({"switches": None}, "starting", "Waiting for the first sample of: switches."),
+    (linked(state="lost"), "link", "The link to the board is lost."),
+    (linked(state="never"), "link", "No frame came from the board yet."),
+    (linked(state="lost", armed=False), "unarmed", None),
+    (linked(armed=False), "unarmed", ""),
+    (linked(armed=False, waiting="no echo"), "unarmed", "The bridge is not armed yet: no echo."),
+    (linked(latched_by=9), "predecessor", ""),
+    (linked(latched_by=BOOT), "predecessor",
+     "The vehicle moved without a command while safety was absent."),
+    (linked(latched_by=OWN), "predecessor", None),
+    (switched(False, True), "switches", ""),
+    (switched(True, None), "switches", ""),
+    (bumper(0.15), "bumper", None),
+    (bumper(0.151), "bumper", "The bumper is not being read."),
+    (bumper(lost=3), "bumper", None),
+    (bumper(lost=4), "bumper", "4 bumper polls of 0.2 s were lost."),
+    (bumper(lost=2), "bumper_lossy", None),
+    (bumper(lost=3), "bumper_lossy", "Creeping: 3 bumper polls of 0.2 s were lost."),
+    ({"velocity": newest(Velocity(linear=0.0, angular=0.0), 0.201)}, "silent",
+     "No recent data: velocity."),
+    (linked(0.601), "silent", "No recent data: link."),
+    (switched(True, True, 3.01), "silent", "No recent data: switches."),
+    (driver("left", age_s=2.01) | driver("right", age_s=2.01), "silent",
+     "No recent data: left driver, right driver."),
+    (driver("left", age_s=2.0) | driver("right", age_s=2.0), "silent", None),
+    ({"estop_path": newest(safety_state(), 0.201)}, "silent",
+     "No recent data: the emergency stop's path through the router."),
+]  # fmt: skip
+
+
+def check(name: str, text: str | None, *given: Any) -> None:
+    (one,) = [each for each in observed(*given) if each.name == name]
+    assert (one.present, one.text) == (text is not None, text or "")
+
+
+@pytest.mark.parametrize(("changes", "name", "text"), BY_INPUTS)
+def test_an_input_raises_its_cause(changes: dict[str, Any], name: str, text: str | None) -> None:
+    check(name, text, replace(GOOD, **changes))
+
+
+@pytest.mark.parametrize(("changes", "name"), [
+    ({"switches": None}, "starting"), ({"switches": None}, "switches"),
+    (switched(None, False), "switches"), (switched(True, True, 3.01), "silent"),
+])  # fmt: skip
+def test_unneeded_switches_raise_nothing(changes: dict[str, Any], name: str) -> None:
+    lax = Safety(require_switches=False, unsafe_overrides=("require_switches",))
+    check(name, None, replace(GOOD, **changes), STATE, lax)
+
+
+def decided(age_s: float) -> dict[str, Any]:
+    return {"decided_ns": NOW_NS - round(age_s * NS_PER_S)}
+
+
+def stands(**fields: Any) -> dict[str, Any]:
+    return {"motion": MotionWatch(standstill=Standstill(**fields))}
+
+
+LATE = {"phase": Phase.STOPPING, "due_ns": NOW_NS - 1}
+TWICE: dict[str, Any] = {"boot": 1, "seq": 1, "received_ns": NOW_NS, "conflict_ns": NOW_NS}
+STALLED = "Safety was stalled: an emergency stop may have been missed."
+# States that differ from the first one, likewise.
+BY_STATE: list[tuple[dict[str, Any], str, str | None]] = [
+    (decided(1.0), "estop_reader", None),
+    (decided(1.001), "estop_reader", STALLED),
+    ({"estop_connection": 2}, "estop_reader", ""),
+    ({"estop_connection": 1}, "estop_reader", None),
+    ({"keepalives": Keepalives(("pendant",), 1.0)}, "starting",
+     "Waiting for the first sample of: emergency stop keepalive of pendant."),
+    ({"verdict": Verdict(judged=(8, SEQ))}, "bumper", "The bridge has restarted."),
+    ({"verdict": Verdict(judged=(BOOT, SEQ - 3))}, "bumper", None),
+    ({"verdict": Verdict(judged=(BOOT, SEQ - 4))}, "bumper", "Samples of the bumper were lost."),
+    (decided(0.15), "silent", None),
+    (decided(0.151), "silent", "Safety was stalled: samples received meanwhile may be old."),
+    ({"motion": MotionWatch(runs_away=True)}, "runaway", ""),
+    (stands(has_left=True), "uncommanded_motion", ""),
+    (stands(**LATE), "not_stopping", "Standstill is not confirmed: no velocity is received."),
+    (stands(**LATE, displacement=Displacement(steady=Twist(0.25, -0.5))), "not_stopping",
+     "The vehicle does not stop: 0.25 m/s, -0.50 rad/s."),
+    ({"arbiter": Arbiter(SETTINGS.sources, {"teleop": DriveChannel(**TWICE)}),
+      "speed_limits": SpeedLimits({"lidar": LIDAR}, {"lidar": LimitChannel(**TWICE)})},
+     "two_publishers", "Two publishers use teleop, limit lidar."),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "name", "text"), BY_STATE)
+def test_a_state_raises_its_cause(changes: dict[str, Any], name: str, text: str | None) -> None:
+    check(name, text, GOOD, replace(STATE, **changes))
+
+
+@pytest.mark.parametrize(("lost", "lossy"), [(1, False), (2, True)])
+def test_lost_polls_slow_until_one_is_left(lost: int, lossy: bool) -> None:
+    held = replace(STATE, latches={"bumper_lossy": Held(0, 0, 0, (0, 0), "")})
+    text = f"Creeping: {lost} bumper polls of 0.2 s were lost." if lossy else None
+    check("bumper_lossy", text, replace(GOOD, **bumper(lost=lost)), held)
+
+
+def test_an_emergency_stop_of_the_bridge_counts_once() -> None:
+    check("estop", None, replace(GOOD, **linked(estop=3)), replace(STATE, estop=3))
+    check("estop", "", replace(GOOD, **linked(estop=4)), replace(STATE, estop=3))
