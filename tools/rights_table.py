@@ -6,8 +6,8 @@ import zenoh
 
 from cli.keys import access
 from cli.keys.access import Rights, Verb
+from cli.keys.members import OPERATORS_SOURCES, Profile, Role
 from common import keys
-from common.members import OPERATORS_SOURCES, Profile, Role
 from services.ros2 import names
 from services.ros2.config import Ros2
 

@@ -8,8 +8,8 @@ a set of Zenoh messages in each direction. The router drops all other messages w
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
+from cli.keys.members import OPERATORS_SOURCES, Member, Profile
 from common import keys
-from common.members import OPERATORS_SOURCES, Member, Profile
 from services.ros2 import names
 from services.ros2.config import Ros2
 

@@ -23,8 +23,8 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 from msgspec.structs import asdict
 
 from cli.keys.member_list import Span, common_name, is_ip
+from cli.keys.members import Member, Profile
 from common.errors import RobotError
-from common.members import Member, Profile
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,9 @@ from msgspec.structs import replace
 
 from cli.keys import instructions, member_list
 from cli.keys.member_list import BOUND, CA_DAYS, DAY_S, DAYS, EARLY_S
+from cli.keys.members import OPERATORS_SOURCES, ROLES, Members, Profile
 from common.cli_args import needs_extra
 from common.errors import ConfigError, RobotError
-from common.members import OPERATORS_SOURCES, ROLES, Members, Profile
 
 if TYPE_CHECKING:
     from cli.keys.store import Folder

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from cli.keys.machine_settings import MEMBERS, SETTINGS, connected, endpoints, ros_override
 from cli.keys.member_list import EVERY_ROBOT
-from common.members import OPERATORS_SOURCES, Member, Profile
+from cli.keys.members import OPERATORS_SOURCES, Member, Profile
 
 PLACE = "/etc/t2/keys"  # on a router's machine, as in the systemd units and compose.yaml
 # A container's router starts with generated rules: they must be generated again first.

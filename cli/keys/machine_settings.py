@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 
 from cli.keys.member_list import EVERY_ROBOT, LOCAL, VEHICLE
-from common.members import Profile
+from cli.keys.members import Profile
 
 PORT = 7447
 SOCKET = "unixsock-stream//run/t2/bus.sock"  # for on-board clients, protected by file permissions

@@ -14,8 +14,8 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from cli.inspect import output
+from cli.keys.members import OPERATORS_SOURCES, Member, Members, Profile, Role
 from common.errors import ConfigError, RobotError
-from common.members import OPERATORS_SOURCES, Member, Members, Profile, Role
 from common.settings import Name, SourceName
 
 DAY_S = 86_400

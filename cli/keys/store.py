@@ -14,11 +14,11 @@ from pathlib import Path
 import msgspec
 
 from cli.keys import member_list
+from cli.keys import members as member_files
 from cli.keys.ca import CertificateAuthority, Issued, certificate_from, certificate_pem, key_pem
 from cli.keys.machine_settings import CA, CERTIFICATE, MEMBERS, PRIVATE_KEY, SETTINGS, bus_toml
-from common import members as member_files
+from cli.keys.members import Members
 from common.errors import RobotError
-from common.members import Members
 
 SECRET, PUBLIC = 0o600, 0o644
 

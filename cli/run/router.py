@@ -6,9 +6,10 @@ import os
 import signal
 from pathlib import Path
 
+from cli.keys import members
 from cli.keys.access import RouterSettings, access_control
 from cli.run.router_probe import RouterProbe
-from common import clock, log, members, realtime
+from common import clock, log, realtime
 from common.bus.session import READERS, RUNTIME_ENV, router, router_config
 from common.cli_args import add_sources, sources
 from common.config import load

@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 
 from cli.__main__ import main
+from cli.keys import members
 from cli.keys.access import RouterSettings, access_control
-from common import members
 from common.bus.session import router
 from common.settings import BusSettings
 from verification.harness.ports import free_port

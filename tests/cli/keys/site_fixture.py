@@ -5,7 +5,7 @@ from typing import Any
 
 from msgspec.structs import asdict
 
-from common.members import Member, Members, Profile, Role
+from cli.keys.members import Member, Members, Profile, Role
 
 NOW = datetime(2026, 11, 21, 12, tzinfo=UTC)
 NOW_S = NOW.timestamp()

@@ -7,8 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from cli.keys.access import RouterSettings, Verb, access_control, rights, ros
+from cli.keys.members import Member, Role
 from common import keys
-from common.members import Member, Role
 from services.ros2 import names
 from services.ros2.config import Ros2
 from services.ros2.definitions import HASHES

@@ -22,8 +22,8 @@ from cli.keys.ca import (
     key_pem,
 )
 from cli.keys.member_list import DAY_S, profile
+from cli.keys.members import Profile
 from common.errors import RobotError
-from common.members import Profile
 
 SERVER, CLIENT = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
 SPAN = 1.8e9, 1.8e9 + 10 * DAY_S

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from cli.__main__ import main
+from cli.keys.members import read
 from common.cli_args import EXIT_CONFIG
-from common.members import read
 
 
 class Keys:

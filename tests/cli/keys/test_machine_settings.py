@@ -7,9 +7,9 @@ import pytest
 
 from cli.keys.machine_settings import SOCKET, bus_toml
 from cli.keys.member_list import profile
+from cli.keys.members import OPERATORS_SOURCES, Profile
 from cli.settings import Everything
 from common.config import Sources, load
-from common.members import OPERATORS_SOURCES, Profile
 from common.settings import Shared
 
 ROBOT = profile("robot", "001")

@@ -15,8 +15,8 @@ from cli.keys.member_list import (
     profile,
     span,
 )
+from cli.keys.members import ROLES, Member, Profile
 from common.errors import ConfigError, RobotError
-from common.members import ROLES, Member, Profile
 from tests.cli.keys.site_fixture import NOW_S, member, members
 
 OLD = member("driver", "anna", "00000001", 10)

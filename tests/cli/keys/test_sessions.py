@@ -13,9 +13,9 @@ import msgspec
 import pytest
 import zenoh
 
+from cli.keys.members import Profile
 from cli.keys.store import Folder
 from common.bus.session import client_config
-from common.members import Profile
 from common.settings import BusSettings
 from verification.harness.certificates import Site, connecting
 from verification.harness.waiting import wait_until

@@ -10,9 +10,9 @@ import pytest
 
 from cli.keys.ca import CertificateAuthority
 from cli.keys.member_list import DAY_S, profile
+from cli.keys.members import Members, Profile
 from cli.keys.store import Folder, locked
 from common.errors import RobotError
-from common.members import Members, Profile
 from tests.cli.keys.site_fixture import member, members
 
 SPAN = 1.8e9, 1.8e9 + 10 * DAY_S

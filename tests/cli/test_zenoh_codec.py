@@ -6,8 +6,8 @@ import math
 import msgpack
 import pytest
 
+from cli.zenoh_codec import decode, encode
 from common import codec
-from common.cli_codec import decode, encode
 from common.messages import Drive, PoseRequest
 
 KEY = "t2/v1/001/@cmd/drive/web"
