@@ -72,6 +72,8 @@ def _range(kind: Any, protective: tuple[float, float] | None) -> str:
         high = protective[1] if high is None else min(protective[1], high)
     if high is None:
         return ""
+    if high == 0.0:
+        return "0 without unsafe_overrides"
     return f"{low:g} to {high:g}" if low is not None else f"over {over or 0:g}, up to {high:g}"
 
 
