@@ -27,7 +27,8 @@ ReleaseRequest = Literal["none", "forward", "backward"]  # off a pressed bumper
 LimitEffect = Literal["none", "slow", "stop"]
 
 # NaN and infinity are out of this range, too: a message with such a number is undecodable.
-Number = Annotated[float, Meta(ge=-1e9, le=1e9)]
+MAX_NUMBER = 1e9
+Number = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 
 # A longer text or list makes a message undecodable. Members that may only read publish events, too:
 # one of 1 MB delayed the emergency stop of a terminal by seconds.
@@ -42,7 +43,7 @@ Statuses = Annotated[tuple[RangeStatus, ...], Meta(min_length=8, max_length=8)]
 Covariance3 = Annotated[tuple[Number, ...], Meta(min_length=9, max_length=9)]
 Covariance2 = Annotated[tuple[Number, ...], Meta(min_length=4, max_length=4)]
 
-Cap = Annotated[float, Meta(ge=0.0, le=1e9)]
+Cap = Annotated[float, Meta(ge=0.0, le=MAX_NUMBER)]
 MAX_REASON = 80  # characters
 Reason = Annotated[str, Meta(max_length=MAX_REASON)]
 

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from cli.inspect import output
-from cli.inspect.addressing import chunks
+from cli.inspect.addressing import chunks, parse_one_key
 from cli.inspect.client import SafetyClient
 from cli.inspect.payload import read
 from cli.inspect.session import add_options, open_session
@@ -26,8 +26,9 @@ Request = dict[str, Any]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "key", metavar="KEY", nargs="?", help="such as safety/reset; lists the calls if omitted"
-    )
+        "key", metavar="KEY", nargs="?", type=parse_one_key,
+        help="such as safety/reset; lists the calls if omitted",
+    )  # fmt: skip
     parser.add_argument(
         "request", metavar="JSON", nargs="?", type=json_object, default={},
         help="""a JSON object, such as '{"bumper_brake": true}'; all defaults if omitted; `echo`,

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from t2.messages import Odometry
+from t2.messages import MAX_NUMBER, Odometry
 
 ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towards its end
 SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
@@ -78,8 +78,8 @@ def slowing(left: float, speed: float, deceleration: float, slowest: float) -> f
 
 def finite(number: float) -> float:
     """Return a number, of NumPy for example, as a float; raise ``ValueError`` or ``TypeError``."""
-    if not math.isfinite(number):
-        raise ValueError(f"only finite numbers are possible, not {number}")
+    if not abs(number) <= MAX_NUMBER:
+        raise ValueError(f"only numbers up to {MAX_NUMBER:g} are possible, not {number}")
     return float(number)
 
 

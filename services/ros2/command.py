@@ -13,12 +13,12 @@ all publishers are one source. A command is passed on once, as it is: it is neve
 neutral command is invented.
 """
 
-import math
 from typing import NamedTuple
 
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
+from common.messages import MAX_NUMBER
 from services.ros2.cdr import Attachment
 
 HELD_BACK_NS = NS_PER_S // 5
@@ -144,8 +144,8 @@ class Commands:
 
 
 def _of_content(twist: Twist) -> Refusal | None:
-    if not all(map(math.isfinite, (*twist.linear, *twist.angular))):
-        return Refusal("not_finite", "A command has a number that is not finite.")
+    if not all(abs(number) <= MAX_NUMBER for number in (*twist.linear, *twist.angular)):
+        return Refusal("not_finite", "A command has a number that is not finite, or over 1e9.")
     if any((*twist.linear[1:], *twist.angular[:2])):
         return Refusal(
             "other_axes",

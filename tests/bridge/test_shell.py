@@ -8,7 +8,7 @@ import pytest
 from common import clock
 from common.bus.bus import Arrival
 from common.config import Sources, load
-from common.messages import Motion
+from common.messages import Link, Motion
 from common.motion import Command
 from common.service import Node
 from common.wire import framing
@@ -135,3 +135,15 @@ def test_a_brake_that_cannot_be_sent_at_once_is_tried_again_at_each_tick(bridge:
     receive_motion(bridge, Command.STOP, seq=3)  # a newer order takes its place
     ticks(bridge)
     assert made.motions == [BREAK, STOP]
+
+
+def test_what_cannot_be_sent_is_counted_and_told(bridge: Bridge) -> None:
+    refusing(bridge, 3)
+    for seq in (1, 2, 3):
+        receive_motion(bridge, Command.STOP, seq)
+    bridge._on_second(0)
+    bridge._on_tick(clock.now_ns())
+    assert bridge._node.counters["send_errors"] == 3
+    link = bridge._publishers["link"].last
+    assert isinstance(link, Link)
+    assert link.send_errors == 3

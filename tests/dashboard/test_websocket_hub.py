@@ -1,12 +1,16 @@
 """Order of the calls that wait for the fleet's thread, and the messages to a slow browser."""
 
 import asyncio
+from types import SimpleNamespace
+from typing import Any
 
 from services.dashboard.websocket_hub import (
     OUTBOX_MAX,
+    VIEWERS_MAX,
     Call,
     Inbox,
     Outbox,
+    WebSocketHub,
 )
 
 
@@ -47,3 +51,27 @@ def test_a_browser_that_takes_nothing_is_noticed() -> None:
         outbox.put(b"a snapshot", True)
         assert not outbox.full or len(outbox._texts) > OUTBOX_MAX
     assert outbox.full
+
+
+def test_the_number_of_viewers_is_limited() -> None:
+    done: list[str] = []
+
+    class Socket:
+        query_params = {"robot": "001"}  # noqa: RUF012 - read only
+
+        async def accept(self) -> None:
+            done.append("accepted")
+
+        async def close(self) -> None:
+            done.append("closed")
+
+        async def receive_text(self) -> str:
+            raise KeyError
+
+    fleet: Any = SimpleNamespace(join=print, leave=print)
+    socket: Any = Socket()
+    hub = WebSocketHub(lambda _: None, fleet)
+    for count in (VIEWERS_MAX - 1, VIEWERS_MAX):
+        hub._outboxes = {str(-number): Outbox() for number in range(count)}
+        asyncio.run(hub.serve(socket))
+    assert done == ["accepted", "closed"]

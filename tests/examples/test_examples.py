@@ -21,7 +21,9 @@ from mcp import Client, StdioServerParameters
 from nbclient import NotebookClient
 
 import t2
+from examples import limit_speed, nearest_obstacle, wall_follower
 from sim.requests import Bumper, Sonar
+from t2.messages import Ultrasonic
 from tests.sdk.library_robot import blocked, ready
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -158,3 +160,20 @@ def test_the_wall_follower_approaches_the_wall(robot: t2.Robot) -> None:
             return way > 1.0 and wall is not None and 0.6 < wall < 1.0
 
         wait_until(follows, "the wall beside the vehicle", 100.0)
+
+
+@pytest.mark.parametrize(
+    ("range_m", "status", "distance"),
+    [(1.5, "ok", 1.5), (None, "no_echo", math.inf), (None, "too_near", 0.0), (None, "fault", 0.0)],
+)
+def test_a_sonar_that_cannot_measure_counts_as_0(
+    range_m: float | None, status: Any, distance: float
+) -> None:
+    """What a program that somebody copies does at 0.02 m, or with a faulty sonar."""
+    clear: list[Any] = ["no_echo"] * 8
+    ranges: list[float | None] = [None] * 8
+    clear[2], ranges[2] = status, range_m
+    sample: Any = Ultrasonic(ranges=tuple(ranges), status=tuple(clear))
+    assert limit_speed.front(sample) == distance
+    assert wall_follower.distance(sample, wall_follower.FRONT) == distance
+    assert nearest_obstacle.nearest(sample) == distance

@@ -134,3 +134,11 @@ def test_an_address_that_does_not_exist_yet_is_waited_for(relay: RunningRelay) -
 )
 def test_an_invalid_setting_ends_it(words: list[str]) -> None:
     assert main(words) == EXIT_CONFIG
+
+
+def test_too_long_a_datagram_is_dropped(relay: RunningRelay) -> None:
+    pass_commands(relay)
+    relay.to_pc(bytes(2049))
+    relay.to_pc(bytes(2048))
+    wait_for(relay.pc[0], bytes(2048))
+    wait_until(lambda: "too_long" in relay.wait_for("silent")["counters"], "the counter")

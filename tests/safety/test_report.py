@@ -166,13 +166,13 @@ def test_the_longest_state_decodes() -> None:
         fixture.driver_boot = fixture.limit_boot = boot
         for name in names:
             fixture.request(source=name)
-            fixture.limit(0.0, reason="急" * MAX_REASON, source=f"l{name[1:]}")
+            fixture.limit(0.0, reason="\U000e0001" * MAX_REASON, source=f"l{name[1:]}")
     state = fixture.published()
     texts = {cause.name: cause.text for cause in state.causes}
     assert {"starting", "two_publishers", "limit_stop", "driver_left", "unarmed"} <= texts.keys()
     for name in names:
         assert f"limit l{name[1:]}" in texts["two_publishers"]
-        assert f"l{name[1:]}: 急" in texts["limit_stop"]
+        assert f"l{name[1:]}: \\u" in texts["limit_stop"]
         assert f"k{name[1:]}" in texts["starting"]
     assert decode(encode(state), SafetyState) == state
     everything = " ".join(texts[name] for name in state.latched)

@@ -1,9 +1,14 @@
 """The oracle observes drives, and objects to a stack with a protection removed."""
 
+from collections.abc import Iterable
+
 import pytest
 
+from common.freshness import NS_PER_S
+from common.wire.reports import BumperReport
 from tests.search.mutations import MUTATIONS, driver_blinks
 from tests.search.scripted_stack import ScriptedStack, driving
+from verification.search.bridge_book import BridgeBook
 
 
 def check_it_drives(stack: ScriptedStack) -> None:
@@ -62,3 +67,32 @@ def test_the_oracle_objects_to_a_missing_protection(
         stack.run(2000)
         found = stack.oracle.violations
         assert any(objection in one for one in found) if is_missing else found == [], found[:5]
+
+
+PORT_0, BOTH = [(0, False)] * 3, [(0, False), (1, False)] * 3
+
+
+@pytest.mark.parametrize(
+    ("samples", "found"),
+    [
+        ([(0, True), (0, True)], [0]),
+        ([(0, True), *PORT_0, (0, True)], [0, 4]),
+        # A copy on the other port is no further sample.
+        ([(0, True), (1, True), *BOTH[:4], (0, True)], [0]),
+        ([(0, True), (1, True), *BOTH, (0, True)], [0, 8]),
+    ],
+)
+def test_three_clear_samples_of_a_port_end_a_hit(
+    samples: Iterable[tuple[int, bool]], found: list[int]
+) -> None:
+    assert hits(samples) == found
+
+
+def hits(samples: Iterable[tuple[int, bool]]) -> list[int]:
+    """Return which samples of the bumper, each of a port, begin a hit."""
+    book = BridgeBook(1)
+    return [
+        number
+        for number, (port, pressed) in enumerate(samples)
+        if book.on_report(BumperReport(pressed), port, number * NS_PER_S // 50)
+    ]

@@ -57,6 +57,8 @@ class MotionOutput:
         self._velocity: Latest[Twist] | None = None
         # 2 equivalent mutants: it is read after a hit only.
         self._hit_ns = 0  # when the hit was read that the lease waits for
+        # 1 equivalent mutant: None is as false as False.
+        self._has_braked = False  # for a hit that ``on_hit`` has not taken yet
         self._stopping_ns: int | None = None
         # 1 equivalent mutant: no ``boot`` is an empty text.
         self._refused: int | None = None  # ``boot`` of the second authority that was reported
@@ -86,13 +88,14 @@ class MotionOutput:
 
     def reflex(self, now_ns: int) -> tuple[Send, Reacted]:
         """Brake for a hit before its datagram is processed; then ``on_hit``."""
-        self._hit_ns = now_ns
+        self._hit_ns, self._has_braked = now_ns, True
         return self.order(BRAKE), Reacted("reflex", now_ns)
 
     def on_hit(self, seq: int, now_ns: int) -> Outputs:
         """Hold BRAKE for a hit until safety has judged the sample that is published as ``seq``."""
-        if self._hit_ns != now_ns:  # its datagram holds more than the hit
+        if not self._has_braked:  # its datagram holds more than the hit
             yield from self.reflex(now_ns)
+        self._has_braked = False
         self.lease = leases.on_hit(self.lease, seq, now_ns)
 
     def on_estop(self, received_ns: int) -> Outputs:

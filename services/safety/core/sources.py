@@ -48,7 +48,14 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
-from common.messages import Drive, KeepaliveState, LimitState, ReleaseRequest, SourceMessage
+from common.messages import (
+    MAX_REASON,
+    Drive,
+    KeepaliveState,
+    LimitState,
+    ReleaseRequest,
+    SourceMessage,
+)
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
 from common.text import printable
 from services.safety.config import LimitSource, Source
@@ -256,7 +263,7 @@ class SpeedLimits(Struct, frozen=True):
                 channel,
                 linear=_cap(limit.linear),
                 angular=_cap(limit.angular),
-                reason=printable(limit.reason),
+                reason=printable(limit.reason)[:MAX_REASON],
             )
         return replace(self, channels={**self.channels, name: channel}), refused
 

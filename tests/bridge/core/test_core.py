@@ -71,6 +71,23 @@ def test_brake_leaves_before_the_rest_is_read(bench: Bench) -> None:
         break
 
 
+def test_brake_for_a_plain_hit_leaves_before_it_is_read(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(framing, "read", None)
+    outputs = iter(bench.core.datagram(HIT, 0, NOW))
+    assert motions([next(outputs), next(outputs)]) == [MotionKind.BREAK]
+
+
+def test_each_new_hit_of_a_datagram_brakes(bench: Bench) -> None:
+    bench.receive(CLEAR)
+    out = bench.receive(HIT + CLEAR * 3 + HIT)
+    assert motions(out) == [MotionKind.BREAK] * 2
+    assert events(out) == ["contact"] * 2
+    bench.receive(CLEAR, CLEAR, CLEAR)
+    assert motions(bench.receive(HIT)) == [MotionKind.BREAK]
+
+
 @pytest.mark.parametrize("form", ["alone", "behind", "before"])
 def test_a_hit_on_the_other_port_counts_at_once(bench: Bench, form: str) -> None:
     hit = HEADER.pack(BumperReport.OPENING, checksum(b"\x80")) + b"\x80"

@@ -98,7 +98,6 @@ def obey(
         (ARMED, run(seq=10), None, Refusal.OLD),
         (ARMED, run(seq=9), None, Refusal.OLD),
         (ARMED, run(seq=12), RUN, None),
-        # only finite numbers
         # the vehicle moved without a command: BRAKE until safety has latched that
         (MOVED, run(), BRAKE, Refusal.UNCOMMANDED),
         (MOVED, run(0.0, 0.0), BRAKE, Refusal.UNCOMMANDED),

@@ -151,6 +151,8 @@ def test_replies_and_refusals(buses: BusFixture, tool: Tool) -> None:
         (("reset",), 1, "reset is ambiguous: safety/reset, odom/reset"),
         (("bridge/led", '{"chanel": 1}'), 2, "not a LedRequest"),
         (("safety/reset", "{"), 2, "is not a JSON object"),
+        (("safety/*",), 2, "matches several keys"),
+        (("t2/v1/*/srv/bridge/led",), 2, "matches several keys"),
     ],
 )  # fmt: skip
 def test_calls_that_fail(words: tuple[str, ...], code: int, phrase: str, tool: Tool) -> None:
