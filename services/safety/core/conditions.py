@@ -111,6 +111,7 @@ def _link(inputs: Inputs) -> Iterator[Observation]:
         return
     link = inputs.link.value
     texts = {"lost": "The link to the board is lost.", "never": "No frame came from the board yet."}
+    # 3 equivalent mutants: nobody reads the text of an absent cause.
     yield Observation("link", link.state != "up", text=texts.get(link.state, ""))
     text = f"The bridge is not armed yet: {link.waiting}." if link.waiting else ""
     yield Observation("unarmed", link.state == "up" and not link.armed, text=text)
@@ -145,6 +146,7 @@ def _bumper(inputs: Inputs, settings: Safety, judged: Token | None, now_ns: int)
 
 
 def _bumper_lossy(inputs: Inputs, held: bool) -> Observation:
+    # 1 equivalent mutant: a single lost poll is not lossy either.
     polls = inputs.bumper.value.lost if inputs.bumper else 0
     lossy = polls >= LOST_POLLS or (held and polls > FEW_POLLS)
     text = f"Creeping: {polls} bumper polls of 0.2 s were lost."
