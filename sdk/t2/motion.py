@@ -79,7 +79,7 @@ def slowing(left: float, speed: float, deceleration: float, slowest: float) -> f
 def finite(number: float) -> float:
     """Return a number, of NumPy for example, as a float; raise ``ValueError`` or ``TypeError``."""
     if not abs(number) <= MAX_NUMBER:
-        raise ValueError(f"only numbers up to {MAX_NUMBER:g} are possible, not {number}")
+        raise ValueError(f"only finite numbers up to {MAX_NUMBER:g} are possible, not {number}")
     return float(number)
 
 
