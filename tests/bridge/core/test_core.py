@@ -74,9 +74,11 @@ def test_brake_leaves_before_the_rest_is_read(bench: Bench) -> None:
 def test_brake_for_a_plain_hit_leaves_before_it_is_read(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(framing, "read", None)
     outputs = iter(bench.core.datagram(HIT, 0, NOW))
-    assert motions([next(outputs), next(outputs)]) == [MotionKind.BREAK]
+    with monkeypatch.context() as unreadable:
+        unreadable.setattr(framing, "read", None)
+        first = [next(outputs), next(outputs)]
+    assert (motions(first), reactions(first)) == ([MotionKind.BREAK], ["reflex"])
 
 
 def test_each_new_hit_of_a_datagram_brakes(bench: Bench) -> None:
