@@ -95,6 +95,7 @@ class MotionOutput:
         """Hold BRAKE for a hit until safety has judged the sample that is published as ``seq``."""
         if not self._has_braked:  # its datagram holds more than the hit
             yield from self.reflex(now_ns)
+        # 1 equivalent mutant: None is as false as False.
         self._has_braked = False
         self.lease = leases.on_hit(self.lease, seq, now_ns)
 
@@ -174,8 +175,10 @@ class MotionOutput:
     def order(self, order: Command, motion: Motion | None = None) -> Send:
         """Return the frame of an order, from the command port; a RUN needs its motion."""
         if order is RUN and motion is not None:
-            return Send(framing.pack(self._translator.run(motion)), self.port, order)
-        return Send(RESTING[order], self.port, order)
+            datagram = framing.pack(self._translator.run(motion))
+        else:
+            datagram = RESTING[order]
+        return Send(datagram, self.port, order)
 
     def _is_at_standstill(self, now_ns: int) -> bool:
         """Return whether standstill was measured after ``stop``."""
