@@ -37,7 +37,7 @@ class Column:
     """A column of a table: a figure of each row, or its median as a multiple of a row's."""
 
     head: str
-    figure: str  # the last part of a series' name
+    figure: str  # the last part of its name in ``Figures``
     unit: Unit
     share: Share = "p50"
     of: tuple[str, ...] = ()

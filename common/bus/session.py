@@ -41,8 +41,8 @@ RUNTIME_ENV = "ZENOH_RUNTIME"  # Zenoh reads it once, when the first session ope
 # host may wait this long for an attempt from the old address.
 OPEN_MS = 4_000
 # Zenoh drops a larger received message, and keeps the link. By default any member could fill 1 GiB
-# of memory for each priority. Odometry's path, our largest message, has up to 6 MB. A router also
-# forwards messages of others: an uncompressed image of 1920 x 1080 pixels has 6 MB.
+# of memory for each priority. Our messages are far smaller (``common/messages.py`` bounds them). A
+# router also forwards messages of others: an uncompressed image of 1920 x 1080 pixels has 6 MB.
 CLIENT_MAX, ROUTER_MAX = 8 * 2**20, 16 * 2**20
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 # Motions come in bursts, and each takes a batch because it is express. With Zenoh's two batches, up
