@@ -108,6 +108,7 @@ class Net:
         self.connections = 1  # since the start
         self.disturbances: dict[str, Disturbance] = {}
         self.subscriptions: list[Subscription] = []
+        self._readers: dict[str, list[Subscription]] = {}  # by key
         self._under_way: list[tuple[int, int, Subscription, Envelope]] = []  # by the due time
         self._counts: Counter[str] = Counter()
         self._order = 0
@@ -121,14 +122,23 @@ class Net:
         """Send an envelope to all matching subscriptions, under the disturbance of its route."""
         route = route_of(envelope.key)
         disturbance = self.disturbances.get(route, CLEAR)
-        for subscription in self.subscriptions:
+        for subscription in self._readers_of(envelope.key):
             reached = envelope.private if subscription.private else self.up
-            if reached and subscription.owner.alive and matches(subscription.key, envelope.key):
+            if reached and subscription.owner.alive:
                 self._counts[route] += 1
                 for delay_ms in disturbance.delays_ms(self._counts[route]):
                     self._order += 1
                     due_ns = self.now_ns + delay_ms * MS
                     heapq.heappush(self._under_way, (due_ns, self._order, subscription, envelope))
+
+    def subscribe(self, subscription: Subscription) -> None:
+        self.subscriptions.append(subscription)
+        self._readers.clear()
+
+    def _readers_of(self, key: str) -> list[Subscription]:
+        if key not in self._readers:
+            self._readers[key] = [it for it in self.subscriptions if matches(it.key, key)]
+        return self._readers[key]
 
     def turn(self) -> None:
         """Deliver everything that is due."""
@@ -320,7 +330,7 @@ class Process:
             handle(envelope)
             self.taking = None
 
-        self.net.subscriptions.append(Subscription(self, key, take, depth, private))
+        self.net.subscribe(Subscription(self, key, take, depth, private))
 
     def announce(self, key: str) -> None:
         """Do nothing: every key reaches every subscription here."""
