@@ -1,9 +1,7 @@
 """``python -m verification.search``: random vehicles, rooms, operators and faults."""
 
 import argparse
-import gc
 import multiprocessing
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -12,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from verification.search.page import page
-from verification.search.run import Result, run_seed
+from verification.search.run import Result, prepare_worker, run_seed
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -42,12 +40,6 @@ def campaign(runs: int, out: Path | None = None) -> list[Result]:
                 out.write_text(page(by_seed), encoding="utf-8")
     print(f"{runs} runs in {(time.monotonic() - began_s) / 60:.0f} min")
     return found
-
-
-def prepare_worker() -> None:
-    """Give way to other programs, and collect garbage rarely: a fifth of the time otherwise."""
-    os.nice(10)
-    gc.set_threshold(50_000)
 
 
 def show(seed: int) -> int:

@@ -1,6 +1,8 @@
 """One run: a draw, driven in simulated time, with its faults and verdicts."""
 
+import gc
 import math
+import os
 import time
 import traceback
 from collections import Counter
@@ -46,6 +48,12 @@ class Result(Struct, frozen=True, kw_only=True):
     def completed(self) -> bool:
         """Whether the script was finished without a needless stop."""
         return self.finished and not self.stops
+
+
+def prepare_worker() -> None:
+    """Give way to other programs; collect garbage rarely, which takes a fifth of the time otherwise."""
+    os.nice(10)
+    gc.set_threshold(50_000)
 
 
 def run_seed(seed: int) -> Result:
