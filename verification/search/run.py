@@ -51,7 +51,7 @@ class Result(Struct, frozen=True, kw_only=True):
 
 
 def prepare_worker() -> None:
-    """Give way to other programs; collect garbage rarely, which takes a fifth of the time otherwise."""
+    """Give way to other programs; collect garbage rarely, otherwise a fifth of the time."""
     os.nice(10)
     gc.set_threshold(50_000)
 
