@@ -34,6 +34,7 @@ def test_the_distance_begins_between_two_counters() -> None:
     for now, distance in ((-0.03, 1.0), (0.01, 1.032), (0.05, 1.064), (0.09, 1.1), (0.13, 1.2)):
         made.add(at(Mileage(distance=distance, heading=0.0, epoch=0), now))
     (stop,), _ = find_stops(made)
+    assert stop.file == ""
     assert stop.distance == pytest.approx(1.1 - 1.024)
     assert stop.reaction == pytest.approx(0.03)
     assert stop.deceleration == pytest.approx(0.8 / 0.02)
@@ -52,6 +53,24 @@ def test_brake_after_stop(brake_s: float, braked: bool) -> None:
     assert (stop.kind, stop.braked) == ("stop", braked)
     assert stop.reaction == pytest.approx(0.1, abs=0.002)
     assert stop.deceleration == pytest.approx(0.5, abs=0.002)
+
+
+def test_the_velocity_at_the_begin_of_brake_belongs_to_the_slope_of_stop() -> None:
+    made = streams(commanding(Command.BRAKE, 0.145))
+    made = changed(made, lambda v, now: replace(v, linear=0.8 if now < 0.13 else 0.0))
+    (stop,), _ = find_stops(made)
+    assert stop.braked
+    assert stop.deceleration == pytest.approx(0.8 / 0.02)
+
+
+def test_a_stop_by_brake() -> None:
+    (stop,), _ = find_stops(braking())
+    assert (stop.kind, stop.braked) == ("brake", False)
+
+
+def test_the_speed_is_the_newest_one_at_the_command() -> None:
+    (stop,), _ = find_stops(faster(0.01, 0.0))
+    assert stop.speed == pytest.approx(0.81)
 
 
 def test_a_single_velocity_of_zero_is_no_standstill() -> None:
@@ -97,10 +116,6 @@ def restarted(first: int, **change: int) -> Streams:
     return made
 
 
-def bumped(seconds: float, pressed: bool = True) -> Streams:
-    return streams(at(Bumper(pressed=pressed), seconds))
-
-
 STANDS_S = 1.685  # the second velocity below 0.02 m/s
 RUN_FIRST, STOP_FIRST = (f"changed to {name} before standstill" for name in ("RUN", "STOP"))
 TOO_SOON = "changed to BRAKE before it slowed down"
@@ -123,6 +138,7 @@ HIT, RESTART = "the bumper was pressed", "bridge or board restarted"
         (streams(speed=0.1), ""),
         (turned(0.11), "turning"),
         (turned(0.1), ""),
+        (turned(0.2, until_s=0.0), "turning"),
         # 5 % of the faster velocity, in the 0.2 s before the newest one at the command
         (faster(0.041, -0.19), ""),
         (faster(0.043, -0.19), UNSTEADY),
@@ -130,14 +146,12 @@ HIT, RESTART = "the bumper was pressed", "bridge or board restarted"
         (faster(0.029, -0.1, 0.2), ""),  # a slow vehicle may scatter by 3 cm/s
         (faster(0.031, -0.1, 0.2), UNSTEADY),
         (only(lambda now: now > 0), SPEEDS),
+        (only(lambda now: now > -0.02), ""),
         (only(lambda now: now > 0 or now < -0.1), SPEEDS),
         (only(lambda now: not 0.5 < now < 0.6), SPEEDS),
         (only(lambda now: not 0.5 < now < 0.58), ""),
         (streams(until_s=1.5), ENDS),
         (turned(0.2, 1.0, 9.0), ENDS),  # it does not stand while it turns
-        (bumped(STANDS_S), HIT),
-        (bumped(0.5, pressed=False), ""),
-        (bumped(1.69), ""),
         (counted(lambda now: now > 0), COUNTERS),
         (counted(lambda now: now < 1.69), COUNTERS),
         (counted(lambda now: not -0.1 < now < 0.15), COUNTERS),
@@ -157,6 +171,26 @@ def test_stops_that_are_left_out(made: Streams, reason: str) -> None:
     assert not any(stop.braked for stop in found)
 
 
+@pytest.mark.parametrize(
+    ("seconds", "pressed", "reasons"),
+    [(0.0, True, {HIT: 1}), (STANDS_S, True, {HIT: 1}), (1.69, True, {}), (0.5, False, {})],
+)
+def test_a_pressed_bumper(seconds: float, pressed: bool, reasons: dict[str, int]) -> None:
+    assert find_stops(streams(at(Bumper(pressed=pressed), seconds)))[1] == reasons
+
+
+def test_stops_that_are_left_out_are_counted() -> None:
+    made = streams(speed=0.05)
+    made.motions *= 2
+    assert find_stops(made) == ([], {"slower than 0.1 m/s": 2})
+
+
+def test_a_vehicle_that_turns_in_place_has_speed() -> None:
+    made = streams(speed=0.0)
+    made.motions[0] = replace(made.motions[0], angular=0.5)
+    assert find_stops(made) == ([], {"slower than 0.1 m/s": 1})
+
+
 def test_what_begins_a_stop() -> None:
     """Only the first STOP or BRAKE after a RUN with speed."""
     made = streams()
@@ -171,9 +205,11 @@ def test_what_begins_a_stop() -> None:
     assert find_stops(made) == ([], {})
 
 
-def test_a_rate_that_is_not_falling() -> None:
+@pytest.mark.parametrize("speeds", [(0.2, 0.5, 0.8), (0.5, 0.52, 0.54), (0.5, 0.5, 0.5)])
+def test_a_rate_that_is_not_falling(speeds: Sequence[float]) -> None:
+    points = [(number / 10, speed) for number, speed in enumerate((1.0, *speeds, 0.0))]
     with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
-        slope([(0.0, 1.0), (0.1, 0.2), (0.2, 0.5), (0.3, 0.8), (0.4, 0.0)])
+        slope(points)
 
 
 @pytest.mark.parametrize(
