@@ -102,6 +102,12 @@ def test_gears_are_chosen_by_number(operator: Operator) -> None:
     assert list(SETTINGS.gears_linear) == sorted(set(SETTINGS.gears_linear))
 
 
+def test_two_directions_drive_an_arc(operator: Operator) -> None:
+    operator.press("w")
+    operator.press("a")
+    assert operator.ticks(2)[-1] == request(0.2, 0.3)
+
+
 @pytest.mark.parametrize(("key", "direction"), [("f", "forward"), ("b", "backward")])
 def test_a_release_and_driving_exclude_each_other(
     operator: Operator, key: str, direction: str
@@ -126,6 +132,11 @@ def test_the_last_direction_of_a_release_counts_and_ends_by_itself(operator: Ope
 
 
 # --- gamepad --------------------------------------------------------------------------------
+
+
+def test_before_there_is_a_gamepad_it_is_neither_silent_nor_due(operator: Operator) -> None:
+    assert operator.controls.is_gamepad_silent is False
+    assert operator.controls.is_gamepad_due(operator.now_ns) is False
 
 
 @pytest.mark.parametrize("key", ["space", "e", "f", "b"])

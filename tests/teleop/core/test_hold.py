@@ -9,7 +9,7 @@ from common.client import NEUTRAL, ZEROS
 from common.freshness import NS_PER_S
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
-from services.teleop.core.hold import RULES, Keys, Press
+from services.teleop.core.hold import RULES, Deadman, Keys, Press
 
 
 def at(seconds: float) -> int:
@@ -35,6 +35,16 @@ def test_deadlines_of_keys(
     for at_s, names in held.items():
         assert keys.held(at(at_s)) == list(names)
     assert keys.held(at(released)) == []
+
+
+def test_a_deadman_counts_after_it_was_up() -> None:
+    deadman = Deadman(silence_s=1.0)
+    assert deadman.is_held is False
+    for down, held in ((True, False), (False, False), (True, True)):
+        deadman.update(down, 0, 0)
+        assert deadman.is_held is held
+    deadman.drop()
+    assert deadman.is_held is False
 
 
 # When keys count again, and whether the deadman must come up, by rule.
