@@ -51,6 +51,25 @@ class Refusal(NamedTuple):
     text: str
 
 
+OUT_OF_ORDER = Refusal("out_of_order", "A command arrived again, or after a later one.")
+HELD_BACK = Refusal(
+    "held_back",
+    "A command took over 0.2 s longer than the fastest of its publisher. The network held it back, "
+    "or the publisher's clock was set: restart that node.",
+)
+SETTLING = Refusal("settling", "A publisher is new, or its delay changes. Commands are taken soon.")
+SECOND_PUBLISHER = Refusal("second_publisher", "Another publisher drives. One at a time may.")
+NOT_NEUTRAL = Refusal(
+    "not_neutral", "A publisher that begins to drive must send a neutral command."
+)
+NOT_FINITE = Refusal("not_finite", "A command has a number that is not finite, or over 1e9.")
+OTHER_AXES = Refusal(
+    "other_axes",
+    "A command asks for motion other than linear.x and angular.z. The vehicle cannot drive "
+    "sideways through this interface.",
+)
+
+
 class Request(NamedTuple):
     """A command to pass on to safety."""
 
@@ -86,21 +105,14 @@ class Commands:
             self.gone(about.gid)
             known = None
         if known is not None and about.sequence <= known.sequence:
-            return Refusal("out_of_order", "A command arrived again, or after a later one.")
+            return OUT_OF_ORDER
         delay_ns = self._noted(about, received_ns) + now_ns - received_ns
         if refusal := _of_content(twist):
             return refusal
         if delay_ns > HELD_BACK_NS:
-            late_s = delay_ns / NS_PER_S
-            return Refusal(
-                "held_back",
-                f"A command took {late_s:.1f} s longer than the fastest of its publisher. The "
-                "network held it back, or the publisher's clock was set: restart that node.",
-            )
+            return HELD_BACK
         if self._is_settling(about.gid, received_ns):
-            return Refusal(
-                "settling", "A publisher is new, or its delay changes. Commands are taken soon."
-            )
+            return SETTLING
         return self._of_owner(about.gid, received_ns, twist) or Request(
             twist.linear[0], twist.angular[2]
         )
@@ -134,22 +146,16 @@ class Commands:
         """Return the refusal of a publisher that does not drive; a neutral command begins."""
         if self.owner != gid:
             if self.owner is not None and now_ns - self._owned_ns < OWNER_NS:
-                return Refusal("second_publisher", "Another publisher drives. One at a time may.")
+                return SECOND_PUBLISHER
             if twist.moves:
-                return Refusal(
-                    "not_neutral", "A publisher that begins to drive must send a neutral command."
-                )
+                return NOT_NEUTRAL
         self.owner, self._owned_ns = gid, now_ns
         return None
 
 
 def _of_content(twist: Twist) -> Refusal | None:
     if not all(abs(number) <= MAX_NUMBER for number in (*twist.linear, *twist.angular)):
-        return Refusal("not_finite", "A command has a number that is not finite, or over 1e9.")
+        return NOT_FINITE
     if any((*twist.linear[1:], *twist.angular[:2])):
-        return Refusal(
-            "other_axes",
-            "A command asks for motion other than linear.x and angular.z. The vehicle cannot drive "
-            "sideways through this interface.",
-        )
+        return OTHER_AXES
     return None

@@ -98,6 +98,11 @@ def test_a_covariance_of_another_size_is_refused() -> None:
         cdr.encode("geometry_msgs/msg/PoseWithCovariance", (pose, (0.0,) * 3))
 
 
+def test_a_value_without_a_field_is_refused() -> None:
+    with pytest.raises(ValueError, match="shorter"):
+        cdr.encode("geometry_msgs/msg/Vector3", (0.0, 0.0))
+
+
 def test_not_a_number_is_kept() -> None:
     stamped = ((0, 0), "f")
     payload = cdr.encode("sensor_msgs/msg/Range", (stamped, 0, 0.5, 0.05, 5.0, math.nan, 0.0))

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.messages import MAX_NUMBER
 from services.ros2.cdr import Attachment
 from services.ros2.command import (
     FASTER_NS,
@@ -128,12 +129,12 @@ def test_a_command_that_is_repeated_or_late_is_refused() -> None:
 @pytest.mark.parametrize("axis", range(6))
 def test_numbers_that_are_not_finite_and_other_axes(axis: int) -> None:
     sender = Sender(Commands()).settle()
-    for number in (math.nan, math.inf, -math.inf, 0.01):
+    for number in (math.nan, math.inf, -math.inf, 1.1 * MAX_NUMBER, MAX_NUMBER, 0.01):
         axes = [0.0] * 6
         axes[axis] = number
         motion = Twist((axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5]))
         taken = "other_axes" if axis in (1, 2, 3, 4) else Request(axes[0], axes[5])
-        expected = taken if math.isfinite(number) else "not_finite"
+        expected = taken if number in (MAX_NUMBER, 0.01) else "not_finite"
         assert sender.send(1.0, motion=motion) == expected
 
 
