@@ -7,7 +7,7 @@ from typing import Any
 from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
-from cli.inspect.session import add_end, add_options, open_session, until_interrupt
+from cli.inspect.session import add_duration, add_options, open_session, until_interrupt
 from common.codec import Sample
 from common.errors import RobotError
 from common.freshness import NS_PER_S
@@ -27,14 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--field", metavar="NAME", help="print this field only, such as x or causes.0.name"
     )
-    add_end(parser)
+    add_duration(parser)
     add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print messages; raise ``RobotError`` if none arrived."""
-    shown = 0
-    most = 1 if options.once else options.count
+    shown = False
     duration_s = options.duration or (ONCE_S if options.once else None)
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
@@ -42,9 +41,9 @@ def run(options: argparse.Namespace) -> int:
         session.probe.listen(wanted, history=chunks(wanted)[1].startswith("evt/"))
         with until_interrupt():
             for sample in session.probe.samples(duration_s):
-                shown += 1
+                shown = True
                 show(sample, session.robot, options)
-                if shown == most:
+                if options.once:
                     break
         left_out = session.probe.left_out
     if left_out:

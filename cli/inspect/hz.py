@@ -3,14 +3,13 @@
 Figures cover the last ``WINDOW`` samples of a key. ``lost`` counts gaps of ``seq`` since the start:
 published and not received.
 
-The delay is by the host's monotonic clock where sender and receiver share it (clock ``host``), else
-by both wall clocks, whose offset is then part of the result (clock ``wall``). Bandwidth counts
-payloads and attachments, without the protocol overhead.
+The delay is by both wall clocks, whose offset is part of the result. Bandwidth counts payloads and
+attachments, without the protocol overhead.
 """
 
 import argparse
 import time
-from collections import deque
+from collections import defaultdict, deque
 from itertools import pairwise
 from statistics import fmean
 from typing import Any
@@ -18,8 +17,13 @@ from typing import Any
 from cli.inspect import output
 from cli.inspect.addressing import add_key, expression, short
 from cli.inspect.payload import read
-from cli.inspect.session import BusSession, add_end, add_options, open_session, until_interrupt
-from common.bus.publisher import host_id
+from cli.inspect.session import (
+    BusSession,
+    add_duration,
+    add_options,
+    open_session,
+    until_interrupt,
+)
 from common.codec import Sample
 from common.errors import RobotError
 from common.freshness import NS_PER_S
@@ -30,20 +34,16 @@ PARTS = {"p50": 0.50, "p99": 0.99, "max": 1.0}
 
 
 class StreamStats:
-    """Statistics of one key; delays by the host's clock if the sender shares it."""
+    """Statistics of one key."""
 
-    def __init__(self, host: int = 0) -> None:
-        self.count = 0
+    def __init__(self) -> None:
         self.lost = 0
-        self.clock = ""  # of the delays: "host" or "wall"
-        self._host = host
         self._sender: tuple[int, int] = (0, 0)  # boot and seq of the newest sample
         self._received: deque[tuple[int, int]] = deque(maxlen=WINDOW)  # time in ns, size
         self._delays_s: deque[float] = deque(maxlen=WINDOW)
 
     def add(self, sample: Sample) -> None:
         """Add a sample; its header is read, whatever its type."""
-        self.count += 1
         self._received.append((sample.received_ns, sample.size))
         header = read(sample.payload, sample.encoding).value
         if not isinstance(header, dict):
@@ -52,12 +52,8 @@ class StreamStats:
         before, self._sender = self._sender, (numbers.get("boot", 0), numbers.get("seq", 0))
         if before[1] and before[0] == self._sender[0]:
             self.lost += max(0, self._sender[1] - before[1] - 1)
-        if numbers.get("mono_ns") and self._host and numbers.get("host") == self._host:
-            self._delays_s.append((sample.received_ns - numbers["mono_ns"]) / NS_PER_S)
-            self.clock = "host"
-        elif numbers.get("t_ns"):
+        if numbers.get("t_ns"):
             self._delays_s.append((sample.wall_ns - numbers["t_ns"]) / NS_PER_S)
-            self.clock = "wall"
 
     def figures(self) -> dict[str, Any]:
         """Return all figures; None where samples are missing, or their timestamps."""
@@ -74,9 +70,7 @@ class StreamStats:
             # The first sample only starts the interval.
             "bytes_per_s": sum(sizes[1:]) / span_s if span_s else None,
             "bytes": fmean(sizes) if sizes else None,
-            # With wall clocks it includes their offset.
             **{f"delay_{name}": quantile(delays, part) for name, part in PARTS.items()},
-            "clock": self.clock or None,
         }
 
 
@@ -88,17 +82,17 @@ def quantile(rising: list[float], part: float) -> float | None:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     add_key(parser)
-    add_end(parser)
+    add_duration(parser)
     add_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Report once a second; raise ``RobotError`` if no message arrived."""
-    streams: dict[str, StreamStats] = {}
+    streams: defaultdict[str, StreamStats] = defaultdict(StreamStats)
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
+        session.probe.listen(wanted)
         with until_interrupt():
-            session.probe.listen(wanted)
             follow(session, options, streams)
     if not streams:
         raise RobotError(f"no message on {wanted}; `t2 ls` lists the active keys")
@@ -106,26 +100,19 @@ def run(options: argparse.Namespace) -> int:
 
 
 def follow(
-    session: BusSession, options: argparse.Namespace, streams: dict[str, StreamStats]
+    session: BusSession, options: argparse.Namespace, streams: defaultdict[str, StreamStats]
 ) -> None:
-    """Measure and report until the duration or the count is reached."""
-    host = host_id()
-    reported_s = time.monotonic()
-    end_s = reported_s + (options.duration or float("inf"))
-    new = 0  # since the last report
-    while (now_s := time.monotonic()) < end_s:
-        if sample := session.probe.take(min(end_s, reported_s + REPORT_S) - now_s):
-            new += 1
-            key = short(sample.key, session.robot)
-            streams.setdefault(key, StreamStats(host)).add(sample)
-            if sum(each.count for each in streams.values()) == options.count:
-                break
-        if time.monotonic() - reported_s >= REPORT_S:
-            reported_s += REPORT_S
-            report(streams, options) if new else output.warn("t2 hz: no new messages")
-            new = 0
-    if new:
-        report(streams, options)
+    """Measure and report until the duration is over."""
+    end_s = time.monotonic() + (options.duration or float("inf"))
+    while (left_s := end_s - time.monotonic()) > 0:
+        new = False
+        for sample in session.probe.samples(min(REPORT_S, left_s)):
+            streams[short(sample.key, session.robot)].add(sample)
+            new = True
+        if new:
+            report(streams, options)
+        else:
+            output.warn("t2 hz: no new messages")
 
 
 def report(streams: dict[str, StreamStats], options: argparse.Namespace) -> None:

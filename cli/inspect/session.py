@@ -52,18 +52,13 @@ def one_robot(text: str) -> str:
     return text
 
 
-def add_duration(parser: argparse.ArgumentParser, default_s: float) -> None:
+def add_duration(parser: argparse.ArgumentParser, default_s: float | None = None) -> None:
     """Add the option for how long a command listens."""
+    text = "until Ctrl-C" if default_s is None else f"{default_s:g} s"
     parser.add_argument(
         "--duration", type=positive, default=default_s, metavar="S",
-        help=f"listen for S seconds, {default_s:g} by default",
+        help=f"listen for S seconds; default: {text}",
     )  # fmt: skip
-
-
-def add_end(parser: argparse.ArgumentParser) -> None:
-    """Add the options that limit how long a command runs."""
-    parser.add_argument("--duration", type=positive, metavar="S", help="end after S seconds")
-    parser.add_argument("--count", "-n", type=whole, metavar="N", help="end after N messages")
 
 
 def positive(text: str) -> float:
@@ -71,14 +66,6 @@ def positive(text: str) -> float:
     number = float(text)
     if not 0 < number < 1e9:
         raise argparse.ArgumentTypeError(f"{text} must be more than 0 and less than 1e9")
-    return number
-
-
-def whole(text: str) -> int:
-    """Parse a count of one or more."""
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"{text} must be 1 or more")
     return number
 
 

@@ -61,14 +61,13 @@ def test_services_of_a_robot_that_dials_a_site(capsys: pytest.CaptureFixture[str
 
 
 def test_figures_of_a_key(bridge: Bus, tool: Tool) -> None:
-    result = tool("hz", "tel/**", "--count", "20")
+    result = tool("hz", "tel/**", "--duration", "0.5")
     assert (result.code, result.err) == (0, "")
     line = result.lines[-1]
     assert (line["key"], line["lost"]) == ("tel/bridge/bumper", 0)
     assert line["bytes_per_s"] == pytest.approx(line["bytes"] * line["hz"], rel=0.1)
-    assert line["clock"] == ("host" if bridge.host else "wall")
     assert 0 < line["delay_p50"] <= line["delay_p99"] < 5
-    head, row = tool("hz", "bumper", "--count", "5", text=True).out.splitlines()[:2]
+    head, row = tool("hz", "bumper", "--duration", "0.5", text=True).out.splitlines()[:2]
     assert row.split()[0] == "tel/bridge/bumper"
     assert len(row.split()) == len(head.split()) == len(line)
 
