@@ -29,7 +29,7 @@ ROLES: Mapping[str, Rights] = {
     "ros of 001": access.ros(Ros2()),
 }
 LATCHED = names.data_key(0, "/tf_static", "tf2_msgs/msg/TFMessage")
-TWIST, TRIGGER, SET_BOOL = "geometry_msgs/msg/Twist", "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
+TWIST, TRIGGER = "geometry_msgs/msg/Twist", "std_srvs/srv/Trigger"
 PLANNER = names.Node(0, "9a", "/", "nav")
 DASHBOARD = keys.EVENTS.on(MINE, service="dashboard")
 # One key of each class, with its name in the table.
@@ -68,7 +68,6 @@ CLASSES: Mapping[str, str] = {
     "ROS 2: `cmd_vel` of another namespace": names.data_key(0, "/t2_002/cmd_vel", TWIST),
     "ROS 2: emergency stop": names.data_key(0, "/hardware/e_stop_trigger", TRIGGER),
     "ROS 2: reset": names.data_key(0, "/hardware/e_stop_reset", TRIGGER),
-    "ROS 2: brake switches": names.data_key(0, "/hardware/bumper_brake", SET_BOOL),
     "ROS 2: nodes of the domain": PLANNER.token,
     "ROS 2: their publishers": PLANNER.endpoint_token(4, "MP", "/cmd_vel", TWIST, names.QOS),
     "ROS 2: topics of another domain": names.data_key(1, "/cmd_vel", TWIST),

@@ -1,9 +1,8 @@
-"""Services of ROS 2 as calls of the bus: emergency stop, reset, the board's brake switches.
+"""Services of ROS 2 as calls of the bus: emergency stop and reset.
 
 A reset that the network held back must not clear a stop that its sender cannot have seen. The
 attachment has the sender's clock, and a client that calls once has no fastest delivery to compare
-with, as ``command`` does. So the clocks of robot and client must agree as far as the stop is old. A
-brake switch that was held back must not undo a later one: its clocks must agree within a second.
+with, as ``command`` does. So the clocks of robot and client must agree as far as the stop is old.
 """
 
 import math
@@ -17,15 +16,13 @@ from common.freshness import NS_PER_S
 from common.service import Node
 from services.ros2.cdr import Attachment, Value
 from services.ros2.config import Ros2Config
-from services.ros2.endpoints import Answer, Endpoints, Serve
+from services.ros2.endpoints import Answer, Endpoints
 
 CONFIRM_NS, REPEAT_S = 3 * NS_PER_S, 0.05
 FRESH_NS = NS_PER_S // 2  # age of safety's state; older, and safety counts as silent
 STOPS_MAX = 32  # calls that wait
 TOLERANCE_S = 0.2  # of the two clocks, and of the age of safety's state
-SWITCH_S = 1.0  # age of a call of a switch
-TRIGGER, SET_BOOL = "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
-SWITCHES = ("ultrasonic_brake", "bumper_brake")
+TRIGGER = "std_srvs/srv/Trigger"
 
 
 class Calls:
@@ -42,8 +39,6 @@ class Calls:
         self._stops: list[tuple[Answer, int]] = []  # answers that wait, and since when
         ros.serve(absolute("hardware/e_stop_trigger"), TRIGGER, self._stop)
         ros.serve(absolute("hardware/e_stop_reset"), TRIGGER, self._reset)
-        for name in SWITCHES:
-            ros.serve(absolute(f"hardware/{name}"), SET_BOOL, self._switch(name))
         node.loop.every(REPEAT_S, self._confirm)
 
     def _stop(self, _: Attachment, __: Value, answer: Answer) -> None:
@@ -73,7 +68,7 @@ class Calls:
 
     def _reset(self, about: Attachment, _: Value, answer: Answer) -> None:
         """Clear what is latched now, unless it is newer than the request."""
-        state = self._fresh()
+        state = self._state(clock.now_ns() - FRESH_NS)
         if state is None:
             answer((False, "Safety is silent."))
             return
@@ -87,25 +82,6 @@ class Calls:
             lambda reason: answer((False, reason)),
         )
 
-    def _fresh(self) -> m.SafetyState | None:
-        return self._state(clock.now_ns() - FRESH_NS)
-
-    def _switch(self, name: str) -> Serve:
-        def handle(about: Attachment, request: Value, answer: Answer) -> None:
-            if reason := switch_refusal(about.source_ns, time.time_ns()):
-                answer((False, reason))
-                return
-            state = self._fresh()
-            echo = state.heartbeat if state else None
-            self._node.bus.call(
-                keys.SET_SWITCHES,
-                m.SwitchesRequest(**{name: request[0]}, echo=echo),
-                lambda _: answer((True, f"{name} is set.")),
-                lambda reason: answer((False, reason)),
-            )
-
-        return handle
-
 
 def reset_refusal(state: m.SafetyState, sent_ns: int, now_ns: int) -> str:
     """Return why a reset must not clear what this state has latched; empty when it may.
@@ -117,24 +93,10 @@ def reset_refusal(state: m.SafetyState, sent_ns: int, now_ns: int) -> str:
         (cause.age for cause in state.causes if cause.name in state.latched), default=math.inf
     )
     if age_s < -TOLERANCE_S:
-        return _ahead(age_s)
+        return f"The sender's clock is {-age_s:.1f} s ahead of the robot's. Synchronize the clocks."
     if max(age_s, 0.0) + TOLERANCE_S <= latched_s:
         return ""
     return (
         f"The reset was sent {age_s:.1f} s ago by its sender's clock, and the last stop was "
         f"{latched_s:.1f} s ago. Reset again; if that fails, synchronize the clocks."
     )
-
-
-def switch_refusal(sent_ns: int, now_ns: int) -> str:
-    """Return why a brake switch must not follow a call; empty when it may."""
-    age_s = (now_ns - sent_ns) / NS_PER_S
-    if age_s < -TOLERANCE_S:
-        return _ahead(age_s)
-    if age_s <= SWITCH_S:
-        return ""
-    return f"The call was sent {age_s:.1f} s ago by its sender's clock. Synchronize the clocks."
-
-
-def _ahead(age_s: float) -> str:
-    return f"The sender's clock is {-age_s:.1f} s ahead of the robot's. Synchronize the clocks."

@@ -18,7 +18,6 @@ class Ros2(settings.Section, frozen=True, kw_only=True):
     frame_prefix: Frame = ""  # before odom, base_link and the sonars, such as t2_001/
     cmd_vel: Literal["both", "stamped", "plain"] = "both"  # TwistStamped, Twist
     publish_tf: bool = True  # odom to base_link; false for users of another estimator
-    publish_clock: bool = False  # for a replay with use_sim_time
     no_echo: Literal["max_range", "inf"] = "max_range"  # the range of a sonar without an echo
     sonar_fov: Annotated[float, Meta(gt=0.0, le=3.2)] = 0.5  # rad, the whole opening
 

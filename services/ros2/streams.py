@@ -48,18 +48,12 @@ class Streams:
     def _motion(self) -> None:
         settings, prefix = self._settings, self._settings.frame_prefix
         odometry = self._publisher("odom", "nav_msgs/msg/Odometry")
-        tf = clock = None
-        if settings.publish_tf:
-            tf = self._publisher("/tf", TRANSFORMS)
-        if settings.publish_clock:
-            clock = self._publisher("/clock", "rosgraph_msgs/msg/Clock")
+        tf = self._publisher("/tf", TRANSFORMS) if settings.publish_tf else None
 
         def publish(message: m.Odometry) -> None:
             odometry.put(translate.odometry(message, prefix))
             if tf:
                 tf.put(translate.transform(message, prefix))
-            if clock:
-                clock.put((translate.time(message.t_ns),))
 
         self._pass_on(keys.ODOMETRY, ODOM_HZ, publish)
 

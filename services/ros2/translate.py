@@ -22,14 +22,9 @@ ONCE = "t2: cmd_vel"  # noted on a change, not periodically
 WORST: Mapping[str, int] = {"run": OK, "slow": WARN, "stop": WARN, "brake": ERROR}
 
 
-def time(t_ns: int) -> Value:
-    """Return a builtin_interfaces/Time."""
-    return divmod(t_ns, NS_PER_S)
-
-
 def header(t_ns: int, frame: str) -> Value:
     """Return a std_msgs/Header."""
-    return time(t_ns), frame
+    return divmod(t_ns, NS_PER_S), frame
 
 
 def turned(yaw: float) -> Value:

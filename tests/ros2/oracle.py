@@ -13,8 +13,6 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 for part, text in {
     "Trigger_Request": "uint8 structure_needs_at_least_one_member",
     "Trigger_Response": "bool success\nstring message",
-    "SetBool_Request": "bool data",
-    "SetBool_Response": "bool success\nstring message",
 }.items():
     STORE.register(get_types_from_msg(text, f"std_srvs/srv/{part}"))
 DISTRIBUTIONS = (Stores.ROS2_IRON, Stores.ROS2_JAZZY, Stores.ROS2_KILTED, Stores.ROS2_LYRICAL)

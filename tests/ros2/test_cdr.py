@@ -14,7 +14,7 @@ from services.ros2.definitions import HASHES
 from tests.ros2 import oracle
 
 TYPES = sorted(name for name in oracle.message_types() if name in HASHES or "/srv/" in name)
-READ = "geometry_msgs/msg/TwistStamped", "std_srvs/srv/SetBool_Request", "tf2_msgs/msg/TFMessage"
+READ = "geometry_msgs/msg/TwistStamped", "std_srvs/srv/Trigger_Response", "tf2_msgs/msg/TFMessage"
 
 
 ATTACHED = bytes.fromhex("0100000000000000c41d526ef347ea18106ddcb54a141ce8bf846ab67b5087d2b9")

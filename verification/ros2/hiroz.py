@@ -38,8 +38,6 @@ SUBSCRIPTIONS = [
 SERVICES = {
     "/hardware/e_stop_trigger": "std_srvs::srv::dds_::Trigger_",
     "/hardware/e_stop_reset": "std_srvs::srv::dds_::Trigger_",
-    "/hardware/bumper_brake": "std_srvs::srv::dds_::SetBool_",
-    "/hardware/ultrasonic_brake": "std_srvs::srv::dds_::SetBool_",
 }
 RECEIVED = {
     "/odom": "nav_msgs/msg/Odometry",
