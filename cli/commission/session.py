@@ -23,7 +23,6 @@ from common.keys import Topic
 from common.messages import Message, ResetDone
 from common.motion import Twist
 from common.settings import Shared
-from common.wire.frame import PAYLOAD_OFFSET
 
 SOURCE = "checkout"  # as in safety's settings
 STACK_S = 10.0
@@ -42,8 +41,6 @@ class CheckoutSession(SafetyClient):
     def __init__(self, opened: Probe, robot: str) -> None:
         """Listen to the robot."""
         super().__init__(opened, robot, SOURCE)
-        self.frames = 0  # received with the board's bytes since the mark
-        self.nonzero = 0  # of these, with a payload that is not all zeros
         self._marked_ns = 0
         self._log: defaultdict[str, list[Any]] = defaultdict(list)
         for topic in TOPICS:
@@ -54,7 +51,6 @@ class CheckoutSession(SafetyClient):
         self._marked_ns = clock.now_ns()
         for log in self._log.values():
             log.clear()
-        self.frames = self.nonzero = 0
         return self._marked_ns
 
     def of(self, topic: Topic[M]) -> list[Latest[M]]:
@@ -72,9 +68,6 @@ class CheckoutSession(SafetyClient):
         except MessageError:
             return
         self._log[topic.path].append(Latest(message, sample.received_ns))
-        if sample.raw:
-            self.frames += 1
-            self.nonzero += any(sample.raw[PAYLOAD_OFFSET:])
 
     def listen(self, seconds: float) -> None:
         """Receive for a time."""

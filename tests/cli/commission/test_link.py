@@ -5,13 +5,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from cli.commission.link import (
-    CRC_FRAMES,
-    EXPECTED_HZ,
-    NONZERO_FRAMES,
-    judge_link,
-    rejected,
-)
+from cli.commission.link import EXPECTED_HZ, judge_link, rejected
 from cli.commission.report import Verdict
 from common.freshness import NS_PER_S
 from common.messages import Link, Relay, Switches
@@ -21,32 +15,23 @@ ON = Switches(ultrasonic_brake=True, bumper_brake=True)
 
 
 def link(**fields: Any) -> Link:
-    return factories.link(**({"rates": dict(EXPECTED_HZ), "round_trip": 0.002} | fields))
+    return factories.link(**({"rates": dict(EXPECTED_HZ)} | fields))
 
 
-def judge(
-    switches: Switches | None = ON,
-    frames: int = CRC_FRAMES,
-    nonzero: int = NONZERO_FRAMES,
-    **last: Any,
-) -> Verdict:
+def judge(switches: Switches | None = ON, **last: Any) -> Verdict:
     """Judge five seconds of link messages; the last one differs."""
     good = [link(mono_ns=round(i * 0.2 * NS_PER_S)) for i in range(25)]
-    return judge_link([*good, link(mono_ns=5 * NS_PER_S, **last)], switches, frames, nonzero)
+    return judge_link([*good, link(mono_ns=5 * NS_PER_S, **last)], switches)
 
 
 def test_a_good_link_passes_with_its_data() -> None:
     verdict = judge(rejected={"bad_value": 1}, ports={"BumperReport": 4001})
     assert verdict.outcome == "passed"
-    assert verdict.text == "The board's link is up: 1000 frames, no bad CRC."
+    assert verdict.text == "The board's link is up: 545 frames, no bad CRC."
     data = dict(verdict.data)
     assert data["BumperReport, Hz"] == "50 of 50"
-    assert data["accepted frames"] == "1000, 50 of these with a nonzero payload"
-    assert data["round trip"] == "2.0 ms"
-    assert data["rejected in this step"] == "bad_value 1"
+    assert data["rejected"] == "bad_value 1"
     assert data["received at port"] == "BumperReport 4001"
-    assert dict(judge(round_trip=None).data)["round trip"] == "unknown"
-    assert data["waiting for"] == "nothing"
 
 
 RELAY = Relay(state="up", version="0.1.0", braking="", uptime=1.0, counters={})
@@ -62,10 +47,8 @@ RELAY = Relay(state="up", version="0.1.0", braking="", uptime=1.0, counters={})
         ({"rejected": {"truncated": 6}}, "6 frames rejected as truncated"),
         ({"switches": None}, "both its emergency brakes"),
         ({"switches": Switches(ultrasonic_brake=True)}, "both its emergency brakes"),
-        ({"frames": CRC_FRAMES - 1, "nonzero": 900}, "Too few frames for a verdict"),
-        ({"nonzero": NONZERO_FRAMES - 1}, "Too few frames for a verdict"),
-        ({"rejected": {"bad_crc": 499}, "frames": 501}, "check the cable"),
-        ({"rejected": {"bad_crc": 500}, "frames": 500}, "another CRC"),
+        ({"rejected": {"bad_crc": 544}}, "check the cable"),
+        ({"rejected": {"bad_crc": 545}}, "another CRC"),
         ({"rates": EXPECTED_HZ | {"UltrasonicReport": 0.0}}, ""),  # once: the median counts
         ({"relay": RELAY}, ""),
         ({"relay": replace(RELAY, braking="silent")}, "now: 0.1.0, braking: silent."),
@@ -86,4 +69,4 @@ def test_only_rejections_of_the_step_count() -> None:
 @pytest.mark.parametrize(("rate", "outcome"), [(14.0, "passed"), (13.9, "failed")])
 def test_lowest_allowed_rate(rate: float, outcome: str) -> None:
     links = [link(rates=EXPECTED_HZ | {"UltrasonicReport": rate})] * 5
-    assert judge_link(links, ON, CRC_FRAMES, NONZERO_FRAMES).outcome == outcome
+    assert judge_link(links, ON).outcome == outcome
