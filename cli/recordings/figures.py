@@ -1,15 +1,13 @@
 """Figures of a report, as inline SVG without scripts."""
 
-import math
 import re
 from bisect import bisect_right
-from itertools import groupby
 
 import ziaplot as zp
 from ziaplot.canvas import Borders, Canvas, ViewBox
 from ziaplot.style import DashTypes, MarkerTypes
 
-from cli.recordings.timeline import Series, Timeline, VelocitySeries, downsampled
+from cli.recordings.timeline import Series, Timeline, VelocitySeries
 
 WIDTH = 1100  # pixels
 REQUESTED, ALLOWED, MEASURED = "#6b7683", "#b35900", "#0b62c4"
@@ -41,16 +39,14 @@ zp.css("""
 
 
 class BrokenLine(zp.PolyLine):
-    """A series with a gap at each NaN, and 0 on both axes; ziaplot's own line has no gaps.
+    """A series with its gaps, and 0 on both axes; ziaplot's own line has no gaps.
 
     A line for each part would take seconds: ziaplot resolves the style of each element.
     """
 
     def __init__(self, series: Series) -> None:
-        points = zip(*downsampled(series.times, series.values), strict=True)
-        parts = groupby(points, lambda point: not math.isnan(point[1]))
-        self._parts = [tuple(zip(*part, strict=True)) for known, part in parts if known]
-        times, values = ([n for part in self._parts for n in part[axis]] for axis in (0, 1))
+        self._parts = series.parts
+        times, values = ([n for part in series.parts for n in part[axis]] for axis in (0, 1))
         super().__init__([0.0, *times], [0.0, *values])
 
     def _xml(
@@ -69,7 +65,7 @@ def path(timeline: Timeline) -> str:
     graph = zp.Graph()
     graph.axesnames("x in odom, m", "y in odom, m")
     for number, segment in enumerate(timeline.path):
-        xs, ys = downsampled(segment.xs, segment.ys)
+        xs, ys = segment.xs, segment.ys
         graph.add(zp.PolyLine(xs, ys).color(MEASURED).strokewidth(1.6))
         _mark(graph, (xs[0], ys[0]), "round", "start" if number == 0 else "odometry restart")
         if number == len(timeline.path) - 1:
