@@ -1,7 +1,5 @@
 """``t2 ls`` and ``t2 hz`` on a real router with simulated services."""
 
-from typing import Any
-
 import pytest
 
 from cli.inspect import hz
@@ -38,25 +36,27 @@ def test_keys_and_services_with_publishers_and_readers(
     assert shown[0].split() == ["key", "type", "hz", "publishers", "readers"]
     assert shown[1].split()[0] == "tel/bridge/bumper"
     assert shown[1].split()[3:] == ["bridge", "safety"]
-    found = {line["name"]: line for line in tool("ls", "--services").lines}
-    assert found["bridge"]["publishes"] == ["tel/bridge/bumper"]
-    assert found["safety"]["reads"] == ["tel/bridge/bumper"]
-    text = tool("ls", "--services", text=True).out
-    assert f"bridge  (instance {bridge.boot:x})\n  publishes  tel/bridge/bumper\n" in text
+    name = f"bridge/{bridge.boot:x}"
+    declared = tool("ls", "--services").lines
+    assert {"session": name, "does": "publishes", "key": "tel/bridge/bumper"} in declared
+    readers = [row["session"] for row in declared if row["does"] == "reads"]
+    assert [name.partition("/")[0] for name in readers] == ["safety"]
+    text = tool("ls", "--services", text=True).out.splitlines()
+    assert [name, "publishes", "tel/bridge/bumper"] in [line.split() for line in text]
 
 
 def test_services_of_a_robot_that_dials_a_site(capsys: pytest.CaptureFixture[str]) -> None:
     """Its router is a peer and not listed as a member, neither on board nor at the site."""
     own, site = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
 
-    def found(place: str) -> dict[str, Any]:
-        lines = Tool(place, "berlin-001", capsys)("ls", "--services").lines
-        return {line["name"]: line["publishes"] for line in lines}
+    def found(place: str) -> list[dict[str, str]]:
+        return Tool(place, "berlin-001", capsys)("ls", "--services").lines
 
     with router(listening(site)), router(listening(own, site)), BusFixture(own) as buses:
         buses.robot = "berlin-001"
-        pretend(buses, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
-        alone = {"bridge": ["tel/bridge/velocity"]}
+        bus = pretend(buses, "bridge", {keys.VELOCITY: lambda: Velocity(linear=0.5, angular=0.0)})
+        name = f"bridge/{bus.boot:x}"
+        alone = [{"session": name, "does": "publishes", "key": "tel/bridge/velocity"}]
         wait_until(lambda: found(own) == found(site) == alone, "the bridge alone")
 
 
