@@ -1,14 +1,14 @@
 """Messages from the browser, as tagged JSON; any other message is refused.
 
-``echo`` is safety's heartbeat in the snapshot that a message answers. Its age is judged by safety,
-in a switch by the bridge; see ``driver_lock.py`` for a hold.
+``echo`` is safety's heartbeat in the snapshot that a message answers. Its age is judged by safety;
+see ``driver_lock.py`` for a hold.
 """
 
 from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from common.messages import Direction, Number, SwitchesRequest
+from common.messages import Direction, Number
 from services.dashboard.config import GEARS
 
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
@@ -66,10 +66,4 @@ class Reset(ClientMessage, frozen=True):
     echo: int
 
 
-class Switch(ClientMessage, frozen=True):
-    """Set the board's emergency brakes; ``to`` carries the echo."""
-
-    to: SwitchesRequest
-
-
-AnyMessage = Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Switch
+AnyMessage = Take | Leave | Hold | Free | Gear | Alive | Estop | Reset

@@ -145,15 +145,6 @@ class Robot:
             lambda reason: notify("warning", reason, "reset_refused"),
         )
 
-    def switch(self, request: m.SwitchesRequest, notify: Notify) -> None:
-        """Set the board's emergency brakes and report the answer."""
-        self.bus.call(
-            keys.SET_SWITCHES,
-            request,
-            lambda _: notify("info", "done", ""),
-            lambda reason: notify("warning", reason, "call_refused"),
-        )
-
     # --- requests -----------------------------------------------------------------------------
 
     def _on_denied(self) -> None:

@@ -68,7 +68,7 @@ class RobotPage:
                 self._take(viewer, force)
             case _ if self.robot.driver_lock.driver == viewer:
                 self._drive(viewer, message)
-            case client.Gear() | client.Reset() | client.Switch():
+            case client.Gear() | client.Reset():
                 self._notify(viewer, "warning", "take_first")
 
     def tick(self, now_ns: int, robots: Mapping[str, bool]) -> None:
@@ -116,8 +116,6 @@ class RobotPage:
                 lock.gear = gear
             case client.Reset(echo):
                 robot.reset(echo, notify)
-            case client.Switch(to):
-                robot.switch(to, notify)
 
     def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
         self._send_text([viewer], notice(level, text, about), False)

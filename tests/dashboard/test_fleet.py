@@ -10,7 +10,7 @@ import pytest
 from common import clock, keys
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.messages import Event, SwitchesRequest
+from common.messages import Event
 from services.dashboard import client_messages as client
 from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
@@ -199,11 +199,3 @@ def test_a_reset_of_an_unknown_state_is_refused(
     assert not buses["001"].call.called
     fleet.handle("001", "1", client.Reset(5))
     assert buses["001"].call.call_args.args[1].echo == 5
-
-
-def test_a_switch_carries_the_echo_of_the_page(fleet: Fleet, buses: dict[str, Mock]) -> None:
-    fleet.join("001", "1")
-    fleet.handle("001", "1", client.Take())
-    request = SwitchesRequest(bumper_brake=False, echo=5)
-    fleet.handle("001", "1", client.Switch(request))
-    assert buses["001"].call.call_args.args[:2] == (keys.SET_SWITCHES, request)

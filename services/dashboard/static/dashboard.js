@@ -159,13 +159,6 @@ function reset() {
   else send({ k: "reset", echo: echoOf(drawn) });
 }
 
-function toggle(name) {
-  const on = slow?.switches?.[name] === true;
-  const apply = () => send({ k: "switch", to: { [name]: !on, echo: echoOf(drawn) } });
-  if (on) confirm(name, t("switch_off"), apply);
-  else apply();
-}
-
 function showCamera(url) {
   if (!url) return;
   const [image, note] = $("camera").querySelectorAll("img, p");
@@ -187,7 +180,6 @@ function begin() {
     localStorage.setItem("t2.language", language);
     showTexts();
   };
-  for (const name of ["ultrasonic_brake", "bumper_brake"]) $(name).onclick = () => toggle(name);
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
   estop.begin({ send, lost, toast, robot, mayDrive: () => fast?.driver.may !== false });

@@ -101,7 +101,7 @@ export function show(isDriver, fast) {
   panel.classList.toggle("view-only", driver?.may === false);
   panel.dataset.hold = hold;
   write("hold", !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
-  for (const name of ["leave", "ultrasonic_brake", "bumper_brake"]) disable($(name), !isDriver);
+  disable($("leave"), !isDriver);
   disable($("take"), isDriver);
   disable($("reset"), !isDriver || !!refused);
   $("reset").title = refused ? page.t(refused) : "";
