@@ -96,14 +96,11 @@ class Finding:
 class Observation:
     """Everything that the doctor has observed on the bus; paths are keys below the robot."""
 
-    zenoh: str  # this laptop's versions
-    t2: str
-    routers: list[str] = field(default_factory=list)  # their versions, where readable
+    t2: str  # this laptop's version
     instances: dict[str, int] = field(default_factory=dict)  # by service, from tokens
     others: list[str] = field(default_factory=list)  # other robots at the same router
     may_drive: bool | None = None
     may_call: bool | None = None
-    one_clock: bool = False  # whether the robot runs on this host
     delays_s: list[float] = field(default_factory=list)  # by both wall clocks
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path
     undecodable: dict[str, str] = field(default_factory=dict)  # reason by path
@@ -132,8 +129,7 @@ class Observation:
 
 
 def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
-    """Return all findings from the router to the wheels, and safety's state last."""
-    yield from router(seen)
+    """Return all findings from the services to the wheels, and safety's state last."""
     if not seen.instances and seen.others:
         text = f"no service of robot {name} is here; the router knows {', '.join(seen.others)}"
         todo = "is it switched on, and its stack started? Otherwise correct --robot or robot.id"
@@ -144,18 +140,6 @@ def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
 
 
 # --- from the laptop to the services --------------------------------------------------------------
-
-
-def router(seen: Observation) -> Iterator[Finding]:
-    """Report the router's version."""
-    if not seen.routers:
-        yield Finding("router", "note", "version unknown (the router's admin space is closed)")
-    for version in seen.routers:
-        if version == seen.zenoh:
-            yield Finding("router", "ok", f"Zenoh {version}, as on this laptop")
-        else:
-            text = f"Zenoh {version}, on this laptop {seen.zenoh}"
-            yield Finding("router", "note", text, UPDATE)
 
 
 def services(seen: Observation) -> Iterator[Finding]:
@@ -224,9 +208,7 @@ def clock(seen: Observation) -> Iterator[Finding]:
         text = f"messages take up to {most - least:.2f} s longer than the fastest"
         todo = "move closer to the access point; safety refuses requests with too high a delay"
         yield Finding("clock", "note", text, todo)
-    if seen.one_clock:
-        yield Finding("clock", "ok", "the robot runs on this host")
-    elif abs(least) > CLOCK_S:
+    if abs(least) > CLOCK_S:
         side = "behind" if least < 0 else "ahead of"
         text = f"this laptop's clock is {abs(least):.1f} s {side} the robot's"
         todo = "synchronize both clocks with NTP; driving does not need it, recordings do"

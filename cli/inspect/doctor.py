@@ -11,17 +11,14 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, replace
-from importlib.metadata import version
 from pathlib import Path
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
 from cli.inspect.diagnosis import NEEDED, Finding, Observation, diagnose
-from cli.inspect.payload import read
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
 from common import keys
 from common.bus.probe import Probe, probe
-from common.bus.publisher import host_id
 from common.cli_args import VERSION
 from common.codec import Sample
 from common.errors import LinkError, MessageError
@@ -33,7 +30,6 @@ LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
 CONNECT_S = 2.0
 ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
 STREAMS = ("tcp", "tls", "ws")
-ROUTER = "@/*/*"
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
 KEYS = "`t2 keys list` shows the validity of certificates; renew it and copy its folder here again"
 REFUSED = (
@@ -141,11 +137,7 @@ def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
 
 def observe(opened: Probe, robot: str, seconds: float) -> Observation:
     """Return the observation of one robot."""
-    seen = Observation(zenoh=version("eclipse-zenoh"), t2=VERSION)
-    for answer in opened.query(ROUTER):  # empty where the admin space is closed
-        if isinstance(record := read(answer.payload, answer.encoding).value, dict):
-            version_text = str(record.get("version", ""))
-            seen.routers.append(version_text.removeprefix("v").partition("-")[0])
+    seen = Observation(t2=VERSION)
     listen(opened, robot, seconds, seen)
     running = services(opened, "*")
     seen.instances = Counter(service for name, service in running if name == robot)
@@ -160,17 +152,16 @@ def observe(opened: Probe, robot: str, seconds: float) -> Observation:
 def listen(opened: Probe, robot: str, seconds: float, seen: Observation) -> None:
     """Add the messages of one robot to the observation."""
     counts: Counter[str] = Counter()
-    host = host_id()
     for word in EVERYTHING:
         opened.listen(expression(word, robot))
     with until_interrupt():
         for sample in opened.samples(seconds):
             counts[chunks(sample.key)[1]] += 1
-            add_sample(sample, seen, host)
+            add_sample(sample, seen)
     seen.rates = {path: count / seconds for path, count in counts.items()}
 
 
-def add_sample(sample: Sample, seen: Observation, host: int) -> None:
+def add_sample(sample: Sample, seen: Observation) -> None:
     """Add one sample, if its key is a topic."""
     path, topic = chunks(sample.key)[1], topic_of(sample.key)
     if topic is None:
@@ -182,7 +173,6 @@ def add_sample(sample: Sample, seen: Observation, host: int) -> None:
         return
     if path.startswith("tel/"):
         seen.delays_s.append((sample.wall_ns - message.t_ns) / NS_PER_S)
-        seen.one_clock |= host != 0 and message.host == host
     seen.add(path, message)
 
 

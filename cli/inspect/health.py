@@ -5,7 +5,6 @@ run it often.
 """
 
 import argparse
-from collections.abc import Iterator
 from typing import Any
 
 import msgspec
@@ -21,16 +20,8 @@ from common.messages import Health
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
 LISTEN_S = 2.5  # two periods of the health messages, and a margin
 SHOWN = (
-    "robot",
-    "service",
-    "state",
-    "version",
-    "uptime",
-    "lateness",
-    "priority",
-    "rss",
-    "counters",
-)
+    "robot", "service", "state", "version", "uptime", "lateness", "priority", "rss", "counters",
+)  # fmt: skip
 REASONS = {"hangs": "is present and publishes no health: it hangs", "missing": "is not running"}
 
 
@@ -52,16 +43,19 @@ def run(options: argparse.Namespace) -> int:
             rows = [{"robot": session.robot, "service": ROUTER, "state": "ok"}]
         else:
             rows = listen(session, options.service)
-    if options.json:
-        output.rows(rows, as_json=True)
-    else:
-        output.rows([{name: each.get(name) for name in SHOWN} for each in rows], as_json=False)
-        print(*notes(rows), sep="", end="", flush=True)
+    output.rows(rows if options.json else list(map(shown, rows)), as_json=options.json)
     unhealthy = [row for row in rows if row["state"] != "ok"]
     for row in unhealthy:
         reason = REASONS[row["state"]]
         output.warn(f"t2 health: {row['service']} of robot {row['robot']} {reason}")
     return 1 if unhealthy else 0
+
+
+def shown(row: Row) -> Row:
+    """Return the columns of a row, with the worst of each reaction that was measured."""
+    reactions = row.get("reactions", {})
+    worst = {name: each["worst"] for name, each in reactions.items() if any(each["counts"])}
+    return {name: row.get(name) for name in SHOWN} | {"worst_reactions": worst}
 
 
 def listen(session: BusSession, service: str | None) -> list[Row]:
@@ -88,14 +82,3 @@ def listen(session: BusSession, service: str | None) -> list[Row]:
         }
         for each in sorted(newest.keys() | alive | needed)
     ]
-
-
-def notes(rows: list[Row]) -> Iterator[str]:
-    """Yield each reaction that was measured since a service's start."""
-    for row in rows:
-        for name, each in row.get("reactions", {}).items():
-            if any(each["counts"]):
-                yield (
-                    f"{row['service']} of robot {row['robot']}: {name} measured "
-                    f"{sum(each['counts'])} times, worst {1e3 * each['worst']:.2f} ms\n"
-                )

@@ -43,7 +43,7 @@ def cell(thing: Any) -> str:
     if isinstance(thing, list):
         return ", ".join(thing) or "-"
     if isinstance(thing, dict):
-        return " ".join(f"{name}={each}" for name, each in sorted(thing.items())) or "-"
+        return " ".join(f"{name}={cell(each)}" for name, each in sorted(thing.items())) or "-"
     if isinstance(thing, float):
         return f"{round(thing, 4):.6g}"
     return str(thing) if thing not in (None, "") else "-"

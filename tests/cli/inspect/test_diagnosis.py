@@ -60,8 +60,7 @@ def seen(*messages: m.Message, **given: Any) -> Observation:
                 break
     newest |= given.pop("newest", {})
     healthy: dict[str, Any] = {
-        "zenoh": "1.10.2", "t2": "1", "routers": ["1.10.2"],
-        "instances": dict.fromkeys(d.NEEDED, 1), "may_drive": True, "may_call": True,
+        "t2": "1", "instances": dict.fromkeys(d.NEEDED, 1), "may_drive": True, "may_call": True,
         "newest": newest, "first": newest, "delays_s": [0.01, 0.02], "rates": RATES,
     }  # fmt: skip
     return Observation(**(healthy | given))
@@ -101,7 +100,6 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
 @pytest.mark.parametrize(
     ("check", "given", "expected"),
     [
-        (d.router, {"routers": ["1.9.0"]}, [("note", "Zenoh 1.9.0, on this laptop 1.10.2")]),
         (d.versions, {"newest": healths(health("bridge", version="0"))},
          [("note", "bridge is T2 0, this laptop 1")]),
         (d.versions, {"undecodable": {"tel/x": "not a Bumper"}},
@@ -161,7 +159,7 @@ def test_without_the_board_its_sensors_are_unknown(lost: str) -> None:
 
 
 def test_without_messages_the_rest_is_unknown() -> None:
-    nothing = Observation(zenoh="1", t2="1", instances=dict.fromkeys(d.NEEDED, 1), rates={"x": 1.0})
+    nothing = Observation(t2="1", instances=dict.fromkeys(d.NEEDED, 1), rates={"x": 1.0})
     levels = {each.where: each.level for each in diagnose(nothing, "001")}
     assert (levels["link"], levels["safety"]) == ("unknown", "unknown")
 
