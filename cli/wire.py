@@ -18,17 +18,13 @@ from typing import Any, get_args
 
 import msgspec
 
-from cli.settings import Everything
-from common.cli_args import add_sources, sources
-from common.config import load
 from common.errors import RobotError
-from common.messages import SONAR_NAMES, FaultName
-from common.settings import AngularUnit, Wire
+from common.messages import FaultName
 from common.wire import framing
-from common.wire.commands import TO_BOARD, MotionCommand
+from common.wire.commands import TO_BOARD
 from common.wire.frame import Frame, Kinds
 from common.wire.framing import Reason, Received, Rejected
-from common.wire.reports import FROM_BOARD, SONAR_FAULT_MM
+from common.wire.reports import FROM_BOARD
 
 TABLES: dict[str, Kinds] = {"pc": TO_BOARD, "board": FROM_BOARD}
 
@@ -38,7 +34,6 @@ FURTHEST = (
     Reason.UNKNOWN_ID, Reason.NO_MAGIC,
 )  # fmt: skip
 
-UNITS = {"_mmps": "mm/s", "_mm": "mm", "_ddeg": "deg", "_raw": ""}
 Datagram = tuple[str, bytes]  # its place in the source, its bytes
 
 
@@ -48,19 +43,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "print frames, one per line, with the reason for each invalid run of bytes"
     decode = tools.add_parser("decode", help=text, description=text)
     decode.add_argument("source", metavar="HEX|FILE", help="hex, or a capture (pcap, pcapng)")
-    add_sources(decode)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the frames of the datagrams; return 1 if a run of bytes is invalid."""
-    wire = load(Everything, sources(options)).config.wire
     bad = 0
     for where, data in datagrams(options.source):
-        offset = 0
-        for part in parts(data):
+        for offset, part in parts(data):
             bad += isinstance(part, Rejected)
-            print(f"{where} +{offset:<4} {as_text(part, wire)}".strip())
-            offset += size_of(part)
+            print(f"{where} +{offset:<4} {as_text(part)}".strip())
     return 1 if bad else 0
 
 
@@ -123,63 +114,39 @@ def from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
 Good = dict[str, Received]  # the frame by its possible senders
 
 
-def parts(data: bytes) -> Iterator[Good | Rejected]:
-    """Yield the frames and the invalid runs in order; together they contain all bytes."""
+def parts(data: bytes) -> Iterator[tuple[int, Good | Rejected]]:
+    """Yield the frames and the invalid runs with their offsets; together they contain all bytes."""
     offset = 0
     while offset < len(data):
         read = {name: framing.part_at(offset, data, kinds) for name, kinds in TABLES.items()}
         good = {name: part for name, part in read.items() if isinstance(part, Received)}
         bad = [part for part in read.values() if isinstance(part, Rejected)]
-        part: Good | Rejected = good
-        if not good:
-            part = min(bad, key=lambda each: FURTHEST.index(each.reason))
-        yield part
-        offset += size_of(part)
+        if good:
+            yield offset, good
+            offset += len(next(iter(good.values())).raw)  # the same bytes from each sender
+        else:
+            worst = min(bad, key=lambda each: FURTHEST.index(each.reason))
+            yield offset, worst
+            offset += len(worst.raw)
 
 
-def size_of(part: Good | Rejected) -> int:
-    """Return the number of bytes; a frame has the same bytes from each sender."""
-    return len(part.raw if isinstance(part, Rejected) else next(iter(part.values())).raw)
-
-
-def as_text(part: Good | Rejected, wire: Wire) -> str:
-    """Return a part as one line."""
+def as_text(part: Good | Rejected) -> str:
+    """Return a part as one line; fields are raw, in the units of the manual."""
     if isinstance(part, Rejected):
         return f"BAD {part.reason}: {part.detail}: {part.raw.hex()}"
     frames: list[Frame] = [received.frame for received in part.values()]
     names = " or ".join(type(frame).__name__ for frame in frames)
-    frame = frames[0]  # frames of two senders have the same fields
-    commands = isinstance(frame, MotionCommand)
-    unit = wire.command_angular_unit if commands else wire.feedback_angular_unit
-    fields = msgspec.structs.asdict(frame).items()
-    texts = [_text(name, value, unit) for name, value in fields]
-    return f"{' or '.join(part):<5} {names} {', '.join(texts)}".rstrip()
+    fields = msgspec.structs.asdict(frames[0]).items()  # frames of two senders have the same fields
+    texts = [f"{name}={_text(name, value)}" for name, value in fields]
+    return f"{' or '.join(part):<5} {names} {' '.join(texts)}".rstrip()
 
 
-def _text(name: str, value: Any, unit: AngularUnit) -> str:
-    if name == "angular_raw":
-        if unit == "milliradian":
-            return f"angular {value / 1000:.3f} rad/s"
-        return f"angular {value / 10:.1f} deg/s"
-    if name == "ranges_mm":
-        shown = ("fault" if range_ == SONAR_FAULT_MM else str(range_) for range_ in value)
-        pairs = zip(SONAR_NAMES, shown, strict=True)
-        return " ".join(f"{place}={text}" for place, text in pairs) + " mm"
+def _text(name: str, value: Any) -> str:
     if name == "fault_bits":
-        return f"faults 0x{value:08x} {' '.join(_faults(value))}".rstrip()
-    if isinstance(value, IntEnum):
-        return f"{name} {value.name}"
-    return _number(name, value)
-
-
-def _number(name: str, value: int) -> str:
-    for suffix, unit in UNITS.items():
-        if name.endswith(suffix):
-            shown = f"{value / 10:.1f}" if suffix == "_ddeg" else str(value)
-            return f"{name.removesuffix(suffix)} {shown} {unit}"
-    if isinstance(value, bool):
-        return f"{name} {'yes' if value else 'no'}"
-    return f"{name} {value}"
+        return ",".join([f"0x{value:08x}", *_faults(value)])
+    if isinstance(value, tuple):
+        return ",".join(map(str, value))
+    return value.name if isinstance(value, IntEnum) else str(value)
 
 
 def _faults(bits: int) -> list[str]:
