@@ -24,6 +24,7 @@ from common.bus.probe import Probe
 from common.cli_args import source_words
 from common.errors import LinkError, RobotError
 from common.messages import EstopKeepalive, KeepaliveState, SafetyState
+from common.text import printable
 
 TIMEOUT_S = 3.0  # without a router
 KEEPALIVE_S = 0.1
@@ -169,4 +170,4 @@ def follow(client: SafetyClient, name: str) -> None:
 def described(state: SafetyState, name: str) -> str:
     """Return the state as a line."""
     alive = any(one.source == name and one.alive for one in state.estop_keepalives)
-    return f"{'alive' if alive else 'NOT ALIVE'}  {state.verdict.upper()}  {state.text}"
+    return f"{'alive' if alive else 'NOT ALIVE'}  {state.verdict.upper()}  {printable(state.text)}"

@@ -14,6 +14,7 @@ from t2.stream import CONNECTED, check_process
 
 LOCAL = "tcp/127.0.0.1:7447"
 TIMEOUT_MS = 3_000
+MAX_MESSAGE = 8 * 2**20  # larger ones are dropped; the messages of T2 are far smaller
 FILES = {
     "ca": "root_ca_certificate",
     "certificate": "connect_certificate",
@@ -63,13 +64,13 @@ def read(file: Path) -> dict[str, Any]:
 
 def settings(endpoints: list[str], bus: dict[str, Any]) -> dict[str, Any]:
     """Return Zenoh's configuration of a client."""
-    link: dict[str, Any] = {}
+    link: dict[str, Any] = {"rx": {"max_message_size": MAX_MESSAGE}}
     if bus.get("ca"):
         tls = {name: bus.get(ours, "") for ours, name in FILES.items()}
-        link = {"link": {"tls": tls | {"enable_mtls": True}}}
+        link["tls"] = tls | {"enable_mtls": True}
     return {
         "mode": "client",
         "connect": {"endpoints": list(endpoints), "timeout_ms": TIMEOUT_MS},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {"shared_memory": {"enabled": False}, **link},
+        "transport": {"shared_memory": {"enabled": False}, "link": link},
     }

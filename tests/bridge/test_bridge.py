@@ -64,6 +64,18 @@ def test_reports_reach_the_bus_with_their_raw_frames_and_calls_the_board(
     assert bridge.board.leds[0].channel == 3
 
 
+def test_an_emergency_stop_is_braked_for_until_safety_acknowledges_it(
+    bridge: BridgeFixture,
+) -> None:
+    bridge.drive()
+    session = bridge.bus.sessions[0].zenoh
+    assert session is not None
+    session.put(keys.estop_key("001"), b"")
+    bridge.board.wait_for(MotionKind.BREAK)
+    time.sleep(0.3)  # safety requests RUN as if it had not received it
+    assert bridge.board.motions[-1].kind is MotionKind.BREAK
+
+
 def test_a_motion_from_the_router_is_not_even_read(bridge: BridgeFixture) -> None:
     bridge.drive()
     rejected = m.Motion(command=Command.RUN, linear=0.9, boot=bridge.bus.boot, seq=2**62)

@@ -1,5 +1,7 @@
 """Newest messages and events of a robot."""
 
+from msgspec.structs import replace
+
 from common import keys
 from common.freshness import NS_PER_S, Latest
 from common.messages import Bumper, Drive, Driver, Event, Velocity
@@ -54,6 +56,12 @@ def test_events_are_sorted_by_the_senders_time_and_bounded() -> None:
     assert len(telemetry.events) == EVENTS_MAX
     assert telemetry.events[0].text == "4"
     assert len(telemetry.new_events) == EVENTS_MAX
+
+
+def test_an_event_of_any_length_costs_little() -> None:
+    telemetry = TelemetryCache()
+    telemetry.add_event("safety", replace(event(1), text="\x1b" * 4000))
+    assert telemetry.events[0].text == "\\u001b" * 166 + "\\u00"
 
 
 def test_services_by_token_or_by_health() -> None:

@@ -7,12 +7,15 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+import zenoh
 
-from common import child_process
+from common import child_process, codec, keys
+from common.bus.session import client_config
 from services.ros2.definitions import HASHES
 from sim.requests import Bumper
+from tests import factories
 from tests.ros2.peer import LATCHED, RosPeer, peer
-from verification.harness.bus import set_options
+from verification.harness.bus import at, set_options
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
@@ -126,6 +129,22 @@ def test_a_contact_is_seen_at_once_and_its_reset_is_refused(
     wait_until(states_the_reason, f"the reason: {refusals}")
     stack.control.do(Bumper(pressed=False))
     wait_until(lambda: reset(node), "a reset")
+
+
+def test_the_diagnostics_list_only_services_that_exist(node: RosPeer, stack: RunningStack) -> None:
+    diagnostics = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+    with zenoh.open(client_config(at(stack.endpoint))) as session:
+
+        def received() -> bool:
+            for service in ("invented", "dashboard"):
+                message = factories.health(service=service, version="invented")
+                session.put(keys.HEALTH.on("001", service=service), codec.encode(message))
+            status = statuses(diagnostics).get("t2: service dashboard")
+            return status is not None and status.values[0].value == "invented"
+
+        wait_until(received, "the dashboard's status")
+    services = {name for name in statuses(diagnostics) if name.startswith("t2: service ")}
+    assert services <= {f"t2: service {name}" for name in keys.SERVICES}
 
 
 def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> None:

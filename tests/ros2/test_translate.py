@@ -124,6 +124,11 @@ def test_the_status_of_a_service() -> None:
     assert dict(made[4]) == {"version": "1.2", "uptime": "60 s", "resets": "3"}
 
 
+def test_a_status_is_printable() -> None:
+    made = translate.status(0, "a\x1b", "b\x1b", {"c\x1b": "d\x1b"})
+    assert made == (0, "t2: a\\u001b", "b\\u001b", "t2", (("c\\u001b", "d\\u001b"),))
+
+
 def test_the_newest_status_of_each_name_and_a_silent_part_is_stale() -> None:
     diagnostics = translate.Diagnostics()
     link = translate.status(translate.OK, "link", "Up.", {"a": 1})

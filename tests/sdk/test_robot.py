@@ -277,8 +277,10 @@ def test_a_drive_is_entered_once_and_alone(robot: t2.Robot) -> None:
     drive = robot.drive("nav")
     with pytest.raises(t2.T2Error, match="not entered"):
         drive.velocity(0.2)
-    with drive, pytest.raises(t2.T2Error, match="is open"), robot.drive("nav"):
-        pass
+    with drive:
+        for other in (robot.drive("nav"), drive):
+            with pytest.raises(t2.T2Error, match="is open"), other:
+                pass
     with pytest.raises(t2.T2Error, match="is closed"), drive:
         pass
     with robot.drive("nav"):

@@ -129,4 +129,6 @@ def test_tls_files_go_into_the_settings_of_zenoh() -> None:
         "root_ca_certificate": "ca.pem", "connect_certificate": "c.pem",
         "connect_private_key": "p.key", "enable_mtls": True,
     }  # fmt: skip
-    assert "link" not in settings([LOCAL], {})["transport"]
+    plain = settings([LOCAL], {})["transport"]["link"]
+    assert plain == {"rx": {"max_message_size": 8 * 2**20}}
+    assert made["transport"]["link"]["rx"] == plain["rx"]

@@ -26,6 +26,14 @@ def test_log_lines_go_to_the_event_log_and_not_to_the_terminal(
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_line_is_printable_and_has_a_greatest_length() -> None:
+    event_log = EventLog()
+    event_log.add("\x1b[2J", "info", "\x1b" * 4000)
+    (line,) = event_log.lines()
+    assert (line.service, len(line.text)) == ("\\u001b[2J", 1000)
+    assert line.text.isprintable()
+
+
 def test_a_repeated_line_is_kept_once_with_its_last_time() -> None:
     event_log = EventLog()
     for t_ns, text in ((1, "stop"), (2, "refused"), (3, "refused"), (4, "stop")):

@@ -26,6 +26,7 @@ from verification.faults.injectors import (
     hit,
     kill,
     late_calls,
+    meanwhile,
     network,
     pause,
     press,
@@ -168,10 +169,16 @@ BUS = [
     # The vehicle still moves: the lease is 0.2 s.
     Fault("safety hangs, then contact",
           steps(kill("safety", signal.SIGSTOP), pause(0.05), hit(0.3)), RESET, within(0.02)),
-    # Twice the lease of a session.
-    Fault("safety hangs for 2 s, then estop",
-          steps(kill("safety", signal.SIGSTOP), pause(2.0), estop), RESET, within(0.02),
-          stops=("brake",)),
+    # The lease of a session is 1 s.
+    *(
+        Fault(f"safety hangs for {seconds:g} s, estop meanwhile",
+              steps(kill("safety", signal.SIGSTOP), meanwhile(seconds, estop)), RESET,
+              within(0.02), stops=("brake",), hold_s=0.1)
+        for seconds in (0.5, 2.0, 10.0, 45.0)
+    ),
+    Fault("router restarts, estop repeated for 3 s",
+          steps(kill("router"), injectors.restart, injectors.repeated_estop(3.0)), RESET,
+          MOTION_LEASE),
     Fault("safety SIGKILL, then estop", steps(kill("safety"), estop), RESET, within(0.02),
           stops=("brake",)),
     # No driver of the campaign requests to back away.

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import random
 import select
 import signal
 import subprocess
@@ -78,6 +79,16 @@ def pause(_: StackFixture, seconds: float) -> None:
     time.sleep(seconds)
 
 
+@injector
+def meanwhile(fixture: StackFixture, seconds: float, inject: Injector) -> int | None:
+    """Wait for some seconds; inject a fault at a random moment of them."""
+    before_s = random.uniform(0.0, seconds)
+    time.sleep(before_s)
+    at_ns = inject(fixture)
+    time.sleep(seconds - before_s)
+    return at_ns
+
+
 # --- processes ------------------------------------------------------------------------------------
 
 
@@ -103,6 +114,11 @@ def kill(fixture: StackFixture, name: str, number: signal.Signals = signal.SIGKI
         fixture.death_s = (clock.now_ns() - at_ns) / NS_PER_S
     os.close(process)
     return at_ns
+
+
+def restart(fixture: StackFixture) -> None:
+    """Restart the processes that have ended."""
+    fixture.restart_ended()
 
 
 def flood(fixture: StackFixture) -> None:
@@ -238,6 +254,15 @@ def put(fixture: StackFixture, /, key: str, payload: bytes = b"", **options: Any
 ESTOP = keys.estop_key("001")
 # As the T2 tools do.
 estop = put(ESTOP, priority=zenoh.Priority.REAL_TIME, express=True)
+
+
+@injector
+def repeated_estop(fixture: StackFixture, seconds: float) -> None:
+    """Publish it 20 times a second, as the senders do until it is confirmed; it has to latch."""
+    for _ in range(round(20 * seconds)):
+        estop(fixture)
+        time.sleep(0.05)
+    wait_until(lambda: "estop" in fixture.client.latched, "the emergency stop")
 
 
 @injector

@@ -7,11 +7,13 @@ from collections.abc import Iterator
 
 import pytest
 
+from cli.inspect.estop import described
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.messages import EstopKeepalive, KeepaliveState
 from tests.cli.inspect.tool import FakeSafety, Tool
 from tests.common.bus_fixture import BusFixture
+from tests.factories import safety_state
 from verification.harness.waiting import PATIENCE_S, wait_until
 
 KNOWN = KeepaliveState(source="pendant", age=0.1, alive=True, timeout=1.0)
@@ -47,6 +49,10 @@ def pendant(buses: BusFixture, safety: Safety) -> Iterator["subprocess.Popen[str
             yield process
         finally:
             process.kill()
+
+
+def test_a_described_state_is_printable() -> None:
+    assert described(safety_state(text="\x1b[2J"), "pendant").endswith("  \\u001b[2J")
 
 
 def test_it_echoes_the_heartbeat_and_ends_with_a_warning(

@@ -52,7 +52,9 @@ def test_all_units_except_the_simulator(tmp_path: Path) -> None:
     wants = " ".join(x for x in written[f"{UNITS}/t2.target"].splitlines() if "Wants=" in x)
     assert {name for name in services if name not in wants} == {OPT_IN}
     assert unit(written[f"{UNITS}/{OPT_IN}"])["Install"]["WantedBy"] == "t2.target"
-    assert "AllowSuspend=no" in written["etc/systemd/sleep.conf.d/t2.conf"]
+    sleep = unit(written["etc/systemd/sleep.conf.d/t2.conf"])["Sleep"]
+    assert len(sleep) == 4
+    assert set(sleep.values()) == {"no"}
     assert written["etc/sysusers.d/t2.conf"].splitlines()[-1].startswith("u t2 ")
 
 

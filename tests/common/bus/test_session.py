@@ -60,9 +60,11 @@ def test_a_router_that_comes_later_or_again_finds_all_as_it_was(buses: BusFixtur
     receiver.open()
     sender.open()
     buses.loop.post(lambda: buses.loop.every(0.01, lambda _: receiver.answer_queries()))
+    connections = []
     for _ in range(2):
         with router(listening(buses.endpoint)):
             wait_until(lambda: receiver.connected and sender.connected, "both sessions")
+            connections.append(receiver.connection)
             until_received(lambda: bumper.put(Bumper(pressed=True)), lambda: received, "a bumper")
             wait_until(lambda: seen, "the token")
             until_received(
@@ -77,6 +79,7 @@ def test_a_router_that_comes_later_or_again_finds_all_as_it_was(buses: BusFixtur
         bumper.put(Bumper(pressed=True))  # harmless
         for some in (received, seen, replies, late):
             some.clear()
+    assert 0 < connections[0] < connections[1]
     receiver.close()
     sender.close()
 
