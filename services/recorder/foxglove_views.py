@@ -75,7 +75,6 @@ _VECTOR = _table(x=_NUMBER, y=_NUMBER, z=_NUMBER)
 _QUATERNION = _table(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
 _POSE = _table(position=_VECTOR, orientation=_QUATERNION)
 
-POSE = _foxglove("PoseInFrame", frame_id=_TEXT, pose=_POSE)
 TRANSFORM = _foxglove(
     "FrameTransform",
     parent_frame_id=_TEXT,
@@ -108,7 +107,7 @@ class FoxgloveViews:
         timestamp = {"sec": log_ns // NS_PER_S, "nsec": log_ns % NS_PER_S}
         match message:
             case Odometry():
-                views = _odometry(message)
+                views = iter([_transform(message)])
             case Ultrasonic():
                 views = self._scans(message)
             case Event():
@@ -131,17 +130,15 @@ class FoxgloveViews:
             yield f"sonar/{name}", SCAN, fields
 
 
-def _odometry(message: Odometry) -> Iterator[View]:
+def _transform(message: Odometry) -> View:
     pose = _pose(message.x, message.y, message.heading)
-    parent, child = message.frame_id, message.child_frame_id
-    yield "pose", POSE, {"frame_id": parent, "pose": pose}
-    transform = {
-        "parent_frame_id": parent,
-        "child_frame_id": child,
+    fields = {
+        "parent_frame_id": message.frame_id,
+        "child_frame_id": message.child_frame_id,
         "translation": pose["position"],
         "rotation": pose["orientation"],
     }
-    yield "tf", TRANSFORM, transform
+    return "tf", TRANSFORM, fields
 
 
 def _log(message: Event, service: str) -> View:

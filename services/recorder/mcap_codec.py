@@ -43,13 +43,11 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A message of a file, as JSON; times on the wall clocks of recorder and sender."""
+    """A message of a file, as JSON; time on the recorder's wall clock."""
 
     channel: Channel
     data: bytes
     log_ns: int
-    publish_ns: int
-    sequence: int = 0
 
     @property
     def key(self) -> str:
@@ -97,16 +95,13 @@ class Encoder:
         fields = decode_fields(sample)
         kind = MESSAGE_TYPES.get(codec.kind_of(sample.encoding))
         channel = Channel(sample.key, schema_of(kind) if kind else None, sample.encoding)
-        sent_ns, number = _header(fields, "t_ns") or log_ns, _header(fields, "seq") & 0xFFFFFFFF
-        yield Entry(channel, encode_json(sample, fields), log_ns, sent_ns, number)
+        yield Entry(channel, encode_json(sample, fields), log_ns)
         message = _message(sample)
         if message is not None:
             service = sample.key.rpartition("/")[2]
             for topic, view_schema, view in self._views.of(message, service, log_ns):
-                data = msgspec.json.encode(view)
-                yield Entry(
-                    Channel(topic, view_schema, is_view=True), data, log_ns, sent_ns, number
-                )
+                view_channel = Channel(topic, view_schema, is_view=True)
+                yield Entry(view_channel, msgspec.json.encode(view), log_ns)
 
 
 def decode_fields(sample: Sample) -> dict[str, Any]:
@@ -144,9 +139,3 @@ def _message(sample: Sample) -> Message | None:
         return codec.decode(sample.payload, kind) if kind else None
     except MessageError:
         return None
-
-
-def _header(fields: dict[str, Any], name: str) -> int:
-    """Return an integer of the message header; 0 if it is missing or does not fit into a file."""
-    found = fields.get(name)
-    return found if isinstance(found, int) and 0 <= found < 2**63 else 0

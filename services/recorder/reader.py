@@ -41,7 +41,6 @@ class Reader:
         self.about: dict[str, str] = {}  # robot, version, why; set while iterating
         self.cut = False  # truncated: the writer was killed, or is still writing
         self.damaged = 0  # chunks that were skipped
-        self.readable = 0  # bytes, up to the end of the last complete record
         self._channels: dict[int, Channel | None] = {}
 
     def __enter__(self) -> Self:
@@ -60,27 +59,20 @@ class Reader:
             elif isinstance(record, records.Message):
                 channel = self._channels.get(record.channel_id)
                 if channel is not None:
-                    yield Entry(
-                        channel, record.data, record.log_time, record.publish_time, record.sequence
-                    )
+                    yield Entry(channel, record.data, record.log_time)
 
     def _records(self) -> Iterator[records.McapRecord]:
         """Yield the records of the file and of its chunks, up to the truncation."""
         reader = StreamReader(self._file, emit_chunks=True, record_size_limit=RECORD_MAX)
-        stream = iter(reader.records)
-        while True:
-            try:
-                record = next(stream)
-            except StopIteration:
-                self.readable = self._file.tell()
-                return
-            except DAMAGE:
-                if self.readable == 0:
-                    raise RobotError(f"{self.path}: is not an MCAP file") from None
-                self.cut = True
-                return
-            yield from self._unpacked(record)
-            self.readable = self._file.tell()
+        has_begun = False
+        try:
+            for record in reader.records:
+                has_begun = True
+                yield from self._unpacked(record)
+        except DAMAGE:
+            if not has_begun:
+                raise RobotError(f"{self.path}: is not an MCAP file") from None
+            self.cut = True
 
     def _unpacked(self, record: records.McapRecord) -> list[records.McapRecord]:
         if not isinstance(record, records.Chunk):

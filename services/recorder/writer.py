@@ -69,9 +69,7 @@ class RecordingWriter:
 
     def _add(self, entry: Entry) -> None:
         identity = self._ids.get(entry.channel) or self._register(entry.channel)
-        self._writer.add_message(
-            identity, entry.log_ns, entry.data, entry.publish_ns, entry.sequence
-        )
+        self._writer.add_message(identity, entry.log_ns, entry.data, entry.log_ns)
 
     def _register(self, channel: Channel) -> int:
         schema_id = 0

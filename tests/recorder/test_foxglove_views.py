@@ -11,7 +11,6 @@ from common.messages import SONAR_NAMES, Event, Message
 from common.settings import Vehicle
 from services.recorder.foxglove_views import (
     LOG,
-    POSE,
     SCAN,
     TRANSFORM,
     FoxgloveViews,
@@ -23,7 +22,7 @@ from tests.recorder import samples
 
 VEHICLE = Vehicle(length=1.0, width=0.6)
 AT_NS = 1_700_000_000_250_000_000
-VIEWS = (POSE, TRANSFORM, SCAN, LOG)
+VIEWS = (TRANSFORM, SCAN, LOG)
 ALL = [schema_of(kind) for kind in MESSAGE_TYPES.values()] + list(VIEWS)
 
 
@@ -43,15 +42,12 @@ def test_views_match_their_schemas(message: Message) -> None:
         assert fields["timestamp"] == {"sec": 1_700_000_000, "nsec": 250_000_000}
 
 
-def test_pose_orientation_follows_the_heading() -> None:
-    made = views_of(samples.odometry(x=3.0, heading=math.pi / 2))
-    pose = made["foxglove/pose"][1]["pose"]
-    assert pose["position"] == {"x": 3.0, "y": 2.0, "z": 0.0}
+def test_the_frame_of_the_vehicle_follows_its_pose() -> None:
+    _, transform = views_of(samples.odometry(x=3.0, heading=math.pi / 2))["foxglove/tf"]
+    assert transform["translation"] == {"x": 3.0, "y": 2.0, "z": 0.0}
     half = math.sqrt(0.5)
-    assert pose["orientation"] == pytest.approx({"x": 0.0, "y": 0.0, "z": half, "w": half})
-    transform = made["foxglove/tf"][1]
+    assert transform["rotation"] == pytest.approx({"x": 0.0, "y": 0.0, "z": half, "w": half})
     assert (transform["parent_frame_id"], transform["child_frame_id"]) == ("odom", "base_link")
-    assert (transform["translation"], transform["rotation"]) == tuple(pose.values())
 
 
 def test_each_sonar_is_a_scan_at_its_mounting_position() -> None:
