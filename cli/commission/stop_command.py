@@ -61,14 +61,11 @@ def read(files: Sequence[Path]) -> tuple[list[Stop], Counter[str]]:
 
 def read_streams(file: Path) -> Streams:
     """Return the messages of one recording; raise ``RobotError`` if it shows no stops."""
-    streams, robots = Streams(), set()
+    streams = Streams()
     with open_recording(file) as reader:
         for entry in reader:
             if entry.kind in KINDS and (message := entry.message) is not None:
                 streams.add(message)
-                robots.add(entry.key.removeprefix(f"{keys.ROOT}/").split("/")[0])
-    if len(robots) > 1:
-        raise RobotError(f"{file}: has several robots ({', '.join(sorted(robots))}): record one")
     if streams.problem:
         raise RobotError(f"{file}: {streams.problem}")
     return streams

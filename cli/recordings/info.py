@@ -95,7 +95,6 @@ def summary(timeline: Timeline, reader: "Reader") -> dict[str, str]:
         "stops": f"{len(timeline.stops)}, {while_driving} while driving",
         "services": versions or "no health messages",
         "messages": f"{timeline.messages} on {len(timeline.streams)} keys",
-        "recorded": ", ".join(f"{name} {value}" for name, value in sorted(reader.about.items())),
     }
 
 

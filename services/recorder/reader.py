@@ -20,7 +20,6 @@ from zstandard import ZstdError
 
 from common.errors import RobotError
 from services.recorder.mcap_codec import Channel, Entry
-from services.recorder.writer import ABOUT
 
 # Raised by the MCAP library for missing or wrong bytes.
 DAMAGE = (McapError, struct.error, ValueError, RuntimeError, EOFError, OverflowError, MemoryError)
@@ -38,7 +37,6 @@ class Reader:
             raise RobotError(f"{path}: cannot be read: {error.strerror}") from None
         self.path = path
         self.size = path.stat().st_size
-        self.about: dict[str, str] = {}  # robot, version, why; set while iterating
         self.cut = False  # truncated: the writer was killed, or is still writing
         self.damaged = 0  # chunks that were skipped
         self._channels: dict[int, Channel | None] = {}
@@ -52,9 +50,7 @@ class Reader:
     def __iter__(self) -> Iterator[Entry]:
         """Yield all messages; raise ``RobotError`` if the file is not an MCAP file."""
         for record in self._records():
-            if isinstance(record, records.Metadata) and record.name == ABOUT:
-                self.about = record.metadata
-            elif isinstance(record, records.Channel):
+            if isinstance(record, records.Channel):
                 self._channels[record.id] = _channel(record)
             elif isinstance(record, records.Message):
                 channel = self._channels.get(record.channel_id)

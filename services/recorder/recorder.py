@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from common import clock, codec, keys
-from common.cli_args import VERSION
 from common.codec import Sample
 from common.errors import MessageError
 from common.messages import SafetyState
@@ -112,12 +111,7 @@ class Recorder:
 
     def _open_recording(self, first: Sample, reason: str) -> RecordingWriter:
         path = self._storage.new_path(self._node.bus.robot, first.wall_ns, reason)
-        about = {
-            "robot": self._node.bus.robot,
-            "version": VERSION,
-            "why": reason or "everything",
-        }
-        recording = RecordingWriter(path, self._encoder, about)
+        recording = RecordingWriter(path, self._encoder)
         self._node.log.info("recording", file=str(path))
         return recording
 

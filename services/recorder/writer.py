@@ -6,7 +6,6 @@ Everything up to the last flush stays readable, even after ``kill -9``.
 
 import contextlib
 import fcntl
-from collections.abc import Mapping
 from pathlib import Path
 
 from mcap.writer import Writer
@@ -17,13 +16,12 @@ from services.recorder.blackbox import CloseRecording, OpenRecording
 from services.recorder.mcap_codec import Channel, Encoder, Entry
 
 SIZE_MAX, TIME_MAX_NS = 200_000_000, 600 * NS_PER_S  # of a file of a continuous recording
-ABOUT = "t2"  # name of the metadata record: robot, version and reason of the recording
 
 
 class RecordingWriter:
     """One file, open for writing; raises ``OSError`` when the disk refuses a write."""
 
-    def __init__(self, path: Path, encoder: Encoder, about: Mapping[str, str]) -> None:
+    def __init__(self, path: Path, encoder: Encoder) -> None:
         """Create a new file; raise ``FileExistsError`` instead of overwriting one."""
         self.path = path
         self.messages = 0  # from the bus, without the derived views
@@ -36,7 +34,6 @@ class RecordingWriter:
             fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)  # other recorders leave the file
         self._writer = Writer(self._file)
         self._writer.start(library="t2")
-        self._writer.add_metadata(ABOUT, dict(about))
         self._writer.flush()
 
     @property

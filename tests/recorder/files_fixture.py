@@ -30,7 +30,7 @@ class Files:
 
     def open(self, first: Sample, reason: str) -> RecordingWriter:
         path = self.storage.new_path("001", first.wall_ns, reason)
-        return RecordingWriter(path, Encoder(Vehicle()), {"why": reason})
+        return RecordingWriter(path, Encoder(Vehicle()))
 
     def close(self, recording: RecordingWriter) -> None:
         recording.close()

@@ -22,7 +22,7 @@ CHUNKS, EACH = 5, 20
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     """A complete file of a few chunks."""
-    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {"robot": "001"})
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER)
     for number in range(CHUNKS * EACH):
         made.write(
             sample("tel/bridge/velocity", samples.velocity(number, number), number / 50, b"frame")
@@ -48,12 +48,11 @@ def test_read_what_was_written(path: Path) -> None:
         ("t2/v1/001/tel/bridge/velocity", "Velocity")
     }
     assert [each.log_ns for each in found[:2]] == [BEGIN_NS, BEGIN_NS + NS_PER_S // 50]
-    assert reader.about == {"robot": "001"}
     assert (reader.cut, reader.damaged) == (False, 0)
 
 
 def test_files_have_an_index_and_view_topics(tmp_path: Path) -> None:
-    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {})
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER)
     made.write(sample("tel/odom/odometry", samples.odometry()))
     made.write(bare("tel/mine", b"\x80"))
     made.close()
@@ -111,7 +110,7 @@ def test_other_files_are_rejected(tmp_path: Path, content: bytes) -> None:
 
 
 def test_log_times_ignore_clock_steps(tmp_path: Path) -> None:
-    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {})
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER)
     first, second = (sample("tel/x", samples.velocity(), at_s) for at_s in (0.0, 1.0))
     made.write(first)
     stepped = {name: getattr(second, name) for name in second.__struct_fields__} | {"wall_ns": 5}
@@ -121,7 +120,7 @@ def test_log_times_ignore_clock_steps(tmp_path: Path) -> None:
 
 
 def test_an_invalid_message_is_none(tmp_path: Path) -> None:
-    made = RecordingWriter(tmp_path / "a.mcap", ENCODER, {})
+    made = RecordingWriter(tmp_path / "a.mcap", ENCODER)
     it = sample("tel/bridge/velocity", samples.velocity())
     made.write(bare("tel/bridge/velocity", b"\x80", it.encoding))
     made.close()

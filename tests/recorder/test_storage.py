@@ -90,7 +90,7 @@ def test_a_marked_file_and_the_latest_of_this_process_stay(tmp_path: Path) -> No
 
 def test_a_file_that_any_process_writes_stays(tmp_path: Path) -> None:
     disk = Disk(tmp_path, 12 * MB, *CONTINUOUS[1:])
-    writing = RecordingWriter(tmp_path / CONTINUOUS[0], Encoder(Vehicle()), {})
+    writing = RecordingWriter(tmp_path / CONTINUOUS[0], Encoder(Vehicle()))
     Storage(tmp_path, 10.5 * MB, disk.free, robot="001").check(0)
     assert disk.names() == [CONTINUOUS[0], CONTINUOUS[2]]
     writing.close()

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from msgspec.structs import replace
 
 from cli.__main__ import main
 from cli.commission.stops import Streams
@@ -24,17 +23,15 @@ PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
 CAREFUL = ("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5")
 
 
-def record(path: Path, streams: Streams, other: str = "001") -> Path:
+def record(path: Path, streams: Streams) -> Path:
     messages: list[tuple[str, Message]] = [
         (key, each) for name, key in PATHS.items() for each in getattr(streams, name)
     ]
-    writer = RecordingWriter(path, Encoder(Vehicle()), {"robot": "001"})
+    writer = RecordingWriter(path, Encoder(Vehicle()))
     for key, each in sorted(messages, key=lambda one: one[1].mono_ns):
         at_s = each.mono_ns / NS_PER_S
         writer.write(bare(key, codec.encode(each), codec.encoding(type(each)), at_s))
     writer.write(bare("tel/mine", b"\xc1", at_s=at_s))
-    last = bare(key, codec.encode(each), codec.encoding(type(each)), at_s)
-    writer.write(replace(last, key=last.key.replace("001", other)))
     writer.close()
     return path
 
@@ -118,14 +115,12 @@ def test_what_it_cannot_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[s
     still = driven(0.5)
     still.motions = [motion for motion in still.motions if motion.command == "stop"]
     stands = record(tmp_path / "still.mcap", still)
-    robots = record(tmp_path / "robots.mcap", driven(0.5), "002")
     for words, code, error in (
         ((slow,), 1, "no stop to measure: a STOP or BRAKE from a steady speed, until standstill "),
         ((slow,), 1, "(1 slower than 0.1 m/s)"),
         ((stands,), 1, "(no RUN with speed ends)"),
         ((text,), 1, "is not an MCAP file"),
         ((none,), 1, "cannot be read"),
-        ((robots,), 1, "has several robots (001, 002): record one"),
         ((), EXIT_CONFIG, "name at least one recording: start `t2 record` on the robot"),
         ((slow, "--only", "link"), EXIT_CONFIG, "has no steps and no report"),
     ):

@@ -16,8 +16,7 @@ from tests.recorder.samples import bare, sample
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    about = {"robot": "007", "version": "1.2.3", "why": "latch-contact"}
-    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), about)
+    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()))
     health = Health(
         service="odom", version="1.2", uptime=0, rates={}, counters={}, lateness=0, rss=0
     )
@@ -39,7 +38,6 @@ def test_the_content_of_a_recording(path: Path, capsys: pytest.CaptureFixture[st
         f"file: {path}, {path.stat().st_size} bytes",
         "duration: 2.0 s",
         "messages: 16 on 5 keys",
-        "recorded: robot 007, version 1.2.3, why latch-contact",
         "services: odom 1.2",
         "1 messages could not be decoded.",
         "001/tel/bridge/velocity  Velocity           11  10.0     0",

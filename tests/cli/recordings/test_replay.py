@@ -30,7 +30,7 @@ FAST = ("--rate", "1000")
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     """A recording of five seconds, with every kind of message that must not be played."""
-    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()), {})
+    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()))
     for second in range(5):
         made.write(
             sample("tel/bridge/velocity", samples.velocity(second), second, raw=b"%d" % second)

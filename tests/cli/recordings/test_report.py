@@ -17,7 +17,7 @@ from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     """A recording of the drive, and of an unknown key."""
-    made = RecordingWriter(tmp_path / "lap.mcap", Encoder(Vehicle()), {"robot": "001"})
+    made = RecordingWriter(tmp_path / "lap.mcap", Encoder(Vehicle()))
     for key, _, message, at_ns in drive():
         at_s = (at_ns - BEGIN_NS) / NS_PER_S
         made.write(sample(key.removeprefix(f"{ROOT}/"), message, at_s))
@@ -60,7 +60,7 @@ def test_error_messages(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(file.parent)
-    RecordingWriter(Path("empty.mcap"), Encoder(Vehicle()), {}).close()
+    RecordingWriter(Path("empty.mcap"), Encoder(Vehicle())).close()
     before = file.read_bytes()
     assert main(["report", *words]) == 1
     assert sentence in capsys.readouterr().err
