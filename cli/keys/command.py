@@ -147,7 +147,7 @@ def _ask(prompt: str) -> bytes:
 def _create_certificate(
     folder: "Folder", wanted: Profile, options: argparse.Namespace, *, settings: bool
 ) -> None:
-    authority = folder.authority(options.ca_key, lambda: _ask("passphrase of the CA's key: "))
+    authority = folder.authority(lambda: _ask("passphrase of the CA's key: "))
     span = member_list.span(time.time(), options.days, folder.ends_s())
     issued = authority.issue(wanted, span)
     before = folder.read()
@@ -180,9 +180,6 @@ def _add_signing(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--days", type=int, default=DAYS, help=f"validity in days; {DAYS} by default"
-    )
-    parser.add_argument(
-        "--ca-key", type=Path, metavar="FILE", help="the CA's key, if it is stored elsewhere"
     )
 
 

@@ -46,17 +46,14 @@ class Folder:
         _write(self.members, _as_file(members), PUBLIC)
         _write(self.ca, certificate_pem(authority.certificate), PUBLIC)
 
-    def authority(
-        self, key_file: Path | None, passphrase: Callable[[], bytes]
-    ) -> CertificateAuthority:
-        """Return the authority; its key may be stored elsewhere."""
-        key = key_file or self.ca_key
-        if not key.exists():
+    def authority(self, passphrase: Callable[[], bytes]) -> CertificateAuthority:
+        """Return the authority."""
+        if not self.ca_key.exists():
             raise RobotError(
-                f"{key} not found: it is needed to sign; "
-                "if it is stored elsewhere, use --ca-key FILE"
+                f"{self.ca_key} not found: it is needed to sign; "
+                "if it is stored elsewhere, make it a link"
             )
-        return CertificateAuthority.load(self.certificate(), _read(key), passphrase)
+        return CertificateAuthority.load(self.certificate(), _read(self.ca_key), passphrase)
 
     def certificate(self) -> bytes:
         """Return the certificate of the authority."""

@@ -74,7 +74,7 @@ def test_a_client_rejects_a_driver_as_router(site: Site, anna: BusSettings, endp
 def issue(site: Site, who: Profile, ends_s: float) -> BusSettings:
     """Issue a certificate that `t2 keys` does not: for this profile, valid until ``ends_s``."""
     folder = Folder(site.folder)
-    issued = folder.authority(None, bytes).issue(who, (time.time() - 60, time.time() + ends_s))
+    issued = folder.authority(bytes).issue(who, (time.time() - 60, time.time() + ends_s))
     folder.write_machine(issued, folder.read(), settings=True)
     return site.settings(who.role, who.name)
 

@@ -34,7 +34,7 @@ def folder(tmp_path: Path) -> Folder:
 
 
 def create_machine(folder: Folder, who: Profile, *, settings: bool = True) -> Path:
-    issued = folder.authority(None, no_passphrase).issue(who, SPAN)
+    issued = folder.authority(no_passphrase).issue(who, SPAN)
     listed = Members(site="berlin", members=(*folder.read().members, issued.member))
     target = folder.write_machine(issued, listed, settings=settings)
     folder.write(listed)
