@@ -28,7 +28,7 @@ GROUPS = {
     },
     "Inspect": {
         "doctor": ("cli.inspect.doctor", "diagnose the path from this laptop to the wheels"),
-        "robots": ("cli.inspect.robots", "the robots on the bus: verdict, speed, driver"),
+        "robots": ("cli.inspect.robots", "the robots on the bus: verdict, driver, reason"),
         "health": ("cli.inspect.health", "service health"),
         "ls": ("cli.inspect.ls", "active keys with type, rate and publishers; the services"),
         "echo": ("cli.inspect.echo", "print messages received on a key"),

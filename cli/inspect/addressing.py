@@ -32,13 +32,6 @@ def parse_key(word: str) -> str:
     return word
 
 
-def parse_one_key(word: str) -> str:
-    """Check a key that has no wildcard."""
-    if "*" in parse_key(word):
-        raise argparse.ArgumentTypeError(f"{word!r} matches several keys; name one")
-    return word
-
-
 def parse_site(site: str) -> str:
     """Return the key expression chunk that matches the robots of a site."""
     if not SITE.fullmatch(site):

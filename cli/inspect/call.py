@@ -10,7 +10,6 @@ from typing import Any
 import msgspec
 
 from cli.inspect import output
-from cli.inspect.addressing import chunks, parse_one_key
 from cli.inspect.client import SafetyClient
 from cli.inspect.payload import read
 from cli.inspect.session import add_options, open_session
@@ -26,9 +25,8 @@ Request = dict[str, Any]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "key", metavar="KEY", nargs="?", type=parse_one_key,
-        help="such as safety/reset; lists the calls if omitted",
-    )  # fmt: skip
+        "key", metavar="KEY", nargs="?", help="such as safety/reset; lists the calls if omitted"
+    )
     parser.add_argument(
         "request", metavar="JSON", nargs="?", type=json_object, default={},
         help="""a JSON object, such as '{"bumper_brake": true}'; all defaults if omitted; `echo`,
@@ -46,9 +44,7 @@ def run(options: argparse.Namespace) -> int:
         ]  # fmt: skip
         output.rows(rows, as_json=options.json)
         return 0
-    robot, below = chunks(options.key.strip("/"))
-    options.robot = options.robot or robot  # of a whole key
-    call = known(below or options.key.strip("/"))
+    call = known(options.key.strip("/"))
     try:
         codec.encode(msgspec.convert(options.request, call.request))
     except (msgspec.ValidationError, OverflowError) as error:
