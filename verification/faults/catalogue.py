@@ -153,6 +153,9 @@ GREEDY = [
     # More than the bridge can publish: answers to its queries are lost, the bumper's first.
     Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
           (*ON, *ITSELF, *NEUTRAL), hold_s=1.0, harmless=True),
+    Fault("queries as fast as possible", injectors.query_flood, ON, hold_s=3.0),
+    Fault("queries as fast as possible, then contact",
+          steps(injectors.query_flood, pause(1.0), hit(0.3)), RESET, within(0.02)),
     Fault("browser's estop while a viewer sends 50 000 messages/s", injectors.browser_estop,
           RESET, within(0.3)),
 ]  # fmt: skip

@@ -47,6 +47,15 @@ while True:
     time.sleep(max(0.0, due_s - time.monotonic()))
 """
 NOT_ON_THE_PC = ("sim", "relay", "driver")
+QUERIES = """
+import sys
+from verification.faults.independent_client import ROOT, session
+with session(sys.argv[1]) as bus:
+    while True:
+        for replies in [bus.get(f"{ROOT}/info/*/schema", timeout=0.25) for _ in range(80)]:
+            for _ in replies:
+                pass
+"""
 
 
 def injector(
@@ -123,9 +132,17 @@ def restart(fixture: StackFixture) -> None:
 
 def flood(fixture: StackFixture) -> None:
     """Send 20 000 datagrams a second to the bridge's first port, from a foreign address."""
-    port = str(fixture.running.config.board.listen_ports[0])
+    _start(fixture, FLOOD, str(fixture.running.config.board.listen_ports[0]))
+
+
+def query_flood(fixture: StackFixture) -> None:
+    """Query the schemas of all services, 80 queries at once, as often as they are answered."""
+    _start(fixture, QUERIES, operators_endpoint(fixture.running.config))
+
+
+def _start(fixture: StackFixture, program: str, word: str) -> None:
     with fixture.running.log.open("ab") as log:
-        process = subprocess.Popen([sys.executable, "-c", FLOOD, port], stdout=log, stderr=log)
+        process = subprocess.Popen([sys.executable, "-c", program, word], stdout=log, stderr=log)
     fixture.running.others.append(process)
 
 
