@@ -1,8 +1,6 @@
 """The driver lock, and the page that keeps the emergency stop alive."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S, Latest
 from common.messages import KeepaliveState, SafetyState
@@ -106,61 +104,6 @@ def test_a_takeover_ends_the_hold_and_starts_in_gear_1(lock: DriverLock) -> None
 def test_a_push_is_clamped(lock: DriverLock) -> None:
     lock.hold(Push(7.0, -7.0, release="backward"), shown(), NOW_NS)
     assert lock.held(NOW_NS) == Push(1.0, -1.0, release="backward")
-
-
-STEPS = st.lists(
-    st.tuples(
-        st.sampled_from(["take", "force", "leave", "hold", "free", "wait"]),
-        st.sampled_from(["a", "b"]),  # who takes and leaves; the driver holds and lets go
-        st.floats(0.0, 0.5),
-    ),
-    max_size=60,
-)
-
-
-class Play:
-    """A lock, the age of its newest hold, and whether the driver has lapsed since it let go."""
-
-    def __init__(self) -> None:
-        self.lock = DriverLock()
-        self.now_ns = NOW_NS
-        self.answered_ns = 0
-        self.lapsed: str | None = None
-
-    def step(self, what: str, who: str, seconds: float) -> None:
-        span_ns = round(seconds * NS_PER_S)
-        match what:
-            case "take" | "force":
-                self.lock.take(who, force=what == "force")
-            case "leave":
-                self.lock.leave(who)
-            case "free":
-                self.lock.let_go()
-                self.lapsed = None
-            case "hold" if self.lock.driver:
-                answered = shown(self.now_ns - span_ns)
-                self.lock.hold(AHEAD, answered, self.now_ns)
-                if self.lock.shown is answered:
-                    self.answered_ns = self.now_ns - span_ns
-            case "wait":
-                self.now_ns += span_ns
-        self.lapsed = None if self.lapsed != self.lock.driver else self.lapsed
-
-
-@given(STEPS)
-def test_a_valid_hold_is_the_drivers_and_young_and_none_returns_after_a_gap(
-    steps: list[tuple[str, str, float]],
-) -> None:
-    play = Play()
-    for step in steps:
-        play.step(*step)
-        before = play.lock.state
-        if play.lock.held(play.now_ns) is not None:
-            assert play.lock.driver is not None
-            assert play.now_ns - play.answered_ns <= HOLD_NS
-            assert play.lapsed is None
-        elif before is HELD:
-            play.lapsed = play.lock.driver
 
 
 TIMEOUT_NS = NS_PER_S
