@@ -207,10 +207,6 @@ class Simulation:
             contact=self._contact,
             pressed=self._switch.closed,
             command=self._command,
-            braking=self.board.braking(),
-            ultrasonic_brake=self.board.ultrasonic_brake,
-            bumper_brake=self.board.bumper_brake,
-            silent=self._silent(now_ns),
         )
 
     def _update_bumper(self, now_ns: int) -> None:

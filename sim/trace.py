@@ -44,10 +44,6 @@ class Truth(Record, frozen=True, kw_only=True, tag="truth"):
     contact: bool  # something presses the bumper strip
     pressed: bool  # the bumper as the board senses it: contact, or by hand
     command: Command  # the current command of the board
-    braking: bool  # one of the board's own emergency brakes overrules that command
-    ultrasonic_brake: bool
-    bumper_brake: bool
-    silent: bool  # the board is frozen or has no power
 
 
 class Power(Record, frozen=True, kw_only=True, tag="power"):

@@ -1,6 +1,5 @@
 """The robot's description: one tree of frames, the same poses as /tf_static."""
 
-import math
 from xml.etree import ElementTree
 
 import pytest
@@ -23,14 +22,6 @@ def test_wheels_are_at_the_corners_of_wheelbase_and_track() -> None:
         "wheel_rear_left": (-0.3, 0.25, 0.15),
         "wheel_rear_right": (-0.3, -0.25, 0.15),
     }
-
-
-def test_sonars_point_outwards() -> None:
-    sonars = {name: (where, yaw) for name, where, yaw in urdf.frames(VEHICLE) if "sonar" in name}
-    assert len(sonars) == 8
-    where, yaw = sonars["sonar_rear_left"]
-    assert where == (-0.6, 0.4, 0.35)
-    assert yaw == pytest.approx(math.radians(135))
 
 
 def test_the_description_has_the_frames_and_poses_of_tf_static() -> None:
