@@ -215,6 +215,12 @@ def test_slip_by_distance_or_by_turn(sign: int, counted: float, turned: float, s
     assert detector.residual == pytest.approx(10 * sign * counted)
 
 
+def test_before_the_first_comparison_nothing_slips() -> None:
+    detector = SlipDetector(Odom())
+    assert detector.slip is False
+    assert detector.residual is None
+
+
 def test_only_the_last_second_is_compared() -> None:
     detector = compared(500, arc(0.02), arc(0.019))
     assert detector.residual == pytest.approx(0.051)
