@@ -57,12 +57,14 @@ def test_life_cycle_of_a_certificate(keys: Keys) -> None:
     assert f"t2 keys revoke driver anna --serial {keys.serials()[0]}" in message
     assert (keys.folder / "driver.anna" / "private.key").read_bytes() != first
     assert keys.states() == {"driver.anna.0": "valid", "driver.anna.1": "expires soon"}
+    keys.run("issue", "viewer", "anna")
     keys.run("revoke", "driver", "anna", "--serial", keys.serials()[0])
-    assert keys.states() == {"driver.anna.0": "revoked", "driver.anna.1": "expires soon"}
+    assert list(keys.states().values()) == ["revoked", "expires soon", "valid"]
     keys.run("revoke", "driver", "anna")
-    assert set(keys.states().values()) == {"revoked"}
+    assert list(keys.states().values()) == ["revoked", "revoked", "valid"]
+    assert "or a revoked one" in keys.run("renew", "driver", "anna", code=1)
     keys.run("issue", "driver", "anna", "--robot", "002")
-    assert keys.states()["driver.anna.2"] == "valid"
+    assert keys.states()["driver.anna.3"] == "valid"
 
 
 def test_renewal_keeps_rights_and_addresses(keys: Keys) -> None:
@@ -96,6 +98,7 @@ def test_routers_are_known_without_their_folders(keys: Keys, tmp_path: Path) -> 
         (("issue", "viewer", "hall"), 1, "viewer hall has a certificate until"),
         (("issue", "viewer", "v", "--days", "9999"), EXIT_CONFIG, "--days 9999: allowed is 1..36"),
         (("renew", "driver", "ben"), 1, "driver ben has no certificate, or a revoked one"),
+        (("revoke", "viewer", "hall", "--serial", "0"), 1, "hall has no certificate with the se"),
     ],
 )
 def test_errors(keys: Keys, words: tuple[str, ...], code: int, message: str) -> None:

@@ -19,14 +19,6 @@ from cli.keys.members import ROLES, Member, Profile
 from common.errors import ConfigError, RobotError
 from tests.cli.keys.site_fixture import NOW_S, member, members
 
-OLD = member("driver", "anna", "00000001", 10)
-NEW = member("driver", "anna", "00000002")
-GONE = member("driver", "anna", "00000003", revoked=True)
-OTHER = member("driver", "ann", "00000001")
-SAME_NAME = member("viewer", "anna")
-SITE = members(OLD, NEW, GONE, OTHER, SAME_NAME)
-
-
 # --- profiles -----------------------------------------------------------------------------------
 
 
@@ -99,40 +91,18 @@ def test_a_certificate_never_exceeds_the_authority(days: int, left_days: float, 
 # --- the list -----------------------------------------------------------------------------------
 
 
-def test_newest_skips_revoked_certificates() -> None:
-    assert member_list.newest(SITE, "driver", "anna") is NEW
-
-
 def test_a_name_is_free_without_a_valid_certificate() -> None:
-    ended = member("driver", "anna", days=-1)
-    member_list.check_free(members(ended, GONE, OTHER, SAME_NAME), "driver", "anna", NOW_S)
+    ended, gone = member("driver", "anna", days=-1), member("driver", "anna", revoked=True)
+    others = member("driver", "ann"), member("viewer", "anna")
+    member_list.check_free(members(ended, gone, *others), "driver", "anna", NOW_S)
 
 
 def test_routers_have_the_addresses_of_their_latest_certificate() -> None:
     old, new = (member("robot", "002", serial, addresses=(where,))
                 for serial, where in (("1", "10.0.0.1"), ("2", "10.0.0.2")))  # fmt: skip
     gone, site = member("robot", "003", revoked=True), member("site", "berlin")
-    assert member_list.routers(members(site, old, new, gone, OLD)) == [new, site]
-
-
-@pytest.mark.parametrize(("serial", "ended"), [(None, [OLD, NEW]), ("00000001", [OLD])])
-def test_revoke_certificates_of_a_member(serial: str | None, ended: list[Member]) -> None:
-    left, revoked = member_list.revoked(SITE, "driver", "anna", serial)
-    assert revoked == ended
-    assert left.welcome == tuple(each for each in SITE.welcome if each not in ended)
-    assert len(left.members) == len(SITE.members)
-
-
-@pytest.mark.parametrize(
-    ("name", "serial", "message"),
-    [
-        ("ben", None, "driver ben has no certificate that could be revoked"),
-        ("anna", "00000003", "has no certificate with the serial '00000003' that could be"),
-    ],
-)
-def test_nothing_to_revoke(name: str, serial: str | None, message: str) -> None:
-    with pytest.raises(RobotError, match=message):
-        member_list.revoked(SITE, "driver", name, serial)
+    driver = member("driver", "anna")
+    assert member_list.routers(members(site, old, new, gone, driver)) == [new, site]
 
 
 # --- t2 keys list ---------------------------------------------------------------------------------

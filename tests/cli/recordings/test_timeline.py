@@ -86,15 +86,6 @@ def phases_of(*steps: tuple[float, float, Verdict, tuple[Cause, ...]]) -> list[P
     ]
 
 
-def test_a_contact_while_driving_with_a_reset() -> None:
-    (stop,) = stops(
-        phases_of((0, 2, "run", ()), (2, 5, "brake", (CONTACT, IDLE)), (5, 9, "stop", (IDLE,)))
-    )
-    assert (stop.begins_s, stop.ends_s, stop.lasts_s) == (2, 5, 3)
-    assert (stop.was_driving, stop.verdict) == (True, "brake")
-    assert stop.reasons == {"contact": "The bumper was hit."}
-
-
 def test_consecutive_reasons_are_one_stop() -> None:
     (stop,) = stops(
         phases_of((0, 1, "inhibited", (LINK,)), (1, 2, "brake", (CONTACT, LINK)), (2, 3, "run", ()))
