@@ -38,7 +38,6 @@ class Channel:
     topic: str
     schema: Schema | None  # None for messages of other programs: viewers inspect the JSON
     encoding: str = ""  # on the bus; empty for a view
-    is_view: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +99,7 @@ class Encoder:
         if message is not None:
             service = sample.key.rpartition("/")[2]
             for topic, view_schema, view in self._views.of(message, service, log_ns):
-                view_channel = Channel(topic, view_schema, is_view=True)
-                yield Entry(view_channel, msgspec.json.encode(view), log_ns)
+                yield Entry(Channel(topic, view_schema), msgspec.json.encode(view), log_ns)
 
 
 def decode_fields(sample: Sample) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
 from common.errors import RobotError
+from common.keys import ROOT
 from services.recorder.mcap_codec import Channel, Entry
 
 # Raised by the MCAP library for missing or wrong bytes.
@@ -39,7 +40,7 @@ class Reader:
         self.size = path.stat().st_size
         self.cut = False  # truncated: the writer was killed, or is still writing
         self.damaged = 0  # chunks that were skipped
-        self._channels: dict[int, Channel | None] = {}
+        self._channels: dict[int, Channel] = {}
 
     def __enter__(self) -> Self:
         return self
@@ -51,10 +52,11 @@ class Reader:
         """Yield all messages; raise ``RobotError`` if the file is not an MCAP file."""
         for record in self._records():
             if isinstance(record, records.Channel):
-                self._channels[record.id] = _channel(record)
+                encoding = record.metadata.get("encoding", "")
+                self._channels[record.id] = Channel(record.topic, None, encoding)
             elif isinstance(record, records.Message):
                 channel = self._channels.get(record.channel_id)
-                if channel is not None:
+                if channel and channel.topic.startswith(f"{ROOT}/"):  # not a view
                     yield Entry(channel, record.data, record.log_time)
 
     def _records(self) -> Iterator[records.McapRecord]:
@@ -78,10 +80,3 @@ class Reader:
         except (*DAMAGE, ZstdError):
             self.damaged += 1
             return []
-
-
-def _channel(record: records.Channel) -> Channel | None:
-    """Return a channel of the bus; None for a view."""
-    if "drawn" in record.metadata:
-        return None
-    return Channel(record.topic, None, record.metadata.get("encoding", ""))

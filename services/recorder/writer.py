@@ -77,8 +77,7 @@ class RecordingWriter:
                     name, "jsonschema", channel.schema.data
                 )
             schema_id = self._schemas[name]
-        # The key "drawn" is part of the file format.
-        about = {"drawn": "yes"} if channel.is_view else {"encoding": channel.encoding}
+        about = {"encoding": channel.encoding}
         self._ids[channel] = self._writer.register_channel(channel.topic, "json", schema_id, about)
         return self._ids[channel]
 
