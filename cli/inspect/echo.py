@@ -68,8 +68,6 @@ def show(sample: Sample, robot: str, options: argparse.Namespace) -> None:
 def as_json(sample: Sample, reading: Reading, robot: str) -> dict[str, Any]:
     """Return a sample as a JSON object."""
     head = {"key": short(sample.key, robot), "type": reading.kind, "received_ns": sample.wall_ns}
-    if sample.deleted:
-        head["deleted"] = True
     if reading.complaint:
         head["complaint"] = reading.complaint
     return head | {"message": reading.value}
@@ -81,8 +79,7 @@ def as_text(sample: Sample, reading: Reading, robot: str) -> str:
     if isinstance(value, dict):
         seq = f"  seq {value['seq']}" if "seq" in value else ""
         value = {name: each for name, each in value.items() if name not in HEADER}
-    kind = "DELETE" if sample.deleted else reading.kind
-    lines = [f"# {short(sample.key, robot)}  {kind}{seq}  {clock(sample, reading)}"]
+    lines = [f"# {short(sample.key, robot)}  {reading.kind}{seq}  {clock(sample, reading)}"]
     if reading.complaint:
         lines.append(f"# invalid: {reading.complaint}")
     if value not in (None, {}):

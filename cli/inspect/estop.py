@@ -63,13 +63,17 @@ def stop(client: SafetyClient, settings: Sequence[str] = ()) -> int:
     """
     probe, robot = client.probe, client.robot
     client.order_stop(robot)  # before anything else
-    expected = expected_robots(probe, robot)
+    expected = {robot}
+    if "*" in robot:
+        expected = {name for name, service in services(probe, robot) if service in MOVES}
     # By name, too: a driver's certificate may allow its own robots only, not an expression.
     confirmed = client.stop(expected)
     missing = sorted(expected - confirmed)
     if missing == [robot]:
-        if seen := other_robots(probe, robot):
-            output.warn(f"t2 estop: no such robot {robot} at this router (seen: {', '.join(seen)})")
+        present = sorted({name for name, _ in services(probe, "*")})
+        if present and robot not in present:
+            seen = ", ".join(present)
+            output.warn(f"t2 estop: no such robot {robot} at this router (seen: {seen})")
             return 1
         if is_barred(probe, robot):
             output.warn(
@@ -78,13 +82,6 @@ def stop(client: SafetyClient, settings: Sequence[str] = ()) -> int:
             )
     report(confirmed, missing, settings)
     return 0 if confirmed and not missing else 1
-
-
-def expected_robots(probe: Probe, robot: str) -> set[str]:
-    """Return the robots that must confirm: the named one, or all present ones."""
-    if "*" not in robot:
-        return {robot}
-    return {name for name, service in services(probe, robot) if service in MOVES}
 
 
 def report(confirmed: set[str], missing: Sequence[str], settings: Sequence[str]) -> None:
@@ -99,20 +96,10 @@ def report(confirmed: set[str], missing: Sequence[str], settings: Sequence[str])
             f"t2 estop: sent, but safety of robot {each} does not confirm. "
             f"{SWITCH}, then `{doctor}`."
         )
-    robots = len(confirmed) + len(missing)
-    if missing and robots > 1:
-        count = f"{len(missing)} of {robots} robots"
-        output.warn(f"t2 estop: {count} DO NOT CONFIRM: {', '.join(missing)}")
-    if not robots:
+    if not confirmed and not missing:
         output.warn(
             f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. `t2 robots` lists ids"
         )
-
-
-def other_robots(probe: Probe, robot: str) -> list[str]:
-    """Return the robots at the router if the named one is not among them; otherwise nothing."""
-    present = {name for name, _ in services(probe, "*")}
-    return [] if robot in present else sorted(present)
 
 
 def is_barred(probe: Probe, robot: str) -> bool:
