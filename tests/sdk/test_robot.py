@@ -296,3 +296,12 @@ def test_forks_are_publishers_of_their_own_and_inherit_no_connection(
     first, second = (line.split() for line in done.stdout.splitlines())
     assert first[0] == second[0] == "nav"
     assert first[1] != second[1]
+
+
+@pytest.mark.campaign
+def test_two_simulated_robots_drive_in_one_program() -> None:
+    with t2.sim() as first, t2.sim() as second:
+        for robot in (first, second):
+            with robot.drive("nav") as drive:
+                drive.velocity(0.1)
+                await_motion(robot)

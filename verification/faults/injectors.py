@@ -56,6 +56,16 @@ with session(sys.argv[1]) as bus:
             for _ in replies:
                 pass
 """
+# Control characters are escaped before they are shown, which makes them longer still.
+EVENTS = """
+import sys, time, msgpack
+from verification.faults.independent_client import ROOT, session
+event = {"name": "long", "level": "info", "text": chr(27) * 4000, "boot": 1}
+with session(sys.argv[1]) as bus:
+    for seq in range(1, 1_000_000):
+        bus.put(f"{ROOT}/evt/dashboard", msgpack.packb(event | {"seq": seq}))
+        time.sleep(0.01)
+"""
 
 
 def injector(
@@ -245,7 +255,8 @@ def late_releases(fixture: StackFixture) -> None:
 
 
 def browser_estop(fixture: StackFixture) -> int:
-    """Press E-STOP in the browser while another client floods the dashboard."""
+    """Press E-STOP in the browser while clients flood the dashboard with messages and events."""
+    _start(fixture, EVENTS, operators_endpoint(fixture.running.config))
     with dashboard(fixture.running.endpoint, fixture.folder) as server, flooded(server):
         time.sleep(SETTLE_S)
         pressed = urllib.request.Request(
