@@ -5,17 +5,12 @@ import argparse
 import pytest
 from msgspec.structs import replace
 
-from cli.inspect.addressing import (
-    decode,
-    expression,
-    parse_key,
-    topic_of,
-)
+from cli.inspect.addressing import decode, expression, parse_key, topic_of
 from common import codec, keys
 from common.codec import Sample
 from common.errors import MessageError
 from common.messages import Health
-from tests.cli.inspect.tool import health
+from tests.factories import health
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from typing import Any, get_args
 
 import pytest
-from msgspec.structs import replace
 
 from cli.inspect import diagnosis as d
 from cli.inspect.diagnosis import Finding, Observation, diagnose
@@ -12,7 +11,7 @@ from common import keys
 from common import messages as m
 from services.safety.core.causes import RULES
 from tests import factories
-from tests.cli.inspect.tool import health
+from tests.factories import health
 
 CLEAR: Any = ("ok",) * 8
 RATES = {topic.path: topic.rate_hz for topic in d.STREAMS}
@@ -29,7 +28,7 @@ def link(state: Any = "up", **given: Any) -> m.Link:
 
 
 def relay(state: Any = "up", **given: Any) -> m.Link:
-    usual: dict[str, Any] = {"version": "1", "braking": "", "uptime": 60.0, "counters": {}}
+    usual: dict[str, Any] = {"version": "0.1.0", "braking": "", "uptime": 60.0, "counters": {}}
     return link(relay=m.Relay(state=state, **(usual | given)))
 
 
@@ -60,7 +59,7 @@ def seen(*messages: m.Message, **given: Any) -> Observation:
                 break
     newest |= given.pop("newest", {})
     healthy: dict[str, Any] = {
-        "t2": "1", "instances": dict.fromkeys(d.NEEDED, 1), "may_drive": True, "may_call": True,
+        "t2": "0.1.0", "instances": dict.fromkeys(d.NEEDED, 1), "may_drive": True, "may_call": True,
         "newest": newest, "first": newest, "delays_s": [0.01, 0.02], "rates": RATES,
     }  # fmt: skip
     return Observation(**(healthy | given))
@@ -101,7 +100,7 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
     ("check", "given", "expected"),
     [
         (d.versions, {"newest": healths(health("bridge", version="0"))},
-         [("note", "bridge is T2 0, this laptop 1")]),
+         [("note", "bridge is T2 0, this laptop 0.1.0")]),
         (d.versions, {"undecodable": {"tel/x": "not a Bumper"}},
          [("ok", "everywhere"), ("wrong", "tel/x: not a Bumper")]),
         (d.rights, {"may_drive": False}, [("note", "does not receive its driving")]),
@@ -140,7 +139,7 @@ def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, s
         (relay("never", version=""), [("wrong", "no report of the relay received", d.RELAY)]),
         (relay(braking="silent"),
          [("wrong", "the relay sends BRAKE: silent", d.RELAY_BRAKES["silent"])]),
-        (relay(version="2"), [("note", "the relay is T2 2, this laptop 1", d.RELAY_COPY)]),
+        (relay(version="2"), [("note", "the relay is T2 2, this laptop 0.1.0", d.RELAY_COPY)]),
         (state("contact", "neutral", latched=("contact",)), [
             ("wrong", "The bumper was hit. (brake, latched)", d.BUMPER),
             ("note", "Waiting for a neutral request: release the controls, then drive. (stop)",
@@ -175,14 +174,16 @@ def test_frames_rejected_and_unsent_during_the_observation() -> None:
 
 
 def test_streams_that_are_slow_missing_or_downsampled() -> None:
-    sent = replace(
-        health("bridge"),
-        rates={f"t2/v1/001/{path}": hz for path, hz in RATES.items() if "mileage" not in path},
-    )
+    sent_hz = {f"t2/v1/001/{path}": hz for path, hz in RATES.items() if "mileage" not in path}
     rates = RATES | {
         "tel/bridge/bumper": 0.0, "tel/bridge/mileage": 12.0, "tel/bridge/velocity": 10.0,
     }  # fmt: skip
-    found = [text for _, text, _ in problems(seen(rates=rates, newest=healths(sent)))]
+    found = [
+        text
+        for _, text, _ in problems(
+            seen(rates=rates, newest=healths(health("bridge", rates=sent_hz)))
+        )
+    ]
     assert found == [
         "tel/bridge/mileage has 12 of 25 Hz",
         "tel/bridge/bumper is sent with 50 Hz and does not arrive here",

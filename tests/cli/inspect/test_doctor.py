@@ -18,9 +18,9 @@ from common import keys
 from common.bus.bus import Bus
 from common.messages import Bumper
 from common.settings import BusSettings, Shared
-from tests.cli.inspect.tool import Result, Tool, health, pretend
+from tests.cli.inspect.tool import Result, Tool, pretend
 from tests.common.bus_fixture import BusFixture
-from tests.factories import safety_state
+from tests.factories import health, safety_state
 from verification.harness.bus import at, router_process
 from verification.harness.certificates import Site, connecting
 from verification.harness.ports import free_port
@@ -45,7 +45,7 @@ def test_what_it_observes(buses: BusFixture, tool: Tool) -> None:
     assert (result.code, result.err) == (1, "")
     found = [(each["where"], each["level"], each["text"]) for each in result.lines]
     assert ("rights", "ok", "this laptop may read, call and drive") in found
-    assert ("services", "ok", "bridge is up for 3 s") in found
+    assert ("services", "ok", "bridge is up for 60 s") in found
     assert ("services", "wrong", "odom is not running") in found
     assert any(text.startswith("safety is running and publishes no") for *_, text in found)
     assert any(text.startswith("tel/bridge/link: ") for *_, text in found)

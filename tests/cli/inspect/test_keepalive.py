@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 
 import pytest
 
@@ -35,8 +34,11 @@ def safety(buses: BusFixture) -> Safety:
     return Safety(buses)
 
 
-@pytest.fixture
-def pendant(buses: BusFixture, safety: Safety) -> Iterator["subprocess.Popen[str]"]:
+def test_signs_of_life_enter_and_the_end(buses: BusFixture, safety: Safety) -> None:
+    def more() -> None:
+        count = len(safety.received)
+        wait_until(lambda: len(safety.received) > count + 3, "more signs of life")
+
     command = [
         sys.executable, "-m", "cli", "estop", "--keepalive", "pendant", "--robot", buses.robot,
         "--set", f"bus.connect={buses.endpoint}",
@@ -45,45 +47,34 @@ def pendant(buses: BusFixture, safety: Safety) -> Iterator["subprocess.Popen[str
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         try:
-            wait_until(lambda: len(safety.received) > 2, "signs of life")
-            yield process
+            more()
+            newest = safety.received[-1]
+            assert newest.key.endswith("/@cmd/estop_keepalive/pendant")
+            assert newest.message.echo > 100
+            assert not safety.stops
+            assert process.stdin is not None
+            process.stdin.write("\n")
+            process.stdin.close()  # the end of its input is no key
+            wait_until(lambda: safety.stops, "the emergency stop")
+            more()  # they pause during a stop
+            stops = len(safety.stops)
+            more()
+            assert len(safety.stops) == stops
+            process.send_signal(signal.SIGINT)
+            assert process.wait(PATIENCE_S) == 0
+            assert process.stdout is not None
+            out = process.stdout.read()
         finally:
             process.kill()
-
-
-def test_a_described_state_is_printable() -> None:
-    assert described(safety_state(text="\x1b[2J"), "pendant").endswith("  \\u001b[2J")
-
-
-def test_it_echoes_the_heartbeat_and_ends_with_a_warning(
-    pendant: "subprocess.Popen[str]", safety: Safety
-) -> None:
-    newest = safety.received[-1]
-    assert newest.key.endswith("/@cmd/estop_keepalive/pendant")
-    assert newest.message.echo > 100
-    pendant.send_signal(signal.SIGINT)
-    out, _ = pendant.communicate(timeout=PATIENCE_S)
-    assert pendant.returncode == 0
     assert "alive  RUN  Driving." in out
     assert "within 1 s" in out.splitlines()[-1]
-    assert not safety.stops
-
-
-def test_enter_is_an_emergency_stop(pendant: "subprocess.Popen[str]", safety: Safety) -> None:
-    def more() -> int:
-        """Return the number of stops after more signs of life, which pause during a stop."""
-        count = len(safety.received)
-        wait_until(lambda: len(safety.received) > count + 3, "more signs of life")
-        return len(safety.stops)
-
-    assert pendant.stdin is not None
-    pendant.stdin.write("\n")
-    pendant.stdin.close()  # the end of its input is no key
-    wait_until(lambda: safety.stops, "the emergency stop")
-    assert more() == more()
 
 
 def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
     result = tool("estop", "--keepalive", "phone")
     assert result.code == 1
     assert "safety does not expect 'phone': it expects pendant" in result.err
+
+
+def test_a_described_state_is_printable() -> None:
+    assert described(safety_state(text="\x1b[2J"), "pendant").endswith("  \\u001b[2J")

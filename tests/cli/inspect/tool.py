@@ -11,7 +11,7 @@ from cli.__main__ import main
 from common import keys
 from common.bus.bus import Bus
 from common.keys import Topic
-from common.messages import Health, Message, SafetyState
+from common.messages import Message, SafetyState
 from tests.common.bus_fixture import BusFixture
 from tests.factories import safety_state
 
@@ -49,14 +49,6 @@ class Tool:
             code = int(str(end.code))
         captured = self.capsys.readouterr()
         return Result(code, captured.out, captured.err)
-
-
-def health(service: str, version: str = "1", lateness: float = 0.0) -> Health:
-    """Return a health message."""
-    return Health(
-        service=service, version=version, uptime=3.0, rates={}, counters={"overrun": 2},
-        lateness=lateness, rss=5_000_000, priority=53,
-    )  # fmt: skip
 
 
 def pretend(
