@@ -11,7 +11,7 @@ from common.bus.bus import Arrival
 from common.freshness import NS_PER_S, Latest
 from common.service import Node
 from common.settings import sonar_mounts
-from services.ros2 import translate, urdf
+from services.ros2 import translate
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Publisher
@@ -102,9 +102,9 @@ class Streams:
     def _description(self) -> None:
         vehicle, prefix = self._node.config.vehicle, self._settings.frame_prefix
         description = self._publisher("robot_description", "std_msgs/msg/String", latched=True)
-        description.put((urdf.describe(vehicle, prefix),))
+        description.put((translate.description(vehicle, prefix),))
         static = self._publisher("/tf_static", TRANSFORMS, latched=True)
-        static.put(translate.static_transforms(time.time_ns(), urdf.frames(vehicle), prefix))
+        static.put(translate.static_transforms(time.time_ns(), vehicle, prefix))
 
     def _pass_on(
         self,

@@ -5,16 +5,17 @@ measured becomes the value that ROS defines for its reason.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from common import messages as m
 from common.freshness import NS_PER_S
-from common.settings import Mount, Vehicle
+from common.settings import Mount, Vehicle, sonar_mounts
 from common.text import printable
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2
 
 ULTRASOUND = 0
+SONAR_HEIGHT, BODY_HEIGHT, CLEARANCE = 0.35, 0.35, 0.15  # m, for display: the settings have none
 PLANAR = 1e-6  # variance of what a vehicle on a floor does not do: z, roll, pitch, sideways
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
 STALE_NS = 3 * NS_PER_S
@@ -62,10 +63,29 @@ def transform(message: m.Odometry, prefix: str) -> Value:
     return (((stamped, prefix + message.child_frame_id, where),),)
 
 
-def static_transforms(t_ns: int, frames: Iterator[tuple[str, Value, float]], prefix: str) -> Value:
-    """Return a tf2_msgs/TFMessage from ``base_link`` to frames at positions with their yaw."""
+def static_transforms(t_ns: int, vehicle: Vehicle, prefix: str) -> Value:
+    """Return a tf2_msgs/TFMessage from ``base_link`` to the sonars."""
     stamped = header(t_ns, f"{prefix}base_link")
-    return (tuple((stamped, prefix + name, (at, turned(yaw))) for name, at, yaw in frames),)
+    transforms = []
+    for mount in sonar_mounts(vehicle):
+        where = (mount.x, mount.y, SONAR_HEIGHT), turned(mount.yaw)
+        transforms.append((stamped, prefix + sonar_frame(mount), where))
+    return (tuple(transforms),)
+
+
+def description(vehicle: Vehicle, prefix: str) -> str:
+    """Return the URDF: the body as a box. The board reports no angles of wheels."""
+    size = f"{vehicle.length} {vehicle.width} {BODY_HEIGHT}"
+    return f"""<?xml version="1.0"?>
+<robot name="t2">
+  <link name="{prefix}base_link">
+    <visual>
+      <origin xyz="0 0 {CLEARANCE + BODY_HEIGHT / 2}" rpy="0 0 0"/>
+      <geometry><box size="{size}"/></geometry>
+    </visual>
+  </link>
+</robot>
+"""
 
 
 def sonar_frame(mount: Mount) -> str:

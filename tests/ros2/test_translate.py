@@ -2,6 +2,7 @@
 
 import math
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -44,6 +45,25 @@ def test_the_transform_is_that_of_the_odometry() -> None:
     assert child == "r1/base_link"
     assert where == (1.0, -2.0, 0.0)
     assert turned == pytest.approx((0.0, 0.0, -HALF, HALF))
+
+
+def test_static_transforms_are_those_of_the_sonars() -> None:
+    vehicle = Vehicle(length=1.2, width=0.8)
+    (transforms,) = translate.static_transforms(T_NS, vehicle, "r1/")
+    assert len(transforms) == 8
+    header, child, (where, turned) = transforms[7]
+    assert (header, child) == ((STAMP, "r1/base_link"), "r1/sonar_rear_left")
+    assert where == (-0.6, 0.4, 0.35)
+    yaw = math.radians(135)
+    assert turned == pytest.approx((0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)))
+
+
+def test_the_description_has_the_vehicles_size() -> None:
+    text = translate.description(Vehicle(length=1.2, width=0.8), "r1/")
+    link = ElementTree.fromstring(text).find("link[@name='r1/base_link']")
+    box = link.find("visual/geometry/box") if link is not None else None
+    assert box is not None
+    assert box.get("size") == "1.2 0.8 0.35"
 
 
 def measured(index: int, distance: float | None, status: str, **settings: Any) -> Any:
