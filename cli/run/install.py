@@ -21,10 +21,6 @@ USER = Path("/etc/sysusers.d/t2.conf")
 SLEEP = Path("/etc/systemd/sleep.conf.d/t2.conf")
 SETTINGS = Path("/etc/t2/t2.toml")
 KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; lets laptops connect
-ENABLED = {  # links of `systemctl enable`
-    "t2.target": Path("/etc/systemd/system/multi-user.target.wants/t2.target"),
-    "t2-ros2.service": Path("/etc/systemd/system/t2.target.wants/t2-ros2.service"),
-}
 SIM = "t2-sim.service"
 EXTRAS = {
     "t2-recorder.service": "mcap",
@@ -87,7 +83,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="print the changes without making them"
     )
-    parser.add_argument("--uninstall", action="store_true", help="remove units and user")
 
 
 def here() -> Path:
@@ -98,14 +93,11 @@ def here() -> Path:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write or remove the files, and print the next commands; raise ``RobotError`` before."""
+    """Write the files, and print the next commands; raise ``RobotError`` before."""
     host = Host(options.root.absolute(), options.dry_run)
     check_rights(host, options.prefix)
-    if options.uninstall:
-        uninstall(host)
-    else:
-        check_prefix(options.prefix)
-        install(host, options.prefix, options.sim)
+    check_prefix(options.prefix)
+    install(host, options.prefix, options.sim)
     return 0
 
 
@@ -131,17 +123,6 @@ def install(host: Host, prefix: Path, sim: bool) -> None:
     else:
         host.write(SETTINGS, settings(sim))
     print(f"next: systemd-sysusers\n      systemctl daemon-reload\n      systemctl {start}")
-
-
-def uninstall(host: Host) -> None:
-    """Remove all except settings and recordings; raise ``RobotError`` while T2 is enabled."""
-    if enabled := [name for name, link in ENABLED.items() if host.has(link)]:
-        names = " ".join(enabled)
-        raise RobotError(f"T2 is enabled: run `systemctl disable --now {names}` first")
-    for path in sorted(ours()):
-        host.remove(path)
-    print("next: systemctl daemon-reload")
-    print(f"{SETTINGS.parent} and /var/lib/t2 are kept")
 
 
 # --- files --------------------------------------------------------------------------------------
