@@ -4,7 +4,6 @@ import re
 from bisect import bisect_right
 
 import ziaplot as zp
-from ziaplot.canvas import Borders, Canvas, ViewBox
 from ziaplot.style import DashTypes, MarkerTypes
 
 from cli.recordings.timeline import Series, Timeline, VelocitySeries
@@ -36,28 +35,6 @@ zp.css("""
     Point.Text { font_size: 12; margin: 8; }
     Text { font_size: 12; }
 """)
-
-
-class BrokenLine(zp.PolyLine):
-    """A series with its gaps, and 0 on both axes; ziaplot's own line has no gaps.
-
-    A line for each part would take seconds: ziaplot resolves the style of each element.
-    """
-
-    def __init__(self, series: Series) -> None:
-        self._parts = series.parts
-        times, values = ([n for part in series.parts for n in part[axis]] for axis in (0, 1))
-        super().__init__([0.0, *times], [0.0, *values])
-
-    def _xml(
-        self, canvas: Canvas, databox: ViewBox | None = None, borders: Borders | None = None
-    ) -> None:
-        style = self._build_style()
-        for times, values in self._parts:
-            canvas.path(
-                times, values, color=style.get_color(), width=style.stroke_width,
-                stroke=style.stroke, dataview=databox, zorder=self._zorder,
-            )  # fmt: skip
 
 
 def path(timeline: Timeline) -> str:
@@ -118,8 +95,9 @@ def _over_time(timeline: Timeline, y_name: str | None, x_name: str | None = None
 
 def _velocity(timeline: Timeline, series: VelocitySeries, label: str) -> zp.Graph:
     graph = _over_time(timeline, label)
+    graph.add(zp.Point((0.0, 0.0)).color("none"))  # the axis includes 0
     for number, (source, request) in enumerate(series.requested.items()):
-        _line(graph, request, REQUESTED, f"requested by {source}", dash=DASHES[number % 4])
+        _line(graph, request, REQUESTED, f"requested by {source}", DASHES[number % 4])
     _line(graph, series.allowed, ALLOWED, "allowed by safety")
     _line(graph, series.measured, MEASURED, "measured")
     top = graph.datarange().ymax
@@ -137,21 +115,14 @@ def _verdicts(timeline: Timeline) -> zp.Graph:
     for phase in timeline.verdicts:
         _span(graph, phase.begins_s, phase.ends_s, VERDICTS[phase.state.verdict])
     for verdict in dict.fromkeys(phase.state.verdict for phase in timeline.verdicts):
-        _line(graph, Series(), VERDICTS[verdict], verdict, width=6)
+        graph.add(zp.PolyLine([0.0], [0.0]).name(verdict).color(VERDICTS[verdict]).strokewidth(6))
     return graph
 
 
-def _line(
-    graph: zp.Graph,
-    series: Series,
-    color: str,
-    label: str,
-    *,
-    width: float = 1.2,
-    dash: DashTypes = "-",
-) -> None:
-    line = BrokenLine(series)
-    graph.add(line.name(label).color(color).strokewidth(width).stroke(dash))
+def _line(graph: zp.Graph, series: Series, color: str, label: str, dash: DashTypes = "-") -> None:
+    for number, (times, values) in enumerate(series.parts):
+        line = zp.PolyLine(times, values).color(color).strokewidth(1.2).stroke(dash)
+        graph.add(line if number else line.name(label))
 
 
 def _span(graph: zp.Graph, begins_s: float, ends_s: float, color: str) -> None:
