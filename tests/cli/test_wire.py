@@ -1,6 +1,5 @@
 """``t2 wire decode``: captures and hex, frames as text, the reasons of invalid runs, errors."""
 
-import contextlib
 import io
 from collections.abc import Callable
 from pathlib import Path
@@ -108,22 +107,6 @@ OTHER.p, OTHER.data = 6, tcp.TCP()
 )
 def test_the_payload_of_each_udp_packet(content: bytes, found: list[int]) -> None:
     assert list(from_pcap("trip", content)) == [(f"packet {n} {ENDS}", RUN) for n in found]
-
-
-flips = st.lists(st.tuples(st.integers(4, 10_000), st.integers(1, 255)), max_size=3)
-
-
-@given(st.sampled_from([pcap.Writer, pcapng.Writer]), st.integers(4, 10_000), flips)
-def test_a_damaged_capture_is_read_or_refused(
-    writer: type, length: int, changes: list[tuple[int, int]]
-) -> None:
-    """Nothing but ``RobotError`` comes out."""
-    packets = on_ethernet(packet(RUN)), on_ethernet(packet(VELOCITY))
-    damaged = bytearray(as_pcap(*packets, writer=writer)[:length])
-    for at, change in changes:
-        damaged[4 + at % max(1, len(damaged) - 4) if len(damaged) > 4 else 0] ^= change
-    with contextlib.suppress(RobotError):
-        list(from_pcap("trip", bytes(damaged)))
 
 
 # --- the command line -----------------------------------------------------------------------
