@@ -303,5 +303,5 @@ def test_two_simulated_robots_drive_in_one_program() -> None:
     with t2.sim() as first, t2.sim() as second:
         for robot in (first, second):
             with robot.drive("nav") as drive:
-                drive.velocity(0.1)
+                drive.velocity(0.2)
                 await_motion(robot)
