@@ -18,7 +18,6 @@ from common.errors import ConfigError
 from common.freshness import NS_PER_S
 from common.log import Logger
 from common.loop import Loop
-from sim import trace as t
 from sim.config import Config, add_profiles, load_model, load_plan, profile_list
 from sim.model import Model
 from sim.simulation import STEP_NS, Simulation
@@ -41,7 +40,6 @@ class Process:
         ports = config.board.listen_ports
         self.simulation = Simulation(model, plan, clock.now_ns(), config.sim.seed, ports)
         self._trace = trace
-        self._log = Logger()
         with ExitStack() as stack:  # closes opened sockets when a later port is taken
             self.loop = stack.enter_context(closing(Loop()))
             self._board = BoardSocket(config.board)
@@ -56,7 +54,7 @@ class Process:
         """Run until the loop is stopped."""
         self.loop.run()
         counters = dict(self.simulation.counters)
-        self._log.info("stopped", unsent=self._board.unsent, **counters)
+        Logger().info("stopped", unsent=self._board.unsent, **counters)
 
     def close(self) -> None:
         """Close ports and descriptors."""
@@ -83,19 +81,6 @@ class Process:
             self._board.send(datagram)
         for line in self.simulation.take_records():
             self._trace.write(msgspec.json.encode(line) + b"\n")
-            self._log_line(line)
-
-    def _log_line(self, line: t.Line) -> None:
-        match line:
-            case t.BumperSent():
-                self._log.info("bumper reported", pressed=line.pressed)
-            case t.Power():
-                self._log.warning("power", on=line.on)
-            case t.Disturbed():
-                request = msgspec.to_builtins(line.request)
-                self._log.warning("disturbed", request=request, error=line.error)
-            case _:  # commands and truth are samples, not transitions
-                pass
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

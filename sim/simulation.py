@@ -104,11 +104,8 @@ class Simulation:
             self._step()
             self._receive(self.now_ns)
 
-    def receive(self, payload: bytes, port: int | None, now_ns: int) -> None:
-        """Process a datagram from this port of the PC; None: another sender, ignored."""
-        if port is None:
-            self.counters["foreign"] += 1
-            return
+    def receive(self, payload: bytes, port: int, now_ns: int) -> None:
+        """Process a datagram from this port of the PC."""
         self.to_board.put(Datagram(payload, port), now_ns)
         self._receive(now_ns)
 

@@ -33,11 +33,11 @@ class BoardSocket:
         self.sock = bound(board.address, board.port, "board.port")
         self.unsent = 0
 
-    def receive(self) -> Iterator[tuple[bytes, int | None]]:
-        """Yield received datagrams with the PC's port, or None for other senders."""
+    def receive(self) -> Iterator[tuple[bytes, int]]:
+        """Yield received datagrams with the PC's port; those of other senders are ignored."""
         for payload, (address, port, *_) in drain(self.sock):
-            ours = address == self._pc and port in self._ports
-            yield payload, port if ours else None
+            if address == self._pc and port in self._ports:
+                yield payload, port
 
     def send(self, datagram: Datagram) -> None:
         """Send to a port of the PC; count errors."""

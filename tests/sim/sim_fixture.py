@@ -53,7 +53,7 @@ class SimFixture:
         self.datagrams: list[Datagram] = []
         self.records: list[Line] = []
 
-    def say(self, *frames: Frame, port: int | None = 4002) -> list[Frame]:
+    def say(self, *frames: Frame, port: int = 4002) -> list[Frame]:
         """Send frames in one datagram and return what is answered at once."""
         self.simulation.receive(b"".join(map(framing.pack, frames)), port, self.now_ns)
         return self._collect()

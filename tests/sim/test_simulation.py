@@ -30,13 +30,6 @@ def test_bad_bytes_are_counted_and_what_follows_is_heard() -> None:
     assert sim.simulation.counters["BumperQuery"] == 1
 
 
-def test_nobody_else_is_obeyed() -> None:
-    sim = SimFixture()
-    assert sim.say(c.BumperQuery(), c.MotionCommand(c.MotionKind.RUN, 500), port=None) == []
-    assert sim.truth.command.kind == "stop"
-    assert sim.simulation.counters["foreign"] == 1
-
-
 def test_a_driver_fault_is_reported_unasked_once_and_to_both_ports() -> None:
     sim = SimFixture()
     sim.do(Driver(side="right", bits=0x80000001))
