@@ -121,8 +121,10 @@ def _verdicts(timeline: Timeline) -> zp.Graph:
 
 def _line(graph: zp.Graph, series: Series, color: str, label: str, dash: DashTypes = "-") -> None:
     for number, (times, values) in enumerate(series.parts):
-        line = zp.PolyLine(times, values).color(color).strokewidth(1.2).stroke(dash)
-        graph.add(line if number else line.name(label))
+        line = zp.PolyLine(times, values)
+        if number == 0:
+            line.name(label)
+        graph.add(line.color(color).strokewidth(1.2).stroke(dash))
 
 
 def _span(graph: zp.Graph, begins_s: float, ends_s: float, color: str) -> None:
