@@ -34,7 +34,7 @@ NAMES = f"1 to {LONGEST} letters, digits, dots, hyphens and underscores"
 SOURCE_NAMES = "a lowercase letter, then up to 31 of a-z, 0-9, hyphen and underscore"
 LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]{0,61}[A-Za-z0-9])?"
 HOST = re.compile(rf"(?=.{{1,253}}\Z)(?!(.*\.)?\d+\Z)({LABEL}\.)*{LABEL}\Z")  # no 300.1.1.1
-HEAD = ("role", "name", "robots", "sources", "until", "state", "certificate")
+HEAD = ("certificate", "robots", "sources", "until", "state")
 
 Span = tuple[float, float]  # validity of a certificate, in seconds since 1970
 State = Literal["valid", "expires soon", "expired", "revoked"]
@@ -185,13 +185,11 @@ def as_table(members: Members, now_s: float) -> str:
     """Return a table with a row for each certificate."""
     rows = [
         (
-            member.role,
-            member.name,
+            member.common_name,
             " ".join(member.robots) or "-",
             " ".join(member.sources) or "-",
             f"{member.expires:%Y-%m-%d}",
             state(member, now_s),
-            member.common_name,
         )
         for member in members.members
     ]

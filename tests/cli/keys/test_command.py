@@ -28,7 +28,7 @@ class Keys:
         rows = self.run("list").split("\n\n")[1].splitlines()[1:]
         found = {}
         for place, row in enumerate(rows):
-            *_, state, name = re.split("  +", row)
+            name, *_, state = re.split("  +", row)
             found[f"{name.rpartition('.')[0]}.{place}"] = state
         return found
 
@@ -84,10 +84,11 @@ def test_renewal_keeps_rights_and_addresses(keys: Keys) -> None:
 
 def test_routers_are_known_without_their_folders(keys: Keys, tmp_path: Path) -> None:
     keys.run("issue", "robot", "002", "--address", "192.168.1.2")
-    keys.run("issue", "driver", "anna", "--robot", "002")
-    (keys.folder / "robot.002").rename(tmp_path / "away")
     target = "192.168.1.2:/etc/t2/keys"
-    assert f"{target}/members.json  # robot 002\n" in keys.run("revoke", "driver", "anna")
+    copied = f"{target}/members.json  # robot 002\n"
+    assert copied in keys.run("issue", "driver", "anna", "--robot", "002")
+    (keys.folder / "robot.002").rename(tmp_path / "away")
+    assert copied in keys.run("revoke", "driver", "anna")
     assert f"/robot.002/. {target}\n" in keys.run("renew", "robot", "002")
 
 
