@@ -73,11 +73,6 @@ class Plan(Part, frozen=True, kw_only=True):
     walls: tuple[Wall, ...] = ()
     boxes: tuple[Box, ...] = ()
 
-    def __post_init__(self) -> None:
-        names = [box.name for box in self.boxes]
-        if len(set(names)) < len(names):
-            raise ValueError("two boxes have the same name")
-
 
 @dataclass(frozen=True)
 class World:

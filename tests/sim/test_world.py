@@ -58,7 +58,6 @@ def test_contact_begins_with_the_travel_of_the_strip(
 @pytest.mark.parametrize(
     ("plan", "error"),
     [
-        ({"boxes": [BOX, BOX]}, "same name"),
         ({"boxes": [BOX | {"x": math.nan}]}, "x"),
         ({"walls": [{"points": [[0, 0]]}]}, "length >= 2"),
         ({"walls": [{"points": [[0, 0], [0, math.inf]]}]}, "float"),
