@@ -3,17 +3,13 @@
 import argparse
 import sys
 
-from common.cli_args import add_setting, add_sources, run_program, sources
+from common.cli_args import add_sources, run_program, sources
 from common.service import run_optional_service
 from services.ros2.config import Ros2Config
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command line options; each sets a setting."""
-    add_setting(parser, "--domain", "ros2.domain", "ROS_DOMAIN_ID; ros2.domain by default")
-    add_setting(
-        parser, "--namespace", "ros2.namespace", "namespace of node and topics, such as /t2_001"
-    )
+    """Add the command line options."""
     add_sources(parser)
 
 
