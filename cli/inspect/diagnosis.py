@@ -10,7 +10,7 @@ from typing import Literal, TypeVar
 
 from common import keys
 from common.keys import Topic
-from common.messages import SONAR_NAMES, Health, Link, Message, Relay
+from common.messages import Health, Link, Message, Relay
 
 M = TypeVar("M", bound=Message)
 Level = Literal["ok", "note", "wrong", "unknown"]
@@ -26,10 +26,12 @@ START = "on the robot: `t2 up`, or start this service; if its process exists, it
 UPDATE = "install the same version on both, and restart the robot's services"
 SILENT = "the board does not send it: check the board; `t2 hz` shows the rate"
 BOARD_LOST = "check the board's power and cable; the link recovers by itself"
-SWITCHES = """t2 call bridge/switches '{"ultrasonic_brake": true, "bumper_brake": true}'"""
 RESET = "when it is safe: `t2 call safety/reset`, or R in `t2 drive`"
 BUMPER = "free it; if that is impossible: `t2 drive`, hold F or B, away from it; then reset"
-DRIVER = "switch the vehicle off and on; check what the fault names; then reset"
+DRIVER = (
+    "check the wheel (over current), the encoder's cable (encoder) or the battery (under voltage); "
+    "switch the vehicle off and on; then reset"
+)
 LIMIT = "`t2 echo safety/state --field limit_sources` shows who limits, and why"
 RELAY = (
     "is the relay on, its service running, and its cable to the PC connected? board.address and "
@@ -40,17 +42,6 @@ RELAY_BRAKES = {
     "start": "it waits for a neutral command: is the bridge running?",
     "silent": "it lost the commands of the PC: check the cable and the load of both computers",
     "hit": "it waits for the bridge's answer to a bumper hit: is the bridge running?",
-}
-SONARS = {
-    "fault": ("is faulty", "check its cable; it blocks its sector until it measures"),
-    "too_near": ("is covered: an object is below its minimum range", "remove the object"),
-}
-FAULTS = {
-    "over_current": "over-current: a wheel is blocked",
-    "over_voltage": "over-voltage",
-    "encoder": "invalid encoder signal: the encoder's cable",
-    "under_voltage": "under-voltage: the battery",
-    "overload": "overload for too long",
 }
 # By the names of safety's causes, where its text does not contain the remedy.
 CAUSES = {
@@ -64,9 +55,9 @@ CAUSES = {
     "driver_right": DRIVER,
     "flapping": f"find the input that is intermittent (t2 echo evt/safety); {RESET}",
     "leaving": START,
-    "starting": "wait; if it lasts, see the sensors above",
+    "starting": "wait; if it lasts, the board does not send it: check the board",
     "link": BOARD_LOST,
-    "switches": SWITCHES,
+    "switches": """t2 call bridge/switches '{"ultrasonic_brake": true, "bumper_brake": true}'""",
     "bumper": SILENT,
     "bumper_lossy": "check the cable and the board's load: t2 echo tel/bridge/bumper",
     "silent": SILENT,
@@ -76,7 +67,7 @@ CAUSES = {
     "two_publishers": "stop one of the two programs; `t2 ls --services` lists them",
     "blocked": "drive another way, or remove the obstacle",
     "limit": LIMIT,
-    "sonar": SONARS["fault"][1],
+    "sonar": "check the cable of a faulty one, or remove what covers it; it blocks its sector",
 }
 # Causes of normal operation, with or without a driver.
 NORMAL = ("release", "neutral", "obstacle", "blocked", "limit", "limit_stop")
@@ -229,10 +220,9 @@ def board(seen: Observation) -> Iterator[Finding]:
     yield from relay(now.relay, seen.t2)
     yield from link(now, seen.first[keys.LINK.path])
     if now.state != "up":
-        yield Finding("sensors", "unknown", "no sensor data without the board")
+        yield Finding("streams", "unknown", "no data without the board")
         return
-    for check in (switches, streams, sensors, drivers):
-        yield from check(seen)
+    yield from streams(seen)
 
 
 def relay(now: Relay | None, t2: str) -> Iterator[Finding]:
@@ -280,21 +270,6 @@ def link(now: Link, before: Message) -> Iterator[Finding]:
         yield Finding("link", "note", f"the bridge accepts no motion now: {now.waiting}")
 
 
-def switches(seen: Observation) -> Iterator[Finding]:
-    """Report the board's own emergency brakes."""
-    echo = seen.of(keys.SWITCHES)
-    positions = {
-        "ultrasonic": echo and echo.ultrasonic_brake,
-        "bumper": echo and echo.bumper_brake,
-    }
-    for name, on in positions.items():
-        if not on:
-            text = f"the board's {name} brake is {'off' if on is False else 'not confirmed'}"
-            yield Finding("switches", "wrong", text, SWITCHES)
-    if all(positions.values()):
-        yield Finding("switches", "ok", "both emergency brakes of the board are on")
-
-
 def streams(seen: Observation) -> Iterator[Finding]:
     """Report streams that are slow at their publisher, or do not arrive here.
 
@@ -305,43 +280,15 @@ def streams(seen: Observation) -> Iterator[Finding]:
         if max(rate, sent_hz) < ENOUGH * topic.rate_hz:
             level: Level = "note" if rate else "wrong"
             text = f"{topic.path} has {rate:.0f} of {topic.rate_hz:g} Hz"
-            yield Finding("sensors", level, text, SILENT)
+            yield Finding("streams", level, text, SILENT)
         elif not rate:
             text = f"{topic.path} is sent with {sent_hz:.0f} Hz and does not arrive here"
             todo = "the network or the router drops it: move closer to the access point"
-            yield Finding("sensors", "wrong", text, todo)
-
-
-def sensors(seen: Observation) -> Iterator[Finding]:
-    """Report the bumper, and each untrusted sonar."""
-    if bumper := seen.of(keys.BUMPER):
-        if bumper.pressed:
-            yield Finding("bumper", "wrong", "the bumper is pressed", BUMPER)
-        else:
-            yield Finding("bumper", "ok", "the bumper is free")
-    if ultrasonic := seen.of(keys.ULTRASONIC):
-        statuses = zip(SONAR_NAMES, ultrasonic.status, strict=True)
-        bad = [(name, SONARS[status]) for name, status in statuses if status in SONARS]
-        for name, (text, todo) in bad:
-            yield Finding("sonar", "wrong", f"the {name.replace('_', ' ')} sonar {text}", todo)
-        if not bad:
-            yield Finding("sonar", "ok", "all eight sonars measure")
-
-
-def drivers(seen: Observation) -> Iterator[Finding]:
-    """Report the motor drivers' faults."""
-    for side in ("left", "right"):
-        driver = seen.of(keys.DRIVER, side=side)
-        if driver and not driver.faults:
-            yield Finding("drivers", "ok", f"the {side} motor driver reports no fault")
-        for fault in driver.faults if driver else ():
-            meaning = FAULTS.get(fault, "not documented in the manual")
-            text = f"the {side} motor driver reports {fault}: {meaning}"
-            yield Finding("drivers", "wrong", text, DRIVER)
+            yield Finding("streams", "wrong", text, todo)
 
 
 def safety(seen: Observation) -> Iterator[Finding]:
-    """Report the causes in safety's state, with safety's texts."""
+    """Report the causes in safety's state, with safety's texts; it judges the sensors."""
     state = seen.of(keys.SAFETY)
     if state is None:
         yield Finding("safety", "unknown", "safety publishes no state")

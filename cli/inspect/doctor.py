@@ -1,7 +1,8 @@
 """``t2 doctor``: diagnosis of the path from this laptop to the wheels, with remedies.
 
 It checks in the order of a request's path: network, router, services, versions, rights, clock,
-board, switches, sensors, drivers, safety. It only listens and queries; it changes nothing.
+relay, link, streams, and the causes that safety reports. It only listens and queries; it changes
+nothing.
 """
 
 import argparse
