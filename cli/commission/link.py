@@ -57,7 +57,8 @@ def _link_problems(
             "the board's frames."
         )
         return
-    yield from _relay_problems(links)
+    if any(link.relay and (link.relay.state != "up" or link.relay.braking) for link in links):
+        yield f"The relay did not pass commands all the time; now: {_relay(links[-1].relay)}."
     if links[0].epoch != links[-1].epoch:
         yield "The board restarted during this step: check its power."
     for name, rate in rates.items():
@@ -86,11 +87,6 @@ def _switches(switches: Switches | None) -> str:
     if switches is None:
         return "not received"
     return f"ultrasonic {switches.ultrasonic_brake}, bumper {switches.bumper_brake}"
-
-
-def _relay_problems(links: Sequence[Link]) -> Iterator[str]:
-    if any(link.relay and (link.relay.state != "up" or link.relay.braking) for link in links):
-        yield f"The relay did not pass commands all the time; now: {_relay(links[-1].relay)}."
 
 
 def _relay(relay: Relay | None) -> str:

@@ -56,9 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     for verb in (issue, renew):
         _add_signing(verb)
-    revoke.add_argument(
-        "--serial", type=_serial, help="only the certificate whose name ends with this serial"
-    )
+    revoke.add_argument("--serial", help="only the certificate whose name ends with this serial")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -181,11 +179,3 @@ def _add_signing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--days", type=int, default=DAYS, help=f"validity in days; {DAYS} by default"
     )
-
-
-def _serial(text: str) -> str:
-    if not text:  # an unset shell variable must not revoke all
-        raise argparse.ArgumentTypeError(
-            "is empty; `t2 keys list` shows serials, and without --serial all are revoked"
-        )
-    return text

@@ -156,6 +156,7 @@ def revoked(
     members: Members, role: Role, name: str, serial: str | None
 ) -> tuple[Members, Sequence[Member]]:
     """Return the list with revoked certificates of a member, and the revoked ones."""
+    # An empty serial, as of an unset variable of a shell, must not revoke all.
     ends = "" if serial is None else f".{serial}"
     matching = [
         each
