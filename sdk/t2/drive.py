@@ -228,10 +228,12 @@ class Drive:
             while not self._ended.wait(PERIOD_S):
                 self._tick()
             self._publisher.stop()
-        finally:
-            self._ended.set()
-            OPEN.discard(self._key)
-            self._publisher.close()
+        except Exception as error:  # the session was closed, for example
+            ended = T2Error(f"the drive has ended: {error!r}")
+            self._error = self._error or ended.with_traceback(error.__traceback__)
+        self._ended.set()
+        OPEN.discard(self._key)
+        self._publisher.close()
 
     def _tick(self) -> None:
         cancelled, target = self._cancelled, self._target

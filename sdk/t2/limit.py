@@ -32,6 +32,7 @@ class SpeedLimit:
         self._safety = safety
         self._limit = Limit(echo=0)
         self._end_s = math.inf  # monotonic time
+        self._error: Exception | None = None  # of the thread
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"t2 limit {source}", daemon=True)
@@ -54,7 +55,7 @@ class SpeedLimit:
         Returns and raises as ``Robot.limit``.
         """
         if self.has_ended:
-            raise T2Error("this limit has ended; Robot.limit returns another one")
+            raise T2Error("this limit has ended; Robot.limit returns another one") from self._error
         linear, angular = (None if cap is None else finite(cap) for cap in (linear, angular))
         if min(finite(seconds), linear or 0.0, angular or 0.0) < 0:
             raise ValueError("caps and seconds must be finite and not negative")
@@ -84,8 +85,7 @@ class SpeedLimit:
         self._ended.set()
         if self._thread.is_alive():
             self._thread.join()
-        else:
-            self._publisher.close()
+        self._publisher.close()
 
     def _shown(self) -> LimitState:
         """Return what safety's state shows of this source."""
@@ -101,6 +101,7 @@ class SpeedLimit:
                 with self._lock:
                     if time.monotonic() < self._end_s:
                         self._publisher.put(self._limit)
-        finally:
+        except Exception as error:
+            self._error = error
             self._ended.set()
             self._publisher.close()

@@ -196,6 +196,21 @@ def test_a_limit_slows_the_vehicle_down_for_its_seconds(robot: t2.Robot) -> None
     wait_until(lambda: cap(robot) is None, "the end of the limit")
 
 
+def test_an_unexpected_error_ends_drive_and_limit_and_frees_their_sources(robot: t2.Robot) -> None:
+    limit = robot.limit("detector", linear=0.3, seconds=60)
+    limit._limit = None  # type: ignore[assignment]
+    wait_until(lambda: limit.has_ended, "the end of the limit")
+    robot.limit("detector", linear=0.2, seconds=60).end()
+    with robot.drive("nav") as drive:
+        drive._target = None  # type: ignore[assignment]
+        wait_until(lambda: not drive.is_open, "the end of the drive")
+        with pytest.raises(t2.T2Error, match="AttributeError"):
+            drive.velocity(0.2)
+    with robot.drive("nav") as drive:
+        drive.velocity(0.2)
+        await_motion(robot)
+
+
 def test_unknown_names_are_refused_with_the_known_ones(
     robot: t2.Robot, stack: RunningStack
 ) -> None:
