@@ -87,6 +87,15 @@ def test_counters_may_dither_by_one_step(distance: float, steps: float, expected
     assert stands_after(distance, steps * COUNTER_STEP_RAD) is expected
 
 
+def test_the_step_of_a_standstill_may_come_in_parts() -> None:
+    model = NoiseModel(Odom())
+    for _ in range(2):
+        model.update(mileage(), [])
+    part = ArcSegment(0.6 * COUNTER_STEP_M, 0.6 * COUNTER_STEP_RAD, 0.1, seen=True)
+    for share in (0.6, 0.4, 0.0):
+        assert_close(model.counted(part), ProcessNoise(share * ONE_STEP[0], share * ONE_STEP[1], 0))
+
+
 @pytest.mark.parametrize(
     ("distance", "turn", "expected"),
     [
