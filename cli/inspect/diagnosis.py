@@ -6,13 +6,11 @@ part of the path is wrong. A remedy is an instruction to the operator.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal, TypeVar
+from typing import Literal
 
 from common import keys
-from common.keys import Topic
-from common.messages import Health, Link, Message, Relay
+from common.messages import Health, Link, Relay, SafetyState
 
-M = TypeVar("M", bound=Message)
 Level = Literal["ok", "note", "wrong", "unknown"]
 
 NEEDED = ("bridge", "safety", "odom")
@@ -95,26 +93,13 @@ class Observation:
     delays_s: list[float] = field(default_factory=list)  # by both wall clocks
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path
     undecodable: dict[str, str] = field(default_factory=dict)  # reason by path
-    first: dict[str, Message] = field(default_factory=dict)  # message by path
-    newest: dict[str, Message] = field(default_factory=dict)  # message by path
-
-    def add(self, path: str, message: Message) -> None:
-        """Add a message."""
-        self.first.setdefault(path, message)
-        self.newest[path] = message
-
-    def of(self, topic: Topic[M], **names: str) -> M | None:
-        """Return the newest message of a topic."""
-        found = self.newest.get(topic.path.format(**names))
-        return found if isinstance(found, topic.message) else None
-
-    def health(self) -> dict[str, Health]:
-        """Return the newest health message of each service."""
-        return {each.service: each for each in self.newest.values() if isinstance(each, Health)}
+    healths: dict[str, Health] = field(default_factory=dict)  # the newest by service
+    links: list[Link] = field(default_factory=list)
+    state: SafetyState | None = None  # the newest
 
     def sent_hz(self, path: str) -> float:
         """Return the rate at which a stream is sent, by its publisher's health; 0 if unknown."""
-        publisher = self.of(keys.HEALTH, service=path.split("/")[1])
+        publisher = self.healths.get(path.split("/")[1])
         rates = publisher.rates if publisher else {}
         return next((hz for key, hz in rates.items() if key.endswith(f"/{path}")), 0.0)
 
@@ -135,9 +120,8 @@ def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
 
 def services(seen: Observation) -> Iterator[Finding]:
     """Report services that are missing, duplicate or hang."""
-    healths = seen.health()
     for name in sorted({*NEEDED, *seen.instances}):
-        count, health = seen.instances.get(name, 0), healths.get(name)
+        count, health = seen.instances.get(name, 0), seen.healths.get(name)
         if not count:
             yield Finding("services", "wrong", f"{name} is not running", START)
         elif count > 1 and name in NEEDED:
@@ -156,12 +140,11 @@ def services(seen: Observation) -> Iterator[Finding]:
 
 def versions(seen: Observation) -> Iterator[Finding]:
     """Report different versions on robot and laptop."""
-    healths = seen.health()
-    other = {name: h.version for name, h in healths.items() if h.version != seen.t2}
+    other = {name: h.version for name, h in seen.healths.items() if h.version != seen.t2}
     for name, version in sorted(other.items()):
         text = f"{name} is T2 {version}, this laptop {seen.t2}"
         yield Finding("versions", "note", text, UPDATE)
-    if healths and not other:
+    if seen.healths and not other:
         yield Finding("versions", "ok", f"T2 {seen.t2} everywhere")
     for path, reason in sorted(seen.undecodable.items()):
         todo = "a publisher with another version, or a foreign program"
@@ -213,12 +196,12 @@ def clock(seen: Observation) -> Iterator[Finding]:
 
 def board(seen: Observation) -> Iterator[Finding]:
     """Report everything behind the bridge."""
-    now = seen.of(keys.LINK)
-    if now is None:
+    if not seen.links:
         yield Finding("link", "unknown", "no bridge reports the board")
         return
+    now = seen.links[-1]
     yield from relay(now.relay, seen.t2)
-    yield from link(now, seen.first[keys.LINK.path])
+    yield from link(now, seen.links[0])
     if now.state != "up":
         yield Finding("streams", "unknown", "no data without the board")
         return
@@ -242,7 +225,7 @@ def relay(now: Relay | None, t2: str) -> Iterator[Finding]:
         yield Finding("relay", "note", text, RELAY_COPY)
 
 
-def link(now: Link, before: Message) -> Iterator[Finding]:
+def link(now: Link, before: Link) -> Iterator[Finding]:
     """Report the link to the board, with rejected and unsent frames since ``before``."""
     if now.state == "never":
         todo = (
@@ -254,13 +237,12 @@ def link(now: Link, before: Message) -> Iterator[Finding]:
     if now.state == "lost":
         yield Finding("link", "wrong", f"the board at {now.board} is silent", BOARD_LOST)
         return
-    earlier = before if isinstance(before, Link) else now
-    new = {reason: n - earlier.rejected.get(reason, 0) for reason, n in now.rejected.items()}
+    new = {reason: n - before.rejected.get(reason, 0) for reason, n in now.rejected.items()}
     if bad := ", ".join(f"{n} {reason}" for reason, n in new.items() if n > 0):
         text = f"the bridge rejects frames of the board: {bad}"
         todo = "`t2 wire decode` shows the invalid frames"
         yield Finding("link", "note", text, todo)
-    if (unsent := now.send_errors - earlier.send_errors) > 0:
+    if (unsent := now.send_errors - before.send_errors) > 0:
         text = f"the system failed to send {unsent} datagrams to the board"
         todo = "check the robot's network interface, its firewall and board.address"
         yield Finding("link", "wrong", text, todo)
@@ -289,7 +271,7 @@ def streams(seen: Observation) -> Iterator[Finding]:
 
 def safety(seen: Observation) -> Iterator[Finding]:
     """Report the causes in safety's state, with safety's texts; it judges the sensors."""
-    state = seen.of(keys.SAFETY)
+    state = seen.state
     if state is None:
         yield Finding("safety", "unknown", "safety publishes no state")
         return

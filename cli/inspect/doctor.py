@@ -24,6 +24,7 @@ from common.cli_args import VERSION
 from common.codec import Sample
 from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
+from common.messages import Health, Link, SafetyState
 from common.settings import BusSettings, Shared
 from common.text import printable
 
@@ -174,7 +175,13 @@ def add_sample(sample: Sample, seen: Observation) -> None:
         return
     if path.startswith("tel/"):
         seen.delays_s.append((sample.wall_ns - message.t_ns) / NS_PER_S)
-    seen.add(path, message)
+    match message:
+        case Health():
+            seen.healths[message.service] = message
+        case Link():
+            seen.links.append(message)
+        case SafetyState():
+            seen.state = message
 
 
 def as_text(finding: Finding) -> str:

@@ -7,7 +7,6 @@ import pytest
 
 from cli.inspect import diagnosis as d
 from cli.inspect.diagnosis import Finding, Observation, diagnose
-from common import keys
 from common import messages as m
 from services.safety.core.causes import RULES
 from tests import factories
@@ -15,10 +14,6 @@ from tests.factories import health
 
 RATES = {topic.path: topic.rate_hz for topic in d.STREAMS}
 Check = Callable[[Observation], Iterator[Finding]]
-
-
-def healths(*messages: m.Health) -> dict[str, m.Message]:
-    return {f"tel/{each.service}/health": each for each in messages}
 
 
 def link(state: Any = "up", **given: Any) -> m.Link:
@@ -37,22 +32,12 @@ def state(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
     return factories.safety_state(verdict="stop", latched=latched, causes=causes)
 
 
-def seen(*messages: m.Message, **given: Any) -> Observation:
+def seen(**given: Any) -> Observation:
     """Return the observation of a healthy robot, with the given differences."""
-    newest: dict[str, m.Message] = {
-        keys.LINK.path: link(),
-        keys.SAFETY.path: state("no_request"),
-        **healths(*map(health, d.NEEDED)),
-    }
-    for message in messages:
-        for path, other in newest.items():
-            if type(other) is type(message):
-                newest[path] = message
-                break
-    newest |= given.pop("newest", {})
     healthy: dict[str, Any] = {
         "t2": "0.1.0", "instances": dict.fromkeys(d.NEEDED, 1), "may_drive": True, "may_call": True,
-        "newest": newest, "first": newest, "delays_s": [0.01, 0.02], "rates": RATES,
+        "healths": {name: health(name) for name in d.NEEDED}, "links": [link()],
+        "state": state("no_request"), "delays_s": [0.01, 0.02], "rates": RATES,
     }  # fmt: skip
     return Observation(**(healthy | given))
 
@@ -65,7 +50,7 @@ def problems(observed: Observation) -> list[tuple[str, str, str]]:
 
 def test_a_healthy_robot() -> None:
     assert problems(seen()) == []
-    assert problems(seen(state())) == []
+    assert problems(seen(state=state())) == []
 
 
 def test_a_wrong_robot_gets_the_names_of_the_others() -> None:
@@ -76,10 +61,9 @@ def test_a_wrong_robot_gets_the_names_of_the_others() -> None:
 
 
 def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
-    late = healths(health("safety"), health("odom", lateness=0.3), health("teleop"))
+    given = health("safety"), health("odom", lateness=0.3), health("teleop")
     instances = {"safety": 2, "odom": 1, "mine": 1, "teleop": 2}
-    observed = seen(instances=instances)
-    observed.newest = late
+    observed = seen(instances=instances, healths={each.service: each for each in given})
     found = {each.text.split()[0]: each for each in d.services(observed)}
     assert {name: each.level for name, each in found.items()} == {
         "bridge": "wrong", "safety": "wrong", "odom": "note", "mine": "wrong",
@@ -91,7 +75,7 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
 @pytest.mark.parametrize(
     ("check", "given", "expected"),
     [
-        (d.versions, {"newest": healths(health("bridge", version="0"))},
+        (d.versions, {"healths": {"bridge": health("bridge", version="0")}},
          [("note", "bridge is T2 0, this laptop 0.1.0")]),
         (d.versions, {"undecodable": {"tel/x": "not a Bumper"}},
          [("ok", "everywhere"), ("wrong", "tel/x: not a Bumper")]),
@@ -112,29 +96,32 @@ def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, s
 
 
 @pytest.mark.parametrize(
-    ("message", "expected"),
+    ("given", "expected"),
     [
-        (link(armed=False, waiting="link lost"),
+        ({"links": [link(armed=False, waiting="link lost")]},
          [("note", "the bridge accepts no motion now: link lost", "")]),
-        (relay("lost"), [("wrong", "the relay is silent", d.RELAY)]),
-        (relay("never", version=""), [("wrong", "no report of the relay received", d.RELAY)]),
-        (relay(braking="silent"),
+        ({"links": [relay("lost")]}, [("wrong", "the relay is silent", d.RELAY)]),
+        ({"links": [relay("never", version="")]},
+         [("wrong", "no report of the relay received", d.RELAY)]),
+        ({"links": [relay(braking="silent")]},
          [("wrong", "the relay sends BRAKE: silent", d.RELAY_BRAKES["silent"])]),
-        (relay(version="2"), [("note", "the relay is T2 2, this laptop 0.1.0", d.RELAY_COPY)]),
-        (state("contact", "neutral", latched=("contact",)), [
+        ({"links": [relay(version="2")]},
+         [("note", "the relay is T2 2, this laptop 0.1.0", d.RELAY_COPY)]),
+        ({"state": state("contact", "neutral", latched=("contact",))}, [
             ("wrong", "The bumper was hit. (brake, latched)", d.BUMPER),
             ("note", "Waiting for a neutral request: release the controls, then drive. (stop)",
              "")]),
-        (state("smoke", latched=("smoke",)), [("wrong", "smoke (stop, latched)", d.RESET)]),
+        ({"state": state("smoke", latched=("smoke",))},
+         [("wrong", "smoke (stop, latched)", d.RESET)]),
     ],
 )  # fmt: skip
-def test_problems(message: m.Message, expected: list[tuple[str, str, str]]) -> None:
-    assert problems(seen(message)) == expected
+def test_problems(given: dict[str, Any], expected: list[tuple[str, str, str]]) -> None:
+    assert problems(seen(**given)) == expected
 
 
 @pytest.mark.parametrize("lost", ["never", "lost"])
 def test_without_the_board_its_streams_are_unknown(lost: str) -> None:
-    reported = problems(seen(link(lost), rates={"tel/bridge/link": 10.0}))
+    reported = problems(seen(links=[link(lost)], rates={"tel/bridge/link": 10.0}))
     assert [level for level, _, _ in reported] == ["wrong", "unknown"]
 
 
@@ -147,7 +134,7 @@ def test_without_messages_the_rest_is_unknown() -> None:
 def test_frames_rejected_and_unsent_during_the_observation() -> None:
     before = link(rejected={"bad_crc": 4, "no_magic": 1}, send_errors=4)
     now = link(rejected={"bad_crc": 9, "no_magic": 1}, send_errors=7)
-    reported = problems(seen(now, first={keys.LINK.path: before}))
+    reported = problems(seen(links=[before, now]))
     assert [(level, text) for level, text, _ in reported] == [
         ("note", "the bridge rejects frames of the board: 5 bad_crc"),
         ("wrong", "the system failed to send 3 datagrams to the board"),
@@ -159,12 +146,9 @@ def test_streams_that_are_slow_missing_or_downsampled() -> None:
     rates = RATES | {
         "tel/bridge/bumper": 0.0, "tel/bridge/mileage": 12.0, "tel/bridge/velocity": 10.0,
     }  # fmt: skip
-    found = [
-        text
-        for _, text, _ in problems(
-            seen(rates=rates, newest=healths(health("bridge", rates=sent_hz)))
-        )
-    ]
+    observed = seen(rates=rates)
+    observed.healths["bridge"] = health("bridge", rates=sent_hz)
+    found = [text for _, text, _ in problems(observed)]
     assert found == [
         "tel/bridge/mileage has 12 of 25 Hz",
         "tel/bridge/bumper is sent with 50 Hz and does not arrive here",
