@@ -66,9 +66,8 @@ class CertificateAuthority:
             private = load_pem_private_key(key, passphrase() if b"ENCRYPTED" in key else None)
         except ValueError:
             raise RobotError("cannot read the CA's key: wrong passphrase, or not a key") from None
-        if not isinstance(private, ec.EllipticCurvePrivateKey):
-            raise RobotError("the CA's key was not made by `t2 keys init`")
-        if private.public_key() != loaded.public_key():
+        matches = private.public_key() == loaded.public_key()
+        if not matches or not isinstance(private, ec.EllipticCurvePrivateKey):
             raise RobotError("the CA's key does not match the certificate in ca.pem")
         return cls(loaded, private)
 

@@ -5,14 +5,9 @@ from ipaddress import ip_address
 
 import pytest
 from cryptography import x509
-from cryptography.hazmat.primitives.asymmetric import ec, ed25519
+from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.hashes import SHA256
-from cryptography.hazmat.primitives.serialization import (
-    Encoding,
-    NoEncryption,
-    PrivateFormat,
-    load_pem_private_key,
-)
+from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from cryptography.x509.oid import ExtendedKeyUsageOID, ExtensionOID
 
 from cli.keys.ca import (
@@ -106,8 +101,3 @@ def test_invalid_keys(authority: CertificateAuthority) -> None:
         CertificateAuthority.load(certificate, b"no key", no_passphrase)
     with pytest.raises(RobotError, match="invalid certificate"):
         CertificateAuthority.load(b"-----BEGIN", key_pem(stranger.key), no_passphrase)
-    other_kind = ed25519.Ed25519PrivateKey.generate().private_bytes(
-        Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()
-    )
-    with pytest.raises(RobotError, match="was not made by `t2 keys init`"):
-        CertificateAuthority.load(certificate, other_kind, no_passphrase)
