@@ -29,7 +29,7 @@ from common.errors import RobotError
 
 LISTEN_S = 2.0  # two periods of the slowest streams
 ROLES = {"publisher": "publishes", "subscriber": "reads", "queryable": "answers"}
-ZENOH_OWN = "@adv"  # declarations of Zenoh itself below a key
+EVERYWHERE = ("@adv", "/info/")  # Zenoh's own below a key, and what every service answers
 # The router of a robot that connects to a site's router is a peer there.
 ADMIN = "@/*/*/*/t2/v1/{robot}/**"
 
@@ -121,7 +121,7 @@ def declarations(probe: Probe, robot: str) -> list[Declaration]:
     return sorted(
         Declaration(names.get(zid, zid[:8]), ROLES[role], key)
         for role, key, zids in entries
-        if role in ROLES and ZENOH_OWN not in key
+        if role in ROLES and not any(part in key for part in EVERYWHERE)
         for zid in zids
     )
 
