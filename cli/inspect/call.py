@@ -1,7 +1,7 @@
 """``t2 call``: call a service; without a KEY, list the calls.
 
-A request with ``echo`` is an operator's call. If the user gives no echo, safety's newest state
-fills it in, and the causes of a reset. A reset succeeds when safety's state confirms it.
+A request with ``echo`` is an operator's call: safety's newest state fills it in, and the causes of
+a reset. A reset succeeds when safety's state confirms it.
 """
 
 import argparse
@@ -29,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "request", metavar="JSON", nargs="?", type=json_object, default={},
-        help="""a JSON object, such as '{"bumper_brake": true}'; all defaults if omitted; `echo`,
-        and the `causes` of a reset, are those of safety's newest state if omitted""",
+        help="""a JSON object, such as '{"bumper_brake": true}'; all defaults if omitted; a reset
+        clears the `causes` in safety's newest state if they are omitted""",
     )  # fmt: skip
     add_options(parser, every=False)
 
@@ -59,8 +59,7 @@ def run(options: argparse.Namespace) -> int:
 def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace) -> None:
     """Call and show the replies; raise ``RobotError`` if it failed or is unconfirmed."""
     request, seen = options.request, None
-    is_operators = "echo" in call.request.__struct_fields__
-    if call is keys.RESET or (is_operators and request.get("echo") is None):
+    if "echo" in call.request.__struct_fields__:
         seen = client.fresh_state()
         request = filled(call, request, seen)
     typed = msgspec.convert(request, call.request)
@@ -83,14 +82,14 @@ def known(path: str) -> Call[Any, Any]:
 
 
 def filled(call: Call[Any, Any], request: Request, seen: SafetyState) -> Request:
-    """Return the request with defaults filled in; for a reset, print the causes it clears."""
-    given = {name: value for name, value in request.items() if value is not None}
-    if call is keys.RESET and "causes" not in given:
-        given["causes"] = list(reset_request(seen).causes)
+    """Return the request with the state's echo; for a reset, print the causes it clears."""
+    request = {**request, "echo": seen.heartbeat}
+    if call is keys.RESET and "causes" not in request:
+        request["causes"] = list(reset_request(seen).causes)
         for cause in seen.causes:
-            if cause.id in given["causes"]:
+            if cause.id in request["causes"]:
                 output.warn(f"t2 call: clears {cause.name}: {cause.text}")
-    return {"echo": seen.heartbeat, **given}
+    return request
 
 
 def json_object(text: str) -> Request:

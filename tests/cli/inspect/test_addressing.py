@@ -3,14 +3,9 @@
 import argparse
 
 import pytest
-from msgspec.structs import replace
 
-from cli.inspect.addressing import decode, expression, parse_key, topic_of
-from common import codec, keys
-from common.codec import Sample
-from common.errors import MessageError
-from common.messages import Health
-from tests.factories import health
+from cli.inspect.addressing import expression, parse_key, topic_of
+from common import keys
 
 
 @pytest.mark.parametrize(
@@ -48,11 +43,3 @@ def test_topic_of_a_key() -> None:
     assert topic_of("t2/v1/7/tel/mine/x/y") is None
     assert topic_of("t2/v1/7/tel/mine/temperature") is None
     assert topic_of("elsewhere") is None
-
-
-def test_health_of_another_service_is_refused() -> None:
-    payload = codec.encode(health("safety"))
-    theirs = Sample("t2/v1/7/tel/dashboard/health", payload, "", False, None, 0, 0)
-    with pytest.raises(MessageError, match="names another service than the key"):
-        decode(theirs, Health)
-    assert decode(replace(theirs, key="t2/v1/7/tel/safety/health"), Health).service == "safety"
