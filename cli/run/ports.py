@@ -2,7 +2,7 @@
 
 A second stack on the same ports would add a second safety service to the robot's bus. Each port is
 bound once and released, then claimed while ``t2 up`` runs: of two concurrent starts, one continues.
-A Unix socket is only claimed: its file may be a stale one.
+A Unix socket is connected to instead: its file may be a stale one.
 """
 
 import errno
@@ -77,8 +77,7 @@ def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
 def _taken(port: Port, claims: ExitStack) -> str:
     """Claim a port; return why it is not available, or an empty text."""
     try:
-        if port.kind != "unix":
-            _bind(port)
+        (_connect if port.kind == "unix" else _bind)(port)
         if sys.platform == "linux":  # a name in the abstract namespace, free when this process ends
             sock = claims.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
             sock.bind(f"\0t2-up {port.kind} {port.host} {port.number}")
@@ -98,6 +97,15 @@ def _bind(port: Port) -> None:
         sock.bind(address)
         if port.kind == "tcp":
             sock.listen(1)
+
+
+def _connect(port: Port) -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
+        try:
+            sock.connect(port.host)
+        except OSError:  # no socket, or a stale one of a killed router
+            return
+    raise OSError(errno.EADDRINUSE, "used by another program")
 
 
 def _advice(port: Port) -> str:

@@ -5,14 +5,17 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from cli.run import ports
 from cli.run.ports import Port, claimed, wanted
 from cli.settings import Everything
+from common.bus.session import router
 from common.errors import LinkError
 from common.settings import BusSettings
+from verification.harness.bus import listening
 
 TYPES = {"tcp": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}
 
@@ -66,3 +69,17 @@ def test_ports_of_a_killed_stack_are_awaited() -> None:
         began_s = time.monotonic()
         claimed([Port("udp", "127.0.0.1", number, "board.port")]).close()
         assert time.monotonic() - began_s >= 2 * ports.LOOK_S
+
+
+def test_only_a_live_unix_socket_is_taken(tmp_path: Path) -> None:
+    path = str(tmp_path / "bus.sock")
+    port = Port("unix", path, 0, "bus.listen")
+    with (
+        router(listening(f"unixsock-stream/{path}")),
+        pytest.raises(LinkError, match="used by another"),
+    ):
+        claimed([port], 0.0)
+    with socket.socket(socket.AF_UNIX) as stale:
+        stale.bind(f"{path}.2")
+    with claimed([port._replace(host=f"{path}.2"), port._replace(host=f"{path}.3")], 0.0):
+        pass
