@@ -43,20 +43,19 @@ def motions(datagram: bytes) -> list[bytes] | None:
 
     A motion command of another size or kind, or inside another frame, is invalid, too.
     """
-    found, start = [], 0
-    while start < len(datagram):
-        header, begin = datagram[start : start + HEADER.size], start + HEADER.size
-        if len(header) < HEADER.size:
+    found, rest = [], datagram
+    while rest:
+        if len(rest) < HEADER.size:
             return None
-        magic, size, command, crc = HEADER.unpack(header)
-        payload = datagram[begin : start + size]
+        magic, size, command, crc = HEADER.unpack_from(rest)
+        payload = rest[HEADER.size : size]
         if magic != MAGIC or len(payload) != size - HEADER.size or crc16(payload) != crc:
             return None
         if command == MOTION:
             if len(payload) != MOTION_SIZE or payload[0] > HALT:
                 return None
             found.append(payload)
-        start += size
+        rest = rest[size:]
     return found if datagram.count(MOTION_OPENING) == len(found) else None  # none in a payload
 
 
