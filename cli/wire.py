@@ -1,18 +1,18 @@
 """``t2 wire decode``: captured frames as text.
 
-The source is hex on the command line, which is one datagram, or a file of `tcpdump -w`. Spaces,
-colons, commas, dashes and 0x are ignored in hex.
+The source is hex on the command line, which is one datagram, or a file, pcap or pcapng. Spaces,
+colons, commas, dashes and 0x are ignored in hex. A pcapng file is read with the link type of its
+first interface.
 
 The same id means one frame from the PC and another one from the board. The sizes differ, except for
 the two emergency brake switches. So each frame is decoded for both senders.
 """
 
 import argparse
+import io
 import re
-import struct
 from collections.abc import Iterator
 from enum import IntEnum
-from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Any, get_args
 
@@ -34,12 +34,6 @@ FURTHEST = (
     Reason.UNKNOWN_ID, Reason.NO_MAGIC,
 )  # fmt: skip
 
-PCAP = (b"\xd4\xc3\xb2\xa1", b"\x4d\x3c\xb2\xa1")  # of `tcpdump -w`: microseconds, nanoseconds
-# Bytes before the IP packet by link type: Ethernet, and both of `tcpdump -i any`.
-LINKS = {1: 14, 113: 16, 276: 20}
-FILE_HEADER, PACKET_HEADER, IP_HEADER, UDP_HEADER = 24, 16, 20, 8
-PROTOCOL_UDP = 17
-
 Datagram = tuple[str, bytes]  # its place in the source, its bytes
 
 
@@ -48,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
     text = "print frames, one per line, with the reason for each invalid run of bytes"
     decode = tools.add_parser("decode", help=text, description=text)
-    decode.add_argument("source", metavar="HEX|FILE", help="hex, or a capture of `tcpdump -w`")
+    decode.add_argument("source", metavar="HEX|FILE", help="hex, or a capture (pcap, pcapng)")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -83,26 +77,36 @@ def datagrams(source: str) -> list[Datagram]:
 
 
 def from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
-    """Yield the payload of each UDP packet over IPv4; raise ``RobotError`` for another file."""
-    link = LINKS.get(int.from_bytes(content[20:24], "little"))
-    if content[:4] not in PCAP or link is None:
+    """Yield the payload of each UDP packet; raise ``RobotError`` at the first invalid one."""
+    try:
+        from dpkt import dpkt, ethernet, ip, pcap, sll, sll2, udp, utils  # type: ignore[import-untyped]
+    except ImportError:
         raise RobotError(
-            f"{name} is not a pcap file of Ethernet: capture with `tcpdump -w FILE`, or convert it "
-            "with `editcap -F pcap`"
-        )
-    number, offset = 0, FILE_HEADER
-    while offset + PACKET_HEADER <= len(content):
-        number += 1
-        start = offset + PACKET_HEADER
-        offset = start + int.from_bytes(content[offset + 8 : offset + 12], "little")
-        packet = content[start + link : offset]
-        if len(packet) < IP_HEADER or packet[0] >> 4 != 4 or packet[9] != PROTOCOL_UDP:
-            continue
-        udp = packet[4 * (packet[0] & 0xF) :]  # after the options of IP
-        if len(udp) >= UDP_HEADER:
-            source, target, size = struct.unpack(">HHH", udp[:6])
-            ends = f"{IPv4Address(packet[12:16])}:{source} > {IPv4Address(packet[16:20])}:{target}"
-            yield f"packet {number} {ends}", udp[UDP_HEADER:size]
+            "reading a capture needs dpkt; `make` installs it, or pip install -e '.[inspect]'"
+        ) from None
+    links = {
+        pcap.DLT_EN10MB: ethernet.Ethernet,
+        pcap.DLT_LINUX_SLL: sll.SLL,  # of `tcpdump -i any`
+        pcap.DLT_LINUX_SLL2: sll2.SLL2,
+    }
+    number = 0
+    try:
+        reader = pcap.UniversalReader(io.BytesIO(content))
+        if reader.datalink() not in links:
+            raise RobotError(
+                f"{name}: unsupported link type {reader.datalink()}; capture on Ethernet"
+            )
+        for number, (_, packet) in enumerate(reader, 1):
+            network = links[reader.datalink()](packet)
+            while not isinstance(network, (ip.IP, bytes)):
+                network = network.data
+            if not isinstance(network, bytes) and isinstance(network.data, udp.UDP):
+                segment = network.data
+                source = f"{utils.inet_to_str(network.src)}:{segment.sport}"
+                target = f"{utils.inet_to_str(network.dst)}:{segment.dport}"
+                yield f"packet {number} {source} > {target}", bytes(segment.data)
+    except (dpkt.Error, ValueError, KeyError) as error:
+        raise RobotError(f"{name}: invalid after packet {number}: {error}") from None
 
 
 # --- frames -------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from argparse import Namespace
 from importlib.metadata import metadata
+from pathlib import Path
 
 import pytest
 
@@ -70,7 +71,7 @@ def test_errors_and_exit_codes(
 # The robot's requirements have no extras: only commands that need one may fail, with a message.
 ROBOT_SET = """
 import sys
-ABSENT = {"matplotlib", "textual", "pygame", "cryptography"}
+ABSENT = {"matplotlib", "textual", "pygame", "dpkt", "cryptography"}
 class Absent:
     def find_spec(self, name, path=None, target=None):
         if name.split(".")[0] in ABSENT:
@@ -84,7 +85,8 @@ for name in COMMANDS:
         main([name, "--help"])
     except SystemExit as end:
         assert end.code == 0, name
-for words in (["demo"], ["drive"], ["keys", "list"]):
+capture = sys.argv[1]
+for words in (["demo"], ["drive"], ["wire", "decode", capture], ["keys", "list"]):
     print(words[0], "gives", main(words), file=sys.stderr)
 ABSENT.clear()
 ABSENT.add("t2")
@@ -92,17 +94,20 @@ main(["demo"])
 """
 
 
-def test_without_the_extras() -> None:
+def test_without_the_extras(tmp_path: Path) -> None:
+    capture = tmp_path / "trip.pcap"
+    capture.write_bytes(bytes.fromhex("d4c3b2a1") + bytes(20))
     result = subprocess.run(
-        [sys.executable, "-c", ROBOT_SET],
+        [sys.executable, "-c", ROBOT_SET, str(capture)],
         capture_output=True, text=True, timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
     *lines, client = result.stderr.splitlines()
-    demo, drive, keys = lines[::2]
+    demo, drive, wire, keys = lines[::2]
     assert demo.startswith("t2 demo: the demo needs matplotlib; ")
     assert demo.endswith("pip install -e '.[demo]' -e sdk")
     assert client.startswith("t2 demo: the demo needs t2; ")
     assert drive.startswith("t2 drive: the screen needs ")
+    assert wire.endswith("pip install -e '.[inspect]'")
     assert keys.startswith("t2 keys: it needs cryptography: install the extra `keys`")
-    assert lines[1::2] == [f"{name} gives 1" for name in ("demo", "drive", "keys")]
+    assert lines[1::2] == [f"{name} gives 1" for name in ("demo", "drive", "wire", "keys")]
