@@ -13,6 +13,7 @@ from services.odom.core.pose import (
     Pose,
     PoseEstimate,
     ProcessNoise,
+    chord_ratio,
     fitted,
     halved,
     total,
@@ -31,6 +32,13 @@ ways = st.lists(segments, max_size=8)
 CERTAIN = Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 CLOSE = pytest.approx((0.0, 0.0), abs=1e-9)
 QUARTER = math.pi / 2
+
+
+@pytest.mark.parametrize("turn", [9e-5, -9e-5, 1.1e-4, 0.01])
+def test_the_chord_of_a_small_turn(turn: float) -> None:
+    ratio, derivative = chord_ratio(turn)
+    assert (1.0 - ratio) / turn**2 == pytest.approx(1 / 24, rel=1e-3)
+    assert derivative / turn == pytest.approx(-1 / 12, rel=1e-3)
 
 
 @pytest.mark.parametrize(
