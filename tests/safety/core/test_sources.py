@@ -227,6 +227,12 @@ def test_a_zero_counts_that_was_received_after_the_last_bar() -> None:
     assert not arbiter.barred(5).is_neutral("teleop")
 
 
+def test_the_sources_that_request_zero_are_those_with_a_fresh_zero() -> None:
+    arbiter, _ = request(request(DRIVES)[0], 1, "web", 0.1)
+    assert arbiter.requesting_zero(1) == {"teleop"}
+    assert arbiter.requesting_zero(TELEOP_NS + 1) == set()
+
+
 def test_the_source_in_control_overrules_lower_ones_only() -> None:
     arbiter, lowest = DRIVES, request(DRIVES, source="nav")[0]
     assert [one.overruled(0) is one for one in (arbiter, lowest)] == [True, True]
