@@ -19,6 +19,7 @@ import msgspec
 from msgspec import Struct
 
 from common.errors import ConfigError
+from common.removed_settings import REMOVED
 
 C = TypeVar("C", bound=Struct)
 
@@ -212,8 +213,10 @@ def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) ->
     values = {}
     for name, value in table.items():
         at = f"{path}.{name}" if path else name
+        if at in REMOVED:
+            raise ConfigError(f"{_origin(at, given)}: {at}: {REMOVED[at]}")
         if name not in types:
-            unknown = f"unknown{_suggestion(name, types)} (removed settings: CHANGELOG.md)"
+            unknown = f"unknown{_suggestion(name, types)}"
             raise ConfigError(f"{_origin(at, given)}: {at}: {unknown}")
         values[name] = _value(types[name], value, at, given)
     for field in msgspec.structs.fields(kind):

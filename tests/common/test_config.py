@@ -157,9 +157,16 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
     [
         ("[bord]\nport = 1", "over0.toml: bord.port: no section 'bord'; did you mean 'board'?"),
         (
-            "[board]\nprot = 1",
-            "board.prot: unknown; did you mean 'port'? (removed settings: CHANGELOG.md)",
+            "[wire]\nangular_unit = 'milliradian'",
+            "over0.toml: wire.angular_unit: was replaced by wire.command_angular_unit and "
+            "wire.feedback_angular_unit",
         ),
+        (
+            "[bridge]\nbumper_rate = 40.0",
+            "over0.toml: bridge.bumper_rate: is no setting any more, always 50 Hz",
+        ),
+        ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
+        ("[sim.drive]\ncoast = 1", "over0.toml: sim.drive: is no setting any more; a profile"),
         ("[sim]\nzzz = 1", "over0.toml: sim.zzz: unknown; there are control_port, seed, world"),
         ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),
         ("[board]\nport = 70000", "port = 70000: Expected `int` <= 65535; allowed is 1..65535"),
