@@ -163,6 +163,7 @@ class Policy:
         arbiter, overrides = state.arbiter, state.overrides
         if state.sonar_array.unseen or overrides.since:
             neutral = {
+                # 1 equivalent mutant: both are before any fault.
                 name: arbiter.channels[name].neutral_ns or 0
                 for name in self.settings.operators & arbiter.requesting_zero(now_ns)
             }

@@ -6,6 +6,7 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.messages import Drive, Switches
+from common.motion import STILL
 from services.safety.config import Safety
 from services.safety.core.inputs import DriveRequest
 from tests.safety.core.policy_fixture import PolicyFixture
@@ -57,6 +58,13 @@ def test_two_publishers_stop_the_vehicle_until_one_is_left_and_neutral() -> None
     assert fixture.drive(0.5, seconds=0.2).name == "inhibited"  # the stick is still pushed
     fixture.drive()
     assert fixture.drive(0.5, seconds=0.1).command == "run"
+
+
+def test_a_motion_that_stops_has_no_velocity() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.drive(0.5, 0.2, seconds=0.2)
+    assert (fixture.verdict.command, fixture.verdict.name) == ("stop", "inhibited")
+    assert fixture.verdict.twist == STILL
 
 
 @pytest.mark.parametrize("zeros_s", [0.0, 0.1])
