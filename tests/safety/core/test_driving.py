@@ -61,8 +61,9 @@ def test_two_publishers_stop_the_vehicle_until_one_is_left_and_neutral() -> None
 
 
 def test_a_motion_that_stops_has_no_velocity() -> None:
-    fixture = PolicyFixture().ready()
-    fixture.drive(0.5, 0.2, seconds=0.2)
+    fixture = PolicyFixture()
+    fixture.tick(40)
+    fixture.drive(0.5, 0.2)  # without a neutral request
     assert (fixture.verdict.command, fixture.verdict.name) == ("stop", "inhibited")
     assert fixture.verdict.twist == STILL
 
