@@ -193,6 +193,7 @@ class Policy:
         return replace(state, latches=held), Verdict(
             name=_name(worst, held),
             command=command,
+            # 1 equivalent mutant: without RUN the plan stands still, too.
             twist=plan.twist if command is RUN else STILL,
             source=source,
             control=source if source and BARRING.isdisjoint(held) else None,
