@@ -1,12 +1,15 @@
 """Figures of a report, as inline SVG without scripts."""
 
+import math
 import re
 from bisect import bisect_right
+from itertools import groupby
 
 import ziaplot as zp
+from ziaplot.canvas import Borders, Canvas, ViewBox
 from ziaplot.style import DashTypes, MarkerTypes
 
-from cli.recordings.timeline import Series, Timeline, VelocitySeries
+from cli.recordings.timeline import Series, Timeline, VelocitySeries, downsampled
 
 WIDTH = 1100  # pixels
 REQUESTED, ALLOWED, MEASURED = "#6b7683", "#b35900", "#0b62c4"
@@ -37,12 +40,36 @@ zp.css("""
 """)
 
 
+class BrokenLine(zp.PolyLine):
+    """A series with a gap at each NaN, and 0 on both axes; ziaplot's own line has no gaps.
+
+    A line for each part would take seconds: ziaplot resolves the style of each element.
+    """
+
+    def __init__(self, series: Series) -> None:
+        points = zip(*downsampled(series.times, series.values), strict=True)
+        parts = groupby(points, lambda point: not math.isnan(point[1]))
+        self._parts = [tuple(zip(*part, strict=True)) for known, part in parts if known]
+        times, values = ([n for part in self._parts for n in part[axis]] for axis in (0, 1))
+        super().__init__([0.0, *times], [0.0, *values])
+
+    def _xml(
+        self, canvas: Canvas, databox: ViewBox | None = None, borders: Borders | None = None
+    ) -> None:
+        style = self._build_style()
+        for times, values in self._parts:
+            canvas.path(
+                times, values, color=style.get_color(), width=style.stroke_width,
+                stroke=style.stroke, dataview=databox, zorder=self._zorder,
+            )  # fmt: skip
+
+
 def path(timeline: Timeline) -> str:
     """Draw the path by odometry, with the numbered stops."""
     graph = zp.Graph()
     graph.axesnames("x in odom, m", "y in odom, m")
     for number, segment in enumerate(timeline.path):
-        xs, ys = segment.xs, segment.ys
+        xs, ys = downsampled(segment.xs, segment.ys)
         graph.add(zp.PolyLine(xs, ys).color(MEASURED).strokewidth(1.6))
         _mark(graph, (xs[0], ys[0]), "round", "start" if number == 0 else "odometry restart")
         if number == len(timeline.path) - 1:
@@ -95,9 +122,8 @@ def _over_time(timeline: Timeline, y_name: str | None, x_name: str | None = None
 
 def _velocity(timeline: Timeline, series: VelocitySeries, label: str) -> zp.Graph:
     graph = _over_time(timeline, label)
-    graph.add(zp.Point((0.0, 0.0)).color("none"))  # the axis includes 0
     for number, (source, request) in enumerate(series.requested.items()):
-        _line(graph, request, REQUESTED, f"requested by {source}", DASHES[number % 4])
+        _line(graph, request, REQUESTED, f"requested by {source}", dash=DASHES[number % 4])
     _line(graph, series.allowed, ALLOWED, "allowed by safety")
     _line(graph, series.measured, MEASURED, "measured")
     top = graph.datarange().ymax
@@ -115,16 +141,21 @@ def _verdicts(timeline: Timeline) -> zp.Graph:
     for phase in timeline.verdicts:
         _span(graph, phase.begins_s, phase.ends_s, VERDICTS[phase.state.verdict])
     for verdict in dict.fromkeys(phase.state.verdict for phase in timeline.verdicts):
-        graph.add(zp.PolyLine([0.0], [0.0]).name(verdict).color(VERDICTS[verdict]).strokewidth(6))
+        _line(graph, Series(), VERDICTS[verdict], verdict, width=6)
     return graph
 
 
-def _line(graph: zp.Graph, series: Series, color: str, label: str, dash: DashTypes = "-") -> None:
-    for number, (times, values) in enumerate(series.parts):
-        line = zp.PolyLine(times, values)
-        if number == 0:
-            line.name(label)
-        graph.add(line.color(color).strokewidth(1.2).stroke(dash))
+def _line(
+    graph: zp.Graph,
+    series: Series,
+    color: str,
+    label: str,
+    *,
+    width: float = 1.2,
+    dash: DashTypes = "-",
+) -> None:
+    line = BrokenLine(series)
+    graph.add(line.name(label).color(color).strokewidth(width).stroke(dash))
 
 
 def _span(graph: zp.Graph, begins_s: float, ends_s: float, color: str) -> None:

@@ -4,11 +4,12 @@ A stop begins with the first cause that stops the vehicle and ends when none is 
 and ``neutral`` do not count: the vehicle stands because nothing requests motion, or because the
 controls must be released first.
 
-Times are seconds since the recording's first message, on the recorder's wall clock.
+Times are seconds since the recording's first message, on the recorder's wall clock. A series holds
+NaN in a gap, so that no line is drawn through it.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -27,6 +28,7 @@ from common.messages import (
     Velocity,
 )
 
+NAN = math.nan
 GAP_S = 0.5  # the slowest plotted stream has 20 Hz
 MISSED = 3.0  # a gap is longer than this many periods
 IDLE = {"no_request", "neutral"}
@@ -108,17 +110,18 @@ def stopping_causes(state: SafetyState) -> list[Cause]:
 
 @dataclass(slots=True)
 class Series:
-    """A time series in parts, so that no line is drawn through a gap."""
+    """A time series."""
 
-    parts: list[tuple[list[float], list[float]]] = field(default_factory=list)  # times, values
+    times: list[float] = field(default_factory=list)  # s
+    values: list[float] = field(default_factory=list)
 
     def add(self, at_s: float, value: float) -> None:
-        """Add a value; begin a part after a gap."""
-        if not self.parts or at_s - self.parts[-1][0][-1] > GAP_S:
-            self.parts.append(([], []))
-        times, values = self.parts[-1]
-        times.append(at_s)
-        values.append(value)
+        """Add a value; mark a gap before it with NaN."""
+        if self.times and at_s - self.times[-1] > GAP_S:
+            self.times.append(self.times[-1])
+            self.values.append(NAN)
+        self.times.append(at_s)
+        self.values.append(value)
 
 
 @dataclass(slots=True)
@@ -263,3 +266,29 @@ class Timeline:
         segment.times.append(at_s)
         segment.xs.append(message.x)
         segment.ys.append(message.y)
+
+
+def downsampled(
+    times: Sequence[float], values: Sequence[float], limit: int = 4000
+) -> tuple[list[float], list[float]]:
+    """Return about ``limit`` points at most, with every peak, dip and gap at its place."""
+    if len(times) <= limit:
+        return list(times), list(values)
+    # Up to four points of each block are kept.
+    length = math.ceil(4 * len(times) / limit)
+    kept = [
+        index
+        for begin in range(0, len(times), length)
+        for index in _extremes(values, range(begin, min(begin + length, len(times))))
+    ]
+    return [times[index] for index in kept], [values[index] for index in kept]
+
+
+def _extremes(values: Sequence[float], block: range) -> Iterator[int]:
+    known = [index for index in block if not math.isnan(values[index])]
+    chosen = [index for index in block if math.isnan(values[index])][:1]
+    if known:
+        chosen += [
+            min(known, key=values.__getitem__), max(known, key=values.__getitem__), known[-1]
+        ]  # fmt: skip
+    yield from sorted(set(chosen))

@@ -1,8 +1,10 @@
 """Timeline of a recorded drive: series, streams, and stops with their reasons."""
 
+import math
+
 import pytest
 
-from cli.recordings.timeline import Phase, Series, Stream, add_state, stops
+from cli.recordings.timeline import Phase, Series, Stream, add_state, downsampled, stops
 from common.messages import Cause, Drive, SafetyState, Velocity, Verdict
 from tests import factories
 from tests.cli.recordings.drive_fixture import CONTACT, HIT_S, RESET_S, at, drive, timeline_of
@@ -11,12 +13,10 @@ from tests.cli.recordings.drive_fixture import CONTACT, HIT_S, RESET_S, at, driv
 def test_the_timeline_of_a_drive() -> None:
     timeline = timeline_of(*drive())
     assert set(timeline.linear.requested) == {"teleop"}
-    ((_, requested),) = timeline.linear.requested["teleop"].parts
-    assert set(requested) == {0.5}
-    ((times, allowed),) = timeline.linear.allowed.parts
-    assert [value == 0.0 for value in allowed] == [HIT_S <= at_s < RESET_S for at_s in times]
-    ((_, measured),) = timeline.angular.measured.parts
-    assert set(measured) == {0.1}
+    assert set(timeline.linear.requested["teleop"].values) == {0.5}
+    allowed = zip(timeline.linear.allowed.times, timeline.linear.allowed.values, strict=True)
+    assert all((value == 0.0) == (HIT_S <= at_s < RESET_S) for at_s, value in allowed)
+    assert set(timeline.angular.measured.values) == {0.1}
     (stop,) = timeline.stops
     assert (stop.begins_s, stop.ends_s) == (HIT_S, RESET_S)
     assert (list(stop.reasons), stop.was_driving) == (["contact"], True)
@@ -33,11 +33,26 @@ def test_a_new_odometry_epoch_starts_a_new_segment() -> None:
     assert timeline.distance == pytest.approx(0.04)
 
 
-def test_a_gap_begins_a_part() -> None:
+def test_a_gap_is_marked_with_nan() -> None:
     series = Series()
     for at_s in (0.0, 0.1, 2.0):
         series.add(at_s, 1.0)
-    assert series.parts == [([0.0, 0.1], [1.0, 1.0]), ([2.0], [1.0])]
+    assert series.times == [0.0, 0.1, 0.1, 2.0]
+    assert math.isnan(series.values[2])
+
+
+def test_downsampling_keeps_peaks_and_gaps() -> None:
+    times = [float(number) for number in range(10_000)]
+    values = [0.0] * 10_000
+    values[1234], values[5678], values[9000] = 7.0, -7.0, math.nan
+    fewer_times, fewer = downsampled(times, values, limit=400)
+    assert len(fewer) <= 400
+    assert dict(zip(fewer_times, fewer, strict=True))[1234.0] == 7.0
+    assert (max(fewer), min(fewer)) == (7.0, -7.0)
+    assert any(math.isnan(value) for value in fewer)
+    assert fewer_times == sorted(fewer_times)
+    assert all(map(math.isnan, downsampled(times, [math.nan] * 10_000, limit=400)[1]))
+    assert downsampled(times[:5], values[:5]) == (times[:5], values[:5])
 
 
 # --- streams ------------------------------------------------------------------------------------
@@ -84,6 +99,15 @@ def phases_of(*steps: tuple[float, float, Verdict, tuple[Cause, ...]]) -> list[P
         Phase(begins_s, ends_s, made_of(verdict, causes))
         for begins_s, ends_s, verdict, causes in steps
     ]
+
+
+def test_a_contact_while_driving_with_a_reset() -> None:
+    (stop,) = stops(
+        phases_of((0, 2, "run", ()), (2, 5, "brake", (CONTACT, IDLE)), (5, 9, "stop", (IDLE,)))
+    )
+    assert (stop.begins_s, stop.ends_s, stop.lasts_s) == (2, 5, 3)
+    assert (stop.was_driving, stop.verdict) == (True, "brake")
+    assert stop.reasons == {"contact": "The bumper was hit."}
 
 
 def test_consecutive_reasons_are_one_stop() -> None:
