@@ -59,6 +59,7 @@ class Exporter(Collector):
             bus.subscribe(topic, self._on_message, depth=DEPTH)
         bus.subscribe(keys.HEALTH, self._on_message, depth=DEPTH, service="*")
         bus.subscribe(keys.EVENTS, self._on_event, depth=DEPTH, service="*")
+        bus.watch_live(keys.live_key(bus.robot, "*", "*"), self._on_live)
 
     def _on_message(self, arrival: Arrival[Any]) -> None:
         path = arrival.key.split("/", 3)[3]
@@ -66,6 +67,10 @@ class Exporter(Collector):
 
     def _on_event(self, arrival: Arrival[m.Event]) -> None:
         self._robot(arrival.key).on_event(arrival.key.split("/")[-1], arrival.message)
+
+    def _on_live(self, key: str, alive: bool) -> None:
+        service, instance = key.split("/")[-2:]
+        self._robot(key).on_live(service, instance, alive, clock.now_ns())
 
     def _robot(self, key: str) -> RobotState:
         return self._robots.setdefault(key.split("/")[2], RobotState())

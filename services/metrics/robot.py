@@ -8,11 +8,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
+from common import keys
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Event
 
 FRESH_S = 3.0  # a value is exported for so long: the slowest streams have 1 Hz
-EXPIRY_S = 24 * 3600.0  # until a silent robot is removed: fleets change
+EXPIRY_S = 24 * 3600.0  # until an absent robot is removed: fleets change
 EXPECTED = ("bridge", "safety", "odom")  # needed to drive: exported even if never seen
 EVENT_NAMES_MAX = 500  # further names count as "other": this bounds the memory
 
@@ -22,18 +23,25 @@ class RobotState:
     """Everything received from one robot; paths are those below it, as ``tel/bridge/link``."""
 
     messages: dict[str, Latest[Any]] = field(default_factory=dict)  # by path
+    instances: dict[str, set[str]] = field(  # by liveliness, of each service
+        default_factory=lambda: {name: set() for name in EXPECTED}
+    )
     events: Counter[tuple[str, str, str]] = field(default_factory=Counter)
-    services: set[str] = field(default_factory=lambda: set(EXPECTED))
     is_robot: bool = False  # a robot's own service was seen, not only a laptop with its id
-    seen_ns: int = 0  # last message
+    seen_ns: int = 0  # last message or liveliness change
 
     def on_message(self, path: str, message: object, now_ns: int) -> None:
         """Handle a message of a stream, or a health message."""
         self.messages[path] = Latest(message, now_ns)
         service = path.split("/")[1]
-        self.services.add(service)
-        self.is_robot = self.is_robot or service in EXPECTED
-        self.seen_ns = now_ns
+        self.instances.setdefault(service, set())
+        self._seen(service, now_ns)
+
+    def on_live(self, service: str, instance: str, alive: bool, now_ns: int) -> None:
+        """Handle a liveliness token that appeared or disappeared."""
+        instances = self.instances.setdefault(service, set())
+        (instances.add if alive else instances.discard)(instance)
+        self._seen(service, now_ns)
 
     def on_event(self, service: str, event: Event) -> None:
         """Count an event."""
@@ -52,10 +60,22 @@ class RobotState:
         own = (path for path in self.messages if path.split("/")[1] in EXPECTED)
         return any(self.fresh(path, now_ns) for path in own)
 
+    def is_healthy(self, service: str, now_ns: int) -> bool:
+        """Return whether a service is present and its health is fresh."""
+        health = self.fresh(keys.HEALTH.path.format(service=service), now_ns)
+        return bool(self.instances[service]) and health is not None
+
+    def is_expired(self, now_ns: int) -> bool:
+        """Return whether the robot has been absent for ``EXPIRY_S``."""
+        return not any(self.instances.values()) and now_ns - self.seen_ns > EXPIRY_S * NS_PER_S
+
+    def _seen(self, service: str, now_ns: int) -> None:
+        self.seen_ns = now_ns
+        self.is_robot = self.is_robot or service in EXPECTED
+
 
 def prune(robots: dict[str, RobotState], own: str, now_ns: int) -> None:
     """Remove expired robots and ids without a robot; always keep ``own``."""
     for name, robot in list(robots.items()):
-        is_expired = now_ns - robot.seen_ns > EXPIRY_S * NS_PER_S
-        if name != own and (is_expired or not robot.is_robot):
+        if name != own and (robot.is_expired(now_ns) or not robot.is_robot):
             del robots[name]

@@ -39,7 +39,8 @@ OMITTED = {
 METRICS = {
     "t2_bus_connected": "Whether the exporter is connected to a router",
     "t2_robot_up": "Whether the robot is alive",
-    "t2_service_up": "Whether the service publishes its health",
+    "t2_service_up": "Whether the service is present and healthy",
+    "t2_service_instances": "Processes of the service on the bus",
     "t2_events_total": "Events received, including replayed ones, by `event` and `level`",
 }
 
@@ -92,7 +93,7 @@ def metric_families(
     scrape.add("t2_bus_connected", connected)
     for name, robot in sorted(robots.items()):
         _robot(scrape, name, robot, now_ns)
-        for service in sorted(robot.services):
+        for service in sorted(robot.instances):
             _service(scrape, name, robot, service, now_ns)
     return list(scrape.families.values())
 
@@ -110,8 +111,9 @@ def _robot(scrape: Scrape, name: str, robot: RobotState, now_ns: int) -> None:
 
 def _service(scrape: Scrape, name: str, robot: RobotState, service: str, now_ns: int) -> None:
     labels = {"robot": name, "service": service}
+    scrape.add("t2_service_up", robot.is_healthy(service, now_ns), **labels)
+    scrape.add("t2_service_instances", len(robot.instances[service]), **labels)
     health = robot.fresh(keys.HEALTH.path.format(service=service), now_ns)
-    scrape.add("t2_service_up", health is not None, **labels)
     if health is not None:
         own = f"{keys.ROOT}/{name}/"
         rates = {key.removeprefix(own): rate for key, rate in health.rates.items()}

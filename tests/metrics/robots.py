@@ -34,6 +34,7 @@ def whole(at_ns: int = NOW_NS) -> RobotState:
     """Return a robot whose messages all arrived at that time."""
     robot = RobotState()
     for name in SERVICES:
+        robot.on_live(name, "a", True, at_ns)
         robot.on_message(f"tel/{name}/health", health(name), at_ns)
     for path, message in {SAFETY: safety(), LINK: link(), ODOMETRY: odometry(angular=-0.2)}.items():
         robot.on_message(path, message, at_ns)

@@ -8,7 +8,7 @@ from common.freshness import NS_PER_S
 from services.metrics.config import MetricsConfig
 from services.metrics.robot import EVENT_NAMES_MAX, EXPIRY_S, FRESH_S, RobotState, prune
 from tests.factories import health
-from tests.metrics.robots import LINK, NOW_NS, event, link, whole
+from tests.metrics.robots import LINK, NOW_NS, SERVICES, event, link, whole
 
 LATE_NS = NOW_NS + round(FRESH_S * NS_PER_S) + 1
 LONG_NS = NOW_NS + round(EXPIRY_S * NS_PER_S) + 1
@@ -21,8 +21,24 @@ def test_a_robot_is_up_while_any_message_of_its_own_services_is_fresh() -> None:
     robot.on_message(LINK, link(), LATE_NS)
     assert robot.is_up(LATE_NS)
     laptop = RobotState()
+    laptop.on_live("metrics", "a", True, NOW_NS)
     laptop.on_message("tel/metrics/health", health("metrics"), NOW_NS)
+    assert laptop.is_healthy("metrics", NOW_NS)
     assert not laptop.is_up(NOW_NS)
+
+
+def test_a_service_is_healthy_with_token_and_fresh_health() -> None:
+    robot = RobotState()
+    robot.on_message("tel/bridge/health", health(), NOW_NS)
+    assert not robot.is_healthy("bridge", NOW_NS)  # without a token
+    robot.on_live("bridge", "a", True, NOW_NS)
+    assert robot.is_healthy("bridge", NOW_NS)
+    assert not robot.is_healthy("bridge", LATE_NS)  # it hangs
+    robot.on_live("bridge", "b", True, LATE_NS)
+    robot.on_live("bridge", "a", False, LATE_NS)
+    assert robot.instances["bridge"] == {"b"}
+    robot.on_live("bridge", "never there", False, LATE_NS)
+    assert robot.instances["bridge"] == {"b"}
 
 
 def test_events_are_counted_by_name_and_the_names_are_bounded() -> None:
@@ -37,10 +53,24 @@ def test_events_are_counted_by_name_and_the_names_are_bounded() -> None:
     assert len(robot.events) == EVENT_NAMES_MAX + 1
 
 
+@pytest.mark.parametrize("name", ["bridge", "recorder"])
+def test_a_robot_expires_when_all_its_services_are_gone(name: str) -> None:
+    robot = whole()
+    for each in SERVICES:
+        robot.on_live(each, "a", each == name, NOW_NS)
+    assert not robot.is_expired(LONG_NS)  # it hangs, but is present
+    robot.on_live(name, "a", False, NOW_NS)
+    assert not robot.is_expired(LONG_NS - 1)
+    assert robot.is_expired(LONG_NS)
+
+
 def test_the_own_robot_never_expires_and_a_laptop_is_none() -> None:
     laptop = RobotState()
     laptop.on_message("tel/dashboard/health", health("dashboard"), NOW_NS)
     robots = {"007": whole(), "008": whole(), "laptop": laptop}
+    for name in ("007", "008"):
+        for service in SERVICES:
+            robots[name].on_live(service, "a", False, NOW_NS)
     prune(robots, "007", LONG_NS - 1)
     assert set(robots) == {"007", "008"}
     prune(robots, "007", LONG_NS)

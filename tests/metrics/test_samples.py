@@ -23,7 +23,7 @@ from tests.metrics.robots import (
 
 LATE_NS = NOW_NS + round(FRESH_S * NS_PER_S) + 1
 # Exported for a robot without fresh values.
-ALWAYS = {"t2_bus_connected", "t2_robot_up", "t2_service_up"}
+ALWAYS = {"t2_bus_connected", "t2_robot_up", "t2_service_up", "t2_service_instances"}
 
 
 def values(robot: RobotState, now_ns: int = NOW_NS, *, connected: bool = True) -> Values:
@@ -52,6 +52,7 @@ def test_samples_of_a_healthy_robot() -> None:
         assert value(found, name) == expected, name
     for name, expected in {
         "t2_service_up": 1,
+        "t2_service_instances": 1,
         "t2_service_uptime_seconds": 60,
         "t2_service_rss_bytes": 50_000_000,
     }.items():
