@@ -209,7 +209,8 @@ def _value(kind: Any, value: Any, path: str, given: Given) -> Any:
 
 def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) -> C:
     """Return a struct of a table's values; raise ``ConfigError`` for unknown and missing fields."""
-    types = get_type_hints(kind, include_extras=True)
+    hints = get_type_hints(kind, include_extras=True)
+    types = {name: hints[name] for name in kind.__struct_fields__}
     values = {}
     for name, value in table.items():
         at = f"{path}.{name}" if path else name

@@ -10,6 +10,7 @@ from common.messages import Link, Relay, Switches
 
 ENOUGH = 0.7  # of the requested rate: the poll halves its rate when answers are missing
 VELOCITY_HZ = 10.0  # sent unrequested; safety stops when it is older than 0.2 s
+ENOUGH_FRAMES = 700  # in a step of 10 s: 70 % of a good board's
 STRAY = 0.01  # of all frames: a rare damaged frame is noise on the cable
 MOST_BAD = 0.5  # from this share on it is another CRC, not a bad cable
 BAD_CRC = "bad_crc"
@@ -70,6 +71,8 @@ def _link_problems(
 
 def _rejections(counts: Mapping[str, int], frames: int) -> Iterator[str]:
     """Yield the problems of rejected frames; ``frames`` were accepted."""
+    if frames < ENOUGH_FRAMES:
+        yield f"Too few frames for a verdict: {frames}. Was the bridge running all the time?"
     bad = counts.get(BAD_CRC, 0)
     if bad and bad >= MOST_BAD * (bad + frames):
         yield (

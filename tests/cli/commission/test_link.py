@@ -19,15 +19,15 @@ def link(**fields: Any) -> Link:
 
 
 def judge(switches: Switches | None = ON, **last: Any) -> Verdict:
-    """Judge five seconds of link messages; the last one differs."""
-    good = [link(mono_ns=round(i * 0.2 * NS_PER_S)) for i in range(25)]
-    return judge_link([*good, link(mono_ns=5 * NS_PER_S, **last)], switches)
+    """Judge ten seconds of link messages; the last one differs."""
+    good = [link(mono_ns=round(i * 0.2 * NS_PER_S)) for i in range(50)]
+    return judge_link([*good, link(mono_ns=10 * NS_PER_S, **last)], switches)
 
 
 def test_a_good_link_passes_with_its_data() -> None:
     verdict = judge(rejected={"bad_value": 1}, ports={"BumperReport": 4001})
     assert verdict.outcome == "passed"
-    assert verdict.text == "The board's link is up: 545 frames, no bad CRC."
+    assert verdict.text == "The board's link is up: 1090 frames, no bad CRC."
     data = dict(verdict.data)
     assert data["BumperReport, Hz"] == "50 of 50"
     assert data["rejected"] == "bad_value 1"
@@ -43,12 +43,12 @@ RELAY = Relay(state="up", version="0.1.0", braking="", uptime=1.0, counters={})
         ({"state": "lost"}, "The link is lost"),
         ({"epoch": 1}, "restarted during this step"),
         ({"rejected": {"wrong_address": 20}}, "20 frames rejected as wrong_address"),
-        ({"rejected": {"truncated": 5}}, ""),  # one in a hundred of 545 frames
-        ({"rejected": {"truncated": 6}}, "6 frames rejected as truncated"),
+        ({"rejected": {"truncated": 10}}, ""),  # one in a hundred of 1090 frames
+        ({"rejected": {"truncated": 11}}, "11 frames rejected as truncated"),
         ({"switches": None}, "both its emergency brakes"),
         ({"switches": Switches(ultrasonic_brake=True)}, "both its emergency brakes"),
-        ({"rejected": {"bad_crc": 544}}, "check the cable"),
-        ({"rejected": {"bad_crc": 545}}, "another CRC"),
+        ({"rejected": {"bad_crc": 1089}}, "check the cable"),
+        ({"rejected": {"bad_crc": 1090}}, "another CRC"),
         ({"rates": EXPECTED_HZ | {"UltrasonicReport": 0.0}}, ""),  # once: the median counts
         ({"relay": RELAY}, ""),
         ({"relay": replace(RELAY, braking="silent")}, "now: 0.1.0, braking: silent."),
@@ -61,6 +61,14 @@ def test_problems_are_named(given: dict[str, Any], phrase: str) -> None:
     assert phrase in verdict.text
 
 
+def test_a_bridge_that_was_seen_for_a_part_of_the_step_gives_no_verdict() -> None:
+    few = [link(mono_ns=i * NS_PER_S) for i in range(4)]
+    for links, frames in ((few, 327), (few[:1], 0)):
+        verdict = judge_link(links, ON)
+        assert verdict.outcome == "failed"
+        assert f"Too few frames for a verdict: {frames}." in verdict.text
+
+
 def test_only_rejections_of_the_step_count() -> None:
     before, after = ({"bad_crc": bad, "no_magic": 1} for bad in (3, 5))
     assert rejected([link(rejected=before), link(rejected=after)]) == {"bad_crc": 2}
@@ -68,5 +76,6 @@ def test_only_rejections_of_the_step_count() -> None:
 
 @pytest.mark.parametrize(("rate", "outcome"), [(14.0, "passed"), (13.9, "failed")])
 def test_lowest_allowed_rate(rate: float, outcome: str) -> None:
-    links = [link(rates=EXPECTED_HZ | {"UltrasonicReport": rate})] * 5
+    rates = EXPECTED_HZ | {"UltrasonicReport": rate}
+    links = [link(rates=rates, mono_ns=at_s * NS_PER_S) for at_s in range(11)]
     assert judge_link(links, ON).outcome == outcome

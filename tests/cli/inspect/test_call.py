@@ -104,8 +104,9 @@ def test_every_operator_call_echoes_the_newest_state(
 
 def test_given_causes_are_kept(buses: BusFixture, tool: Tool) -> None:
     safety = Safety(buses, (keys.RESET, obey))
-    assert tool("call", "safety/reset", '{"causes": [8]}').err == ""
+    assert tool("call", "safety/reset", '{"causes": [8], "echo": 7}').err == ""
     assert safety.asked[0].causes == (8,)
+    assert safety.asked[0].echo > 7  # always the newest heartbeat
 
 
 def test_no_operators_call_without_a_state(

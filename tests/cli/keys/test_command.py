@@ -58,13 +58,15 @@ def test_life_cycle_of_a_certificate(keys: Keys) -> None:
     assert (keys.folder / "driver.anna" / "private.key").read_bytes() != first
     assert keys.states() == {"driver.anna.0": "valid", "driver.anna.1": "expires soon"}
     keys.run("issue", "viewer", "anna")
+    keys.run("issue", "driver", "ben", "--robot", "001")
     keys.run("revoke", "driver", "anna", "--serial", keys.serials()[0])
-    assert list(keys.states().values()) == ["revoked", "expires soon", "valid"]
+    assert list(keys.states().values()) == ["revoked", "expires soon", "valid", "valid"]
     keys.run("revoke", "driver", "anna")
-    assert list(keys.states().values()) == ["revoked", "revoked", "valid"]
+    assert list(keys.states().values()) == ["revoked", "revoked", "valid", "valid"]
+    assert "no certificate that could be revoked" in keys.run("revoke", "driver", "anna", code=1)
     assert "or a revoked one" in keys.run("renew", "driver", "anna", code=1)
     keys.run("issue", "driver", "anna", "--robot", "002")
-    assert keys.states()["driver.anna.3"] == "valid"
+    assert keys.states()["driver.anna.4"] == "valid"
 
 
 def test_renewal_keeps_rights_and_addresses(keys: Keys) -> None:
