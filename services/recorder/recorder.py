@@ -16,7 +16,9 @@ from services.recorder.writer import RecordingWriter, RollingWriter
 
 # `**` does not match chunks that begin with "@": two expressions cover all keys.
 EVERYTHING = ("**", "@cmd/**")
-DEPTH = 10_000  # samples that may wait for a slow disk: about 20 s of a whole stack
+# Samples that may wait for a slow disk: about 20 s of a whole stack. Their bytes are bounded by the
+# unit's MemoryMax alone.
+DEPTH = 10_000
 SLICE_S, FLUSH_S, CHECK_S = 0.05, 0.5, 1.0
 
 
