@@ -121,7 +121,7 @@ class SimulatedSession:
         def take(envelope: Envelope) -> None:
             handler(raw(ENCODE(envelope.message)))
 
-        self._stack.net.subscriptions.append(Subscription(self._process, key, take, depth=1))
+        self._stack.net.subscribe(Subscription(self._process, key, take, depth=1))
         return object()
 
     def declare_publisher(self, key: str, **_: object) -> object:
