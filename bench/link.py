@@ -51,7 +51,7 @@ OUTAGES_S = {
     "down for 0.2 s": 0.2, "down for 1 s": 1.0, "down for 5 s": 5.0, "another address": 0.0,
 }  # fmt: skip
 ANOTHER = 3  # the last number of the laptop's address
-SETTLE_S, SECONDS, ESTOP_S, PATIENCE_S = 1.0, 4.0, 5.0, 30.0
+SETTLE_S, SECONDS, ESTOP_S, PATIENCE_S = 1.0, 4.0, 5.0, 60.0
 SURE_NS = NS_PER_S  # of driving without a stop
 NOTICE_NS = NS_PER_S // 20  # to detect the end of a lease
 SHIPPED = SafetyConfig().safety
