@@ -13,12 +13,11 @@ from common import keys
 from common.freshness import Latest, fresh
 from common.keys import Topic
 from common.messages import Event, Message, SafetyState
-from common.text import printable
+from common.text import line
 
 M = TypeVar("M", bound=Message)
 
 EVENTS_MAX = 80
-SHOWN = 1000  # characters of an event: escaping 80 of 4000 takes 0.15 s
 STATES_MAX = 64  # of safety: 3 s, more than any limit on an answer to one
 MISSED = 4.0  # samples that may be missing before the last one is too old to show
 # Names of sources and services come from the bus, where any client can invent them.
@@ -73,10 +72,10 @@ class TelemetryCache:
 
     def add_event(self, service: str, event: Event) -> None:
         """Store an event, sorted by the sender's time."""
-        t, text = event.t_ns / 1e9, printable(event.text[:SHOWN])[:SHOWN]
-        line = EventLine(t, service, event.name, event.level, text)
-        self.new_events.append(line)
-        ordered = sorted([*self.events, line], key=lambda line: line.t)
+        t = event.t_ns / 1e9
+        added = EventLine(t, service, event.name, event.level, line(event.text))
+        self.new_events.append(added)
+        ordered = sorted([*self.events, added], key=lambda each: each.t)
         self.events.clear()
         self.events.extend(ordered)
 

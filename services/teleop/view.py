@@ -23,10 +23,9 @@ from common.messages import (
 )
 from common.motion import Twist
 from common.settings import Log, LogLevel
-from common.text import printable
+from common.text import line, printable
 
 LINES = 40  # of the event log: more than a screen has
-SHOWN = 1000  # characters of a line: escaping 40 lines of 4000 delays the screen by 0.1 s
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +76,11 @@ class EventLog:
         An answer of safety comes twice, to the call and as an event.
         """
         t_ns = time.time_ns() if t_ns is None else t_ns
-        line = Line(t_ns, printable(service), level, printable(text[:SHOWN])[:SHOWN])
+        added = Line(t_ns, printable(service), level, line(text))
         with self._lock:
-            if self._lines and replace(self._lines[-1], t_ns=t_ns) == line:
+            if self._lines and replace(self._lines[-1], t_ns=t_ns) == added:
                 self._lines.pop()
-            self._lines.append(line)
+            self._lines.append(added)
 
     def lines(self) -> tuple[Line, ...]:
         """Return the lines, the newest last."""
