@@ -69,6 +69,8 @@ def active(session: BusSession, options: argparse.Namespace) -> list[dict[str, A
     if not counts:
         raise RobotError(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
     found = declarations(session.probe, session.robot)
+    if not found:
+        output.warn("t2 ls: the router shows no declarations (its admin space is closed)")
     return [
         {
             "key": short(key, session.robot),

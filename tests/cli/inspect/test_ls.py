@@ -2,7 +2,7 @@
 
 import pytest
 
-from cli.inspect import hz
+from cli.inspect import hz, ls
 from common import keys
 from common.bus.bus import Bus
 from common.bus.session import router
@@ -82,3 +82,13 @@ def test_silence_is_reported(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> Non
     assert (result.code, result.out) == (1, "")
     assert result.err.count("t2 hz: no new messages") > 2
     assert "no message on" in result.err
+
+
+def test_a_closed_admin_space_is_reported(
+    bridge: Bus, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ls, "ADMIN", "@/none/*/*/t2/v1/{robot}/**")
+    result = tool("ls", "--duration", "0.5")
+    assert result.code == 0
+    assert result.lines[0]["publishers"] == []
+    assert "the router shows no declarations" in result.err
