@@ -8,7 +8,7 @@ from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Link, Relay, Switches
 
-ENOUGH = 0.7  # of the requested rate: the poll halves its rate when answers are missing
+ENOUGH = 0.7  # of the requested rate: answers may be missing
 VELOCITY_HZ = 10.0  # sent unrequested; safety stops when it is older than 0.2 s
 ENOUGH_FRAMES = 700  # in a step of 10 s: 70 % of a good board's
 STRAY = 0.01  # of all frames: a rare damaged frame is noise on the cable
