@@ -1,6 +1,8 @@
 """Command-line options, exit codes and version that all programs of T2 share."""
 
 import argparse
+import re
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +20,7 @@ EXIT_CONFIG = 78  # EX_CONFIG: a restart does not help
 EXIT_LINK = 69  # EX_UNAVAILABLE: a port or an endpoint is taken
 NO_RESTART = (EXIT_CONFIG, EXIT_LINK)
 EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}  # of other errors: 1
+HINT = re.compile(r"(?<=`)t2 (call |doctor|drive|echo|estop|health|hz|ls|robots)\b[^`]*")
 WIDTH = 100  # characters, of a service's help
 
 
@@ -53,6 +56,11 @@ def source_words(options: argparse.Namespace) -> list[str]:
     return files + [word for text in options.sets for word in ("--set", text)]
 
 
+def with_options(text: str, words: Sequence[str]) -> str:
+    """Return the text with these options in each command of the bus, such as `t2 doctor`."""
+    return HINT.sub(lambda found: " ".join([found[0], *map(shlex.quote, words)]), text)
+
+
 def add_setting(parser: argparse.ArgumentParser, option: str, path: str, text: str) -> None:
     """Add an option for one setting; it has the effect of ``--set PATH=VALUE``."""
     parser.add_argument(
@@ -71,10 +79,12 @@ def run_program(
     """Run a program with its options and return its exit code, as for every service."""
     parser = argparse.ArgumentParser(prog=name, description=what)
     add_arguments(parser)
+    options = parser.parse_args(argv)
     try:
-        return run(parser.parse_args(argv))
+        return run(options)
     except RobotError as error:
-        print(printable(f"{name}: {error}", "\n"), file=sys.stderr)  # noqa: T201 - logs may not be set up yet
+        text = with_options(str(error), source_words(options) if "sets" in options else ())
+        print(printable(f"{name}: {text}", "\n"), file=sys.stderr)  # noqa: T201 - logs may not be set up yet
         return EXIT_CODES.get(type(error), 1)
 
 

@@ -1,10 +1,11 @@
 """Diagnosis of the path from the laptop to the wheels, from an observation of the bus. Pure.
 
 A finding is ``ok``, ``note`` (information, no effect), ``wrong``, or ``unknown`` because an earlier
-part of the path is wrong. A remedy is an instruction to the operator.
+part of the path is wrong. What follows from an earlier finding is no problem of its own: one cause
+gives one remedy, an instruction to the operator.
 """
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -13,14 +14,18 @@ from common.messages import Health, Link, Relay, SafetyState
 
 Level = Literal["ok", "note", "wrong", "unknown"]
 
-NEEDED = ("bridge", "safety", "odom")
+NEEDED = ("safety", "bridge", "odom")  # in the order of a request
 STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOMETRY)
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
 SPREAD_S = 0.2  # delay variation; half of safety's limit for the delay of a request
 
-START = "on the robot: `t2 up`, or start this service; if its process exists, it hangs: kill it"
+START = "on the robot: `t2 up`, or start what is missing; if its process exists, it hangs: kill it"
+STRANGER = (
+    "copy members.json to the router's computer and restart the router; if `t2 keys list` shows "
+    "that it is revoked, use another certificate"
+)
 UPDATE = "install the same version on both, and restart the robot's services"
 SILENT = "the board does not send it: check the board; `t2 hz` shows the rate"
 BOARD_LOST = "check the board's power and cable; the link recovers by itself"
@@ -62,13 +67,16 @@ CAUSES = {
     "unarmed": "see the link above: the bridge reports what it waits for",
     "limit_stop": f"clear the area; then release the controls and drive; {LIMIT}",
     "limit_silent": "start its program, check its network and certificate; see safety.limits",
-    "two_publishers": "stop one of the two programs; `t2 ls --services` lists them",
+    "two_publishers": "stop one of both: `t2 echo '@cmd/**' --json` shows boot and host of each",
     "blocked": "drive another way, or remove the obstacle",
     "limit": LIMIT,
     "sonar": "check the cable of a faulty one, or remove what covers it; it blocks its sector",
 }
 # Causes of normal operation, with or without a driver.
 NORMAL = ("release", "neutral", "obstacle", "blocked", "limit", "limit_stop")
+# Causes that follow from streams that are not sent, and from a bridge or a board that is not there.
+FROM_STREAMS = ("starting", "bumper", "silent", "bumper_lossy", "sonar")
+FROM_LINK = (*FROM_STREAMS, "link", "switches", "unarmed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +94,8 @@ class Observation:
     """Everything that the doctor has observed on the bus; paths are keys below the robot."""
 
     t2: str  # this laptop's version
+    stranger: str = ""  # the certificate of this laptop, if the router answers it nothing
+    listed: bool = True  # whether the router has listed the tokens in time
     instances: dict[str, int] = field(default_factory=dict)  # by service, from tokens
     others: list[str] = field(default_factory=list)  # other robots at the same router
     may_drive: bool | None = None
@@ -97,6 +107,10 @@ class Observation:
     links: list[Link] = field(default_factory=list)
     state: SafetyState | None = None  # the newest
 
+    def is_absent(self, service: str) -> bool:
+        """Return whether a service does not run, or hangs."""
+        return service not in self.healths or (self.listed and service not in self.instances)
+
     def sent_hz(self, path: str) -> float:
         """Return the rate at which a stream is sent, by its publisher's health; 0 if unknown."""
         publisher = self.healths.get(path.split("/")[1])
@@ -106,13 +120,24 @@ class Observation:
 
 def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
     """Return all findings from the services to the wheels, and safety's state last."""
+    if seen.stranger:
+        text = f"this router does not know {seen.stranger}"
+        yield Finding("rights", "wrong", text, STRANGER)
+        return
     if not seen.instances and seen.others:
         text = f"no service of robot {name} is here; the router knows {', '.join(seen.others)}"
         todo = "is it switched on, and its stack started? Otherwise correct --robot or robot.id"
         yield Finding("robot", "wrong", text, todo)
         return
-    for check in (services, versions, rights, clock, board, safety):
+    for check in (services, versions, rights, clock):
         yield from check(seen)
+    behind = list(board(seen))
+    yield from behind
+    wrong = {each.where for each in behind if each.level == "wrong"}
+    if wrong & {"relay", "link"} or seen.is_absent("bridge"):
+        yield from safety(seen, FROM_LINK)
+    else:
+        yield from safety(seen, FROM_STREAMS if "streams" in wrong else ())
 
 
 # --- from the laptop to the services --------------------------------------------------------------
@@ -120,21 +145,27 @@ def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
 
 def services(seen: Observation) -> Iterator[Finding]:
     """Report services that are missing, duplicate or hang."""
-    for name in sorted({*NEEDED, *seen.instances}):
-        count, health = seen.instances.get(name, 0), seen.healths.get(name)
-        if not count:
-            yield Finding("services", "wrong", f"{name} is not running", START)
-        elif count > 1 and name in NEEDED:
+    absent = [name for name in NEEDED if name not in seen.instances]
+    names = f"{', '.join(absent)} {'is' if len(absent) == 1 else 'are'}"
+    if absent and seen.listed:
+        yield Finding("services", "wrong", f"{names} not running", START)
+    elif absent:
+        text = f"{names} perhaps running: the router did not list the services in time"
+        yield Finding("services", "unknown", text)
+    present = [name for name in NEEDED if name in seen.instances]
+    for name in (*present, *sorted(seen.instances.keys() - NEEDED)):
+        count, health = seen.instances[name], seen.healths.get(name)
+        if count > 1 and name in NEEDED:
             todo = "stop one of them: a robot has one of each; look for a second `t2 up`"
             yield Finding("services", "wrong", f"{name} is running {count} times", todo)
-        elif not health:
+        elif not health and seen.rates:  # without any message see the rights
             text = f"{name} is running and publishes no health: it hangs"
             todo = "kill its process; its supervisor restarts it"
             yield Finding("services", "wrong", text, todo)
-        elif health.lateness > LATE_S:
+        elif health and health.lateness > LATE_S:
             text = f"{name} stalls for up to {health.lateness:.2f} s"
             yield Finding("services", "note", text, "find the processes that use its CPU")
-        else:
+        elif health:
             yield Finding("services", "ok", f"{name} is up for {health.uptime:.0f} s")
 
 
@@ -156,11 +187,13 @@ def rights(seen: Observation) -> Iterator[Finding]:
     allowed = {"driving": seen.may_drive, "calls": seen.may_call}
     barred = [name for name, may in allowed.items() if may is False]
     if not seen.instances:
-        text = "no service found, or the router's list lacks this certificate"
-        yield Finding("rights", "unknown", text)
+        yield Finding("rights", "unknown", "no service found")
     elif not seen.rates:
         text = "services run, but no message arrives"
-        todo = "the router's access rules do not allow this laptop to read: use another certificate"
+        todo = (
+            "the router's access rules do not allow this laptop to read: use another certificate; "
+            "if other laptops receive nothing either, all services hang: restart them"
+        )
         yield Finding("rights", "wrong", text, todo)
     elif barred:
         text = f"this laptop may read; safety does not receive its {' and '.join(barred)}"
@@ -201,6 +234,9 @@ def board(seen: Observation) -> Iterator[Finding]:
         return
     now = seen.links[-1]
     yield from relay(now.relay, seen.t2)
+    if now.relay and now.relay.state != "up" and now.state != "up":
+        yield Finding("link", "unknown", "no frame of the board without the relay")
+        return
     yield from link(now, seen.links[0])
     if now.state != "up":
         yield Finding("streams", "unknown", "no data without the board")
@@ -258,6 +294,8 @@ def streams(seen: Observation) -> Iterator[Finding]:
     A router downsamples streams for laptops, so their rate here is no evidence.
     """
     for topic in STREAMS:
+        if seen.is_absent(topic.path.split("/")[1]):
+            continue
         rate, sent_hz = seen.rates.get(topic.path, 0.0), seen.sent_hz(topic.path)
         if max(rate, sent_hz) < ENOUGH * topic.rate_hz:
             level: Level = "note" if rate else "wrong"
@@ -266,16 +304,25 @@ def streams(seen: Observation) -> Iterator[Finding]:
         elif not rate:
             text = f"{topic.path} is sent with {sent_hz:.0f} Hz and does not arrive here"
             todo = "the network or the router drops it: move closer to the access point"
-            yield Finding("streams", "wrong", text, todo)
+            yield Finding("network", "wrong", text, todo)
 
 
-def safety(seen: Observation) -> Iterator[Finding]:
-    """Report the causes in safety's state, with safety's texts; it judges the sensors."""
+def safety(seen: Observation, following: Container[str] = ()) -> Iterator[Finding]:
+    """Report the causes in safety's state, with safety's texts; it judges the sensors.
+
+    Those that are ``following`` from an earlier finding are folded into one note.
+    """
     state = seen.state
     if state is None:
         yield Finding("safety", "unknown", "safety publishes no state")
         return
+    folded = [cause.text for cause in state.causes if cause.name in following]
+    if folded:
+        text = f"follows from the above: {' '.join(folded)}"
+        yield Finding("safety", "note", text)
     for cause in state.causes:
+        if cause.name in following:
+            continue
         latched = cause.name in state.latched
         level: Level = "note" if cause.name in NORMAL else "wrong"
         if cause.name == "no_request":

@@ -20,7 +20,8 @@ from cli.inspect.diagnosis import NEEDED, Finding, Observation, diagnose
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
 from common import keys
 from common.bus.probe import Probe, probe
-from common.cli_args import VERSION
+from common.bus.session import common_name
+from common.cli_args import VERSION, source_words, with_options
 from common.codec import Sample
 from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
@@ -38,7 +39,7 @@ REFUSED = (
     "on the robot: is `t2 up` running? By default the router listens on its own host only; "
     "docs/security.md explains how to open it for laptops"
 )
-NO_ROUTE = "join the robot's Wi-Fi; then --set bus.connect=tcp/ROBOT:7447 with the robot's address"
+NO_ROUTE = "join the robot's Wi-Fi; then --set bus.connect={}/ROBOT:7447 with the robot's address"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,8 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print all findings; return 1 if something is wrong."""
-    wrong = 0
-    for finding in findings(settings(options), options.duration):
+    wrong, robot = 0, ["--robot", options.robot] if options.robot else []
+    for found in findings(settings(options), options.duration):
+        finding = replace(found, todo=with_options(found.todo, [*robot, *source_words(options)]))
         wrong += finding.level == "wrong"
         output.line(asdict(finding)) if options.json else print(as_text(finding), flush=True)
     if not options.json:
@@ -69,7 +71,7 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
         return
     try:
         with probe(config.bus) as opened:
-            seen = observe(opened, config.robot.id, seconds)
+            seen = observe(opened, config.bus, config.robot.id, seconds)
     except LinkError:
         text = "the endpoint accepts connections but is not a router"
         todo = "it hangs, requires TLS, or is not a router: restart it, or correct bus.connect"
@@ -97,13 +99,13 @@ def connect(endpoint: str, bus: BusSettings) -> Finding:
                 took_s = time.monotonic() - begin_s
                 trouble = handshake(plain, host, bus) if protocol == "tls" else ""
         except OSError as error:
-            trouble, todo = explain(error, host)
+            trouble, todo = explain(error, host, protocol)
     if trouble:
         return Finding("network", "wrong", f"{endpoint}: {trouble}", todo)
     return Finding("network", "ok", f"{endpoint} answers in {took_s * 1000:.1f} ms")
 
 
-def explain(error: OSError, host: str) -> tuple[str, str]:
+def explain(error: OSError, host: str, protocol: str) -> tuple[str, str]:
     """Return problem and remedy of a failed connection."""
     match error:
         case socket.gaierror():
@@ -111,8 +113,8 @@ def explain(error: OSError, host: str) -> tuple[str, str]:
         case ConnectionRefusedError():
             return "connection refused: the host is up, but nothing listens", REFUSED
         case TimeoutError():
-            return "no answer", NO_ROUTE
-    return (error.strerror or str(error)).lower(), NO_ROUTE
+            return "no answer", NO_ROUTE.format(protocol)
+    return (error.strerror or str(error)).lower(), NO_ROUTE.format(protocol)
 
 
 def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
@@ -137,14 +139,22 @@ def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
     return "the router closes the connection on this certificate"
 
 
-def observe(opened: Probe, robot: str, seconds: float) -> Observation:
+def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Observation:
     """Return the observation of one robot."""
     seen = Observation(t2=VERSION)
     listen(opened, robot, seconds, seen)
-    running = services(opened, "*")
-    seen.instances = Counter(service for name, service in running if name == robot)
+    running: list[tuple[str, str]] = []
+    try:
+        running = services(opened, "*")
+        seen.instances = Counter(service for name, service in running if name == robot)
+    except LinkError:
+        seen.listed = False
+        seen.instances = dict.fromkeys(seen.healths, 1)
     on_board = {name for name, service in running if service in NEEDED}
     seen.others = sorted(on_board - {robot})
+    if seen.listed and not running and not seen.rates:
+        # The rules allow all members to query the admin space, and nothing to anybody else.
+        seen.stranger = "" if opened.query("@/*/*") else common_name(bus)
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
         seen.may_call = opened.has_server(keys.RESET.on(robot))

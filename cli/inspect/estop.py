@@ -14,6 +14,7 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TextIO
 
 from cli.inspect import output
@@ -29,6 +30,7 @@ from common.text import printable
 TIMEOUT_S = 3.0  # without a router
 KEEPALIVE_S = 0.1
 SWITCH = "USE THE VEHICLE'S OWN SWITCH"
+BARRED = "A driver of this robot releases it (R in `t2 drive`): this certificate may not reset."
 MOVES = ("bridge", "safety")  # a robot without these services cannot move
 
 
@@ -65,30 +67,36 @@ def stop(client: SafetyClient, settings: Sequence[str] = ()) -> int:
     client.order_stop(robot)  # before anything else
     expected = {robot}
     if "*" in robot:
-        expected = {name for name, service in services(probe, robot) if service in MOVES}
+        with suppress(LinkError):  # without the list: until one robot at least has confirmed
+            expected = {name for name, service in services(probe, robot) if service in MOVES}
     # By name, too: a driver's certificate may allow its own robots only, not an expression.
     confirmed = client.stop(expected)
     missing = sorted(expected - confirmed)
     if missing == [robot]:
-        present = sorted({name for name, _ in services(probe, "*")})
-        if present and robot not in present:
-            seen = ", ".join(present)
-            output.warn(f"t2 estop: no such robot {robot} at this router (seen: {seen})")
-            return 1
-        if is_barred(probe, robot):
-            output.warn(
-                f"t2 estop: not allowed: this certificate has no right to stop robot {robot} "
-                "(as it seems: the router drops its commands)"
-            )
-    report(confirmed, missing, settings)
+        with suppress(LinkError):
+            present = sorted({name for name, _ in services(probe, "*")})
+            if present and robot not in present:
+                seen = ", ".join(present)
+                output.warn(f"t2 estop: no such robot {robot} at this router (seen: {seen})")
+                return 1
+            if is_barred(probe, robot):
+                output.warn(
+                    f"t2 estop: not allowed: this certificate has no right to stop robot {robot} "
+                    "(as it seems: the router drops its commands)"
+                )
+    may_reset = bool(confirmed) and probe.has_server(keys.RESET.on(robot))
+    report(confirmed, missing, settings, may_reset=may_reset)
     return 0 if confirmed and not missing else 1
 
 
-def report(confirmed: set[str], missing: Sequence[str], settings: Sequence[str]) -> None:
-    """Print each stopped robot, and a warning for each that does not confirm."""
+def report(
+    confirmed: set[str], missing: Sequence[str], settings: Sequence[str], *, may_reset: bool
+) -> None:
+    """Print each stopped robot with who may release it; warn of each that does not confirm."""
     for each in sorted(confirmed):
         release = shlex.join(["t2", "call", "safety/reset", "--robot", each, *settings])
-        print(f"Robot {each} is stopped. `{release}` releases it.")
+        how = f"`{release}` releases it." if may_reset else BARRED
+        print(f"Robot {each} is stopped. {how}")
     sys.stdout.flush()
     for each in missing:
         doctor = shlex.join(["t2", "doctor", "--robot", each, *settings])

@@ -94,8 +94,12 @@ class Probe:
         return [_answer(reply) for reply in replies if not is_timeout(reply)]
 
     def alive(self, expression: str, timeout_s: float = 2.0) -> list[str]:
-        """Return the current liveliness tokens."""
-        replies = self._session.liveliness().get(expression, timeout=timeout_s)
+        """Return the current liveliness tokens; raise ``LinkError`` if the list is incomplete."""
+        replies = list(self._session.liveliness().get(expression, timeout=timeout_s))
+        time.sleep(POLL_PERIOD_S)  # a lost link ends the query before it leaves this list
+        info = self._session.info
+        if any(map(is_timeout, replies)) or not (*info.routers_zid(), *info.peers_zid()):
+            raise LinkError("the router has not listed the services in time; run `t2 doctor`")
         return sorted(str(reply.ok.key_expr) for reply in replies if reply.ok)
 
     def has_reader(self, *of: str) -> bool:
@@ -128,7 +132,8 @@ def probe(where: BusSettings) -> Iterator[Probe]:
     else:
         raise LinkError(
             f"no router answers at {', '.join(where.endpoints)}: is `t2 up` running there? "
-            "Run `t2 doctor`, or choose another router: --set bus.connect=tcp/HOST:7447"
+            "Run `t2 doctor`, or choose another router: --set bus.connect="
+            f"{'tls' if where.certificate else 'tcp'}/HOST:7447"
         )
     with session:
         yield Probe(session)

@@ -3,6 +3,7 @@
 import contextlib
 import itertools
 import json
+import ssl
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -44,6 +45,9 @@ OPEN_MS = 4_000
 # of memory for each priority. Our messages are far smaller (``common/messages.py`` bounds them). A
 # router also forwards messages of others: an uncompressed image of 1920 x 1080 pixels has 6 MB.
 CLIENT_MAX, ROUTER_MAX = 8 * 2**20, 16 * 2**20
+# In a certificate, first the issuer's and then the subject's: object id 2.5.4.3, then a text as its
+# type, its length (one byte: at most 64) and its bytes. Python's `ssl` decodes no client's own.
+COMMON_NAME = b"\x06\x03\x55\x04\x03"
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 # Motions come in bursts, and each takes a batch because it is express. With Zenoh's two batches, up
 # to one in five bursts of eight lost its newest message on a busy machine.
@@ -180,6 +184,16 @@ def answers(where: BusSettings) -> bool:
             for reply in session.get(f"@/{zid}/*", timeout=where.probe_deadline)
         )
     return False
+
+
+def common_name(where: BusSettings) -> str:
+    """Return the common name in the certificate; empty without a certificate."""
+    try:
+        pem = Path(where.certificate).read_text(encoding="ascii") if where.certificate else ""
+        _, *_, subject = ssl.PEM_cert_to_DER_cert(pem).split(COMMON_NAME)
+        return subject[2 : 2 + subject[1]].decode()
+    except (OSError, ValueError):
+        return ""
 
 
 def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:

@@ -50,10 +50,12 @@ def test_command_lines(
         (ConfigError("a setting is wrong"), EXIT_CONFIG, "t2 config: a setting is wrong\n"),
         (LinkError("a port is taken"), EXIT_LINK, "t2 config: a port is taken\n"),
         (RobotError("something is missing"), 1, "t2 config: something is missing\n"),
+        (RobotError("`t2 doctor` or `t2 keys list`"), 1,
+         "t2 config: `t2 doctor --config 'a b.toml' --set x=1` or `t2 keys list`\n"),
         (KeyboardInterrupt(), 130, ""),  # before the command handles it
     ],
-)
-def test_errors_and_exit_codes(
+)  # fmt: skip
+def test_errors_with_commands_to_paste_and_exit_codes(
     error: BaseException,
     code: int,
     printed: str,
@@ -64,7 +66,7 @@ def test_errors_and_exit_codes(
         raise error
 
     monkeypatch.setattr("cli.settings.run", run)
-    assert main(["config"]) == code
+    assert main(["config", "--config", "a b.toml", "--set", "x=1"]) == code
     assert capsys.readouterr().err == printed
 
 

@@ -3,10 +3,12 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import msgspec
 import pytest
 
 from cli.inspect import diagnosis as d
 from cli.inspect.diagnosis import Finding, Observation, diagnose
+from common import keys
 from common import messages as m
 from services.safety.core.causes import RULES
 from tests import factories
@@ -119,10 +121,56 @@ def test_problems(given: dict[str, Any], expected: list[tuple[str, str, str]]) -
     assert problems(seen(**given)) == expected
 
 
-@pytest.mark.parametrize("lost", ["never", "lost"])
-def test_without_the_board_its_streams_are_unknown(lost: str) -> None:
-    reported = problems(seen(links=[link(lost)], rates={"tel/bridge/link": 10.0}))
-    assert [level for level, _, _ in reported] == ["wrong", "unknown"]
+def without(*services: str) -> dict[str, Any]:
+    """Return instances and healths without these services."""
+    names = [name for name in d.NEEDED if name not in services]
+    return {"instances": dict.fromkeys(names, 1), "healths": {n: health(n) for n in names}}
+
+
+STOPPED = {"rates": {"tel/bridge/link": 10.0}, "state": state("no_request", *d.FROM_LINK)}
+
+
+@pytest.mark.parametrize(
+    ("given", "problem", "remedy"),
+    [
+        (without("bridge") | STOPPED | {"links": []}, "bridge is not running", d.START),
+        ({"instances": dict.fromkeys(d.NEEDED, 1), "healths": without("bridge")["healths"],
+          "links": [], **STOPPED}, "bridge is running and publishes no health: it hangs", None),
+        (STOPPED | {"links": [link("lost")]}, "the board at 10.7.5.224:4002 is", d.BOARD_LOST),
+        (STOPPED | {"links": [link("never")]}, "no frame received from the board", None),
+        (STOPPED | {"links": [msgspec.structs.replace(relay("lost"), state="lost")]},
+         "the relay is silent", d.RELAY),
+        ({"rates": RATES | {"tel/bridge/bumper": 0.0}, "state": state("bumper", "silent")},
+         "tel/bridge/bumper has 0 of 50 Hz", d.SILENT),
+        (without("odom") | {"rates": RATES | {keys.ODOMETRY.path: 0.0}},
+         "odom is not running", d.START),
+        (without("safety") | {"state": None, "may_drive": None}, "safety is not running", d.START),
+        ({"rates": {}, "healths": {}, "links": [], "state": None},
+         "services run, but no message arrives", None),
+        ({"stranger": "driver.bob", "instances": {}}, "this router does not know driver.bob",
+         d.STRANGER),
+    ],
+)  # fmt: skip
+def test_one_cause_is_one_problem(given: dict[str, Any], problem: str, remedy: str | None) -> None:
+    wrong = [(text, todo) for level, text, todo in problems(seen(**given)) if level == "wrong"]
+    assert len(wrong) == 1, wrong
+    assert wrong[0][0].startswith(problem)
+    assert remedy in (None, wrong[0][1])
+
+
+def test_what_follows_is_folded_and_what_needs_a_reset_is_not() -> None:
+    latched = state("bumper", "contact", latched=("contact",))
+    reported = problems(seen(links=[link("lost")], state=latched))
+    assert [(level, text) for level, text, _ in reported[2:]] == [
+        ("note", "follows from the above: The bumper is not being read."),
+        ("wrong", "The bumper was hit. (brake, latched)"),
+    ]
+
+
+def test_services_that_the_router_did_not_list_are_unknown() -> None:
+    ((level, text, _),) = problems(seen(listed=False, instances={"odom": 1}))
+    assert level == "unknown"
+    assert text.startswith("safety, bridge are perhaps running: the router did not list")
 
 
 def test_without_messages_the_rest_is_unknown() -> None:
@@ -159,4 +207,4 @@ def test_streams_that_are_slow_missing_or_downsampled() -> None:
 
 def test_remedies_name_existing_causes() -> None:
     names = {rule.name for rule in RULES}
-    assert names >= d.CAUSES.keys() | {*d.NORMAL}
+    assert names >= d.CAUSES.keys() | {*d.NORMAL, *d.FROM_LINK}

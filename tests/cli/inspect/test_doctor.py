@@ -3,6 +3,8 @@
 On the real stack: ``tests/cli/test_on_stack.py``.
 """
 
+import json
+import signal
 import socket
 from collections.abc import Iterator
 from functools import partial
@@ -11,11 +13,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from cli.__main__ import main
 from cli.inspect import doctor
-from cli.inspect.diagnosis import START, Finding
+from cli.inspect.diagnosis import START, STRANGER, Finding, diagnose
 from cli.inspect.doctor import connect, findings
 from common import keys
 from common.bus.bus import Bus
+from common.bus.probe import probe
 from common.messages import Bumper
 from common.settings import BusSettings, Shared
 from tests.cli.inspect.tool import Result, Tool, pretend
@@ -47,6 +51,7 @@ def test_what_it_observes(buses: BusFixture, tool: Tool) -> None:
     assert ("rights", "ok", "this laptop may read, call and drive") in found
     assert ("services", "ok", "bridge is up for 60 s") in found
     assert ("services", "wrong", "odom is not running") in found
+    assert not any(level == "wrong" and "odom/odometry" in text for _, level, text in found)
     assert any(text.startswith("safety is running and publishes no") for *_, text in found)
     assert any(text.startswith("tel/bridge/link: ") for *_, text in found)
     assert any(where == "clock" and level == "ok" for where, level, _ in found)
@@ -69,7 +74,17 @@ def test_one_reachable_endpoint_is_enough_and_services_may_be_missing() -> None:
         first, second, *rest = findings(config, 0.1)
     assert (first.level, first.todo) == ("note", doctor.REFUSED)
     assert (second.where, second.level) == ("network", "ok")
-    assert [each.todo for each in rest if each.level == "wrong"] == [START] * 3
+    assert [each.todo for each in rest if each.level == "wrong"] == [START]
+
+
+def test_services_that_a_slow_router_does_not_list_are_not_missing() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    where = at(endpoint)
+    with router_process(endpoint) as router, probe(where) as opened:
+        router.send_signal(signal.SIGSTOP)
+        seen = doctor.observe(opened, where, "001", 0.1)
+    assert not seen.listed
+    assert "wrong" not in {each.level for each in diagnose(seen, "001")}
 
 
 def test_an_endpoint_that_is_not_a_router(capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,6 +127,29 @@ def driver_at(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[BusSet
 def first(member: BusSettings, endpoint: str) -> Finding:
     """Return the finding of the network."""
     return next(findings(Shared(bus=connecting(member, endpoint)), 0.1))
+
+
+def test_an_unknown_certificate_and_hints_with_the_options(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    site = Site(tmp_path / "keys")
+    robot = site.member("robot", "001", "--address", "127.0.0.1")
+    site.member("driver", "anna", "--robot", "001")
+    with site.router(robot) as (endpoint, _):
+        site.member("driver", "bob", "--robot", "001")  # unknown to the running router
+
+        def found(name: str) -> list[tuple[str, str]]:
+            file = site.folder / f"driver.{name}" / "bus.toml"
+            words = ["--config", str(file), "--set", f"bus.connect={endpoint}"]
+            main(["doctor", "--json", "--duration", "0.2", *words])
+            lines = map(json.loads, capsys.readouterr().out.splitlines())
+            return [(line["text"], line["todo"]) for line in lines if line["level"] == "wrong"]
+
+        capsys.readouterr()
+        ((text, todo),) = found("bob")
+        assert text.startswith("this router does not know driver.bob.")
+        assert todo == STRANGER
+        assert found("anna") == [("safety, bridge, odom are not running", START)]
 
 
 def test_certificates(driver_at: tuple[BusSettings, str], tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_silence(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     for words in (("tel/none", "--duration", "0.3"), ("tel/none", "--once")):
         result = tool("echo", *words)
         assert (result.code, result.out) == (1, "")
-        assert f"no message on t2/v1/{tool.robot}/tel/none within 0.3 s; `t2 ls`" in result.err
+        assert f"no message on t2/v1/{tool.robot}/tel/none within 0.3 s; `t2 ls --set" in result.err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
