@@ -19,6 +19,7 @@ from common.settings import protocol
 
 PATIENCE_S = 5.0  # children of a killed supervisor may still be stopping the vehicle
 LOOK_S = 0.1
+ABSENT = "this computer does not have this address"
 KINDS = {"udp": "udp", "quic": "udp", "unixsock-stream": "unix"}  # of other protocols: tcp
 
 
@@ -68,8 +69,8 @@ def claimed(ports: Sequence[Port], patience_s: float = PATIENCE_S) -> ExitStack:
     with ExitStack() as claims:
         for port in ports:
             while reason := _taken(port, claims):
-                if time.monotonic() > end_s:
-                    raise LinkError(f"{port}: {reason}; {_advice(port)}")
+                if time.monotonic() > end_s or reason == ABSENT:
+                    raise LinkError(f"{port}: {reason}; {_advice(port, reason)}")
                 time.sleep(LOOK_S)
         return claims.pop_all()
 
@@ -84,6 +85,8 @@ def _taken(port: Port, claims: ExitStack) -> str:
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             return "used by another program"
+        if error.errno == errno.EADDRNOTAVAIL:
+            return ABSENT
         return f"cannot be bound: {error.strerror}"
     return ""
 
@@ -108,7 +111,10 @@ def _connect(port: Port) -> None:
     raise OSError(errno.EADDRINUSE, "used by another program")
 
 
-def _advice(port: Port) -> str:
+def _advice(port: Port, reason: str) -> str:
+    if reason == ABSENT:
+        setting = port.setting.replace("listen_ports", "listen_address")
+        return f"`ip -brief address` lists its own: configure the interface, or correct {setting}"
     if port.setting == "bus.listen":
         return (
             "is a stack already running? `t2 up --no-router` uses the running router, and "

@@ -27,6 +27,7 @@ from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 MOTIONS = 8  # queue length
 LATE_NS = round(1.5 * TICK_S * NS_PER_S)  # of a tick after a stall
+REMIND_S = 10  # between two warnings of a board that has not sent yet
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 # Bounds of the histograms: 10 us to 1 s, four a decade.
 BOUNDS_NS = tuple(round(10_000 * 10 ** (step / 4)) for step in range(21))
@@ -80,6 +81,7 @@ class Bridge:
         self._reactions = {"reflex": Histogram(), "judged_stop": Histogram()}
         self._core = Core(node.config, node.bus.boot, node.counters, clock.now_ns())
         self._ticked_ns = clock.now_ns()
+        self._unheard_s = 0  # without a first frame of the board
         self._unsent = False  # whether the system did not send the last order, a BRAKE
         self._publishers: dict[str, Publisher[Any]] = {
             "velocity": drive.publisher(keys.VELOCITY),
@@ -161,6 +163,11 @@ class Bridge:
         if sockets.send_errors > counters["send_errors"]:
             text = "the system refuses to send to the board"
             self._node.log.warning(text, count=sockets.send_errors, error=sockets.last_error)
+        self._unheard_s = self._unheard_s + 1 if self._core.readiness.link == "never" else 0
+        if self._unheard_s % REMIND_S == REMIND_S // 2:
+            board = self._node.config.board
+            text = f"no frame from {board.address}:{board.port} yet; run `t2 doctor`"
+            self._node.log.warning(text, listening=f"{board.listen_address} {board.listen_ports}")
         rejected["wrong_address"] = sockets.refused
         counters["send_errors"] = sockets.send_errors
         self._do(self._core.second())

@@ -97,7 +97,7 @@ def _bind(address: str, port: int) -> socket.socket:
         sock.close()
         hint = {
             errno.EADDRINUSE: "another program has it; is a bridge running already?",
-            errno.EADDRNOTAVAIL: "this host has no such address; see board.listen_address",
+            errno.EADDRNOTAVAIL: "this host has no such address (ip -brief address)",
         }.get(error.errno or 0, error.strerror)
         raise LinkError(f"cannot listen on UDP {address}:{port}: {hint}") from None
     return sock

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -24,6 +25,7 @@ from services.bridge.config import BridgeConfig
 from tests.bridge.conftest import BridgeFixture, bridge_command
 from verification.harness.bus import bus_on, running
 from verification.harness.fake_board import Board, board
+from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 
@@ -158,6 +160,18 @@ def test_a_killed_supervisor_leaves_a_vehicle_that_was_braked() -> None:
         ended(made, guard)
         made.wait_for(MotionKind.BREAK)
         assert made.times[-1] - killed_s < 5.0
+
+
+def test_a_board_that_has_not_sent_is_reported_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = [f"board.listen_ports={free_port(socket.SOCK_DGRAM)}"]
+    node = Node("bridge", load(BridgeConfig, Sources(environ={}, sets=sets)))
+    bridge, texts = Bridge(node), []
+    monkeypatch.setattr(node.log, "warning", lambda text, **_: texts.append(text))
+    for _ in range(15):
+        bridge._on_second(0)
+    assert texts == ["no frame from 127.0.0.1:4003 yet; run `t2 doctor`"] * 2
+    bridge._sockets.close()
+    node.close()
 
 
 def test_a_bug_of_ours_leaves_a_break() -> None:

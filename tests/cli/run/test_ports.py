@@ -62,6 +62,12 @@ def test_a_taken_port_is_named_with_advice(kind: str, setting: str) -> None:
             claimed([each], 0.0)
 
 
+def test_an_address_of_another_computer_is_no_taken_port() -> None:
+    port = Port("udp", "192.0.2.1", 4002, "board.listen_ports")
+    with pytest.raises(LinkError, match=r"`ip -brief address` .* correct board.listen_address"):
+        claimed([port])  # without waiting for anything
+
+
 def test_ports_of_a_killed_stack_are_awaited() -> None:
     with contextlib.ExitStack() as leaving:
         number = leaving.enter_context(held(socket.SOCK_DGRAM))
