@@ -9,7 +9,7 @@ from pathlib import Path
 from cli.commission import stop_command
 from cli.commission.report import Report, Row, Verdict, render
 from cli.commission.session import CheckoutSession, checkout_session
-from cli.commission.steps import STEPS, Step, prompt, show
+from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
 from cli.inspect.diagnosis import NEEDED
 from cli.settings import Everything
 from common import keys
@@ -105,15 +105,21 @@ def guide(report: Report, steps: Sequence[Step], session: CheckoutSession) -> No
 
 def verdict(step: Step, session: CheckoutSession) -> Verdict:
     """Run a step until the operator accepts its verdict, or skip it with a reason."""
-    if reason := prompt("Press Enter to begin, or type a reason to skip:"):
+    if reason := choice("Press Enter to begin, or type a reason to skip:"):
         return Verdict("skipped", reason)
     while True:
         found = step.run(session)
         show(f"{found.outcome}: {found.text}")
-        if found.outcome == "passed" or prompt(
+        if found.outcome == "passed" or choice(
             "Press Enter to try again, or type any word to continue:"
         ):
             return found
+
+
+def choice(question: str) -> str:
+    """Return one line; a phrase that was typed too early or too late counts as Enter."""
+    typed = prompt(question)
+    return "" if typed.casefold() in (PHRASE, RESET_PHRASE) else typed
 
 
 def now() -> str:

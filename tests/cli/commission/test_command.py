@@ -1,0 +1,39 @@
+"""Dialogue of ``t2 checkout``; on a real stack: ``tests/cli/test_on_stack.py``."""
+
+from typing import Any
+
+import pytest
+
+from cli.commission import command, steps
+from cli.commission.report import Verdict, failed
+from cli.commission.steps import PHRASE, RESET_PHRASE, Step, confirm
+
+SESSION: Any = None
+NOT_CONFIRMED = failed("Not confirmed: no motion was requested.")
+DRIVEN = Verdict("passed", "The wheels turned.")
+
+
+def drive(_: object) -> Verdict:
+    return DRIVEN if confirm("The wheels will turn.", PHRASE) else NOT_CONFIRMED
+
+
+@pytest.mark.parametrize(
+    ("typed", "found"),
+    [
+        (["", PHRASE], DRIVEN),
+        (["no room"], Verdict("skipped", "no room")),
+        ([PHRASE.upper(), PHRASE], DRIVEN),  # too early: it begins, and is asked for
+        ([RESET_PHRASE, PHRASE], DRIVEN),
+        (["", "wheel", "", PHRASE], DRIVEN),
+        (["", "", PHRASE, PHRASE], DRIVEN),  # too late: it tries again
+        (["", "", "next"], NOT_CONFIRMED),
+    ],
+)
+def test_the_phrase_neither_skips_nor_continues(
+    typed: list[str], found: Verdict, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = iter(typed)
+    for module in (command, steps):
+        monkeypatch.setattr(module, "prompt", lambda _: next(answers))
+    assert command.verdict(Step("forward", "Forward", "", drive), SESSION) == found
+    assert list(answers) == []
