@@ -11,9 +11,10 @@ from cli.commission.report import Report, Row, Verdict, render
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
 from cli.inspect.diagnosis import NEEDED
+from cli.inspect.session import one_robot, robot_sources
 from cli.settings import Everything
 from common import keys
-from common.cli_args import VERSION, add_sources, sources
+from common.cli_args import VERSION, add_sources
 from common.config import Loaded, load
 from common.errors import ConfigError, RobotError
 
@@ -41,12 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", type=Path, metavar="FILE", help="out/checkout-ROBOT-DATE.md by default"
     )
+    parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
     add_sources(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the steps and write the report; return 0 if all passed and the operator signed."""
-    loaded = load(Everything, sources(options))
+    loaded = load(Everything, robot_sources(options))
     if options.part:
         if options.only or options.report:
             raise ConfigError("stop: has no steps and no report")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cli.commission.stops import DIRECTIONS, Stop, Streams, find_stops
 from cli.inspect import output
+from cli.inspect.addressing import chunks
 from cli.recordings.info import open_recording
 from cli.settings import Everything
 from common import keys
@@ -28,7 +29,7 @@ def run(options: argparse.Namespace, config: Everything) -> int:
         raise ConfigError(
             "stop: name at least one recording: start `t2 record` on the robot, drive and stop"
         )
-    stops, left_out = read(options.files)
+    stops, left_out = read(options.files, options.robot)
     rows = [as_cells(number, stop, config.safety) for number, stop in enumerate(stops, 1)]
     passed, lines = verdict(stops, config.safety)
     print(output.table(HEAD, rows), "", sep="\n")
@@ -38,19 +39,22 @@ def run(options: argparse.Namespace, config: Everything) -> int:
     return 0 if passed else 1
 
 
-def read(files: Sequence[Path]) -> tuple[list[Stop], Counter[str]]:
+def read(files: Sequence[Path], robot: str | None) -> tuple[list[Stop], Counter[str]]:
     """Return the stops of all recordings, and why others are left out.
 
-    Raise ``RobotError`` without any.
+    Raise ``RobotError`` without any, and for several robots: ``robot`` chooses one.
     """
+    robots: set[str] = set()
     stops: dict[tuple[int, int], Stop] = {}
     left_out: Counter[str] = Counter()
     for file in files:
-        found, reasons = find_stops(read_streams(file), file.name)
+        found, reasons = find_stops(read_streams(file, robot, robots), file.name)
         left_out += reasons
         for stop in found:
             left_out["in two recordings"] += stop.command in stops
             stops.setdefault(stop.command, stop)
+    if len(robots) > 1:
+        raise RobotError(f"recordings of {', '.join(sorted(robots))}: choose one with --robot")
     if not stops:
         raise RobotError(
             f"no stop to measure: a STOP or BRAKE from a steady speed, until standstill "
@@ -59,12 +63,19 @@ def read(files: Sequence[Path]) -> tuple[list[Stop], Counter[str]]:
     return list(stops.values()), +left_out
 
 
-def read_streams(file: Path) -> Streams:
-    """Return the messages of one recording; raise ``RobotError`` if it shows no stops."""
+def read_streams(file: Path, robot: str | None, robots: set[str]) -> Streams:
+    """Return a robot's messages in one recording, and add its robots to ``robots``.
+
+    Raise ``RobotError`` if it shows no stops.
+    """
     streams = Streams()
     with open_recording(file) as reader:
         for entry in reader:
-            if entry.kind in KINDS and (message := entry.message) is not None:
+            name = chunks(entry.key)[0]
+            if entry.kind not in KINDS or robot not in (None, name):
+                continue
+            if (message := entry.message) is not None:
+                robots.add(name)
                 streams.add(message)
     if streams.problem:
         raise RobotError(f"{file}: {streams.problem}")

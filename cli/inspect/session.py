@@ -13,7 +13,7 @@ from common import codec, keys
 from common.bus.probe import Answer, Probe, probe
 from common.cli_args import add_sources, sources
 from common.codec import Sample
-from common.config import load
+from common.config import Sources, load
 from common.errors import MessageError
 from common.settings import Shared
 
@@ -69,12 +69,17 @@ def positive(text: str) -> float:
     return number
 
 
-def settings(options: argparse.Namespace) -> Shared:
-    """Return the effective shared settings; ``--robot`` with one name sets ``robot.id``."""
+def robot_sources(options: argparse.Namespace) -> Sources:
+    """Return the sources of settings; ``--robot`` with one name sets ``robot.id``."""
     given = sources(options)
     if options.robot and "*" not in options.robot:
         given = replace(given, sets=(*given.sets, f"robot.id={options.robot}"))
-    return load(Shared, given).config
+    return given
+
+
+def settings(options: argparse.Namespace) -> Shared:
+    """Return the effective shared settings."""
+    return load(Shared, robot_sources(options)).config
 
 
 @contextmanager

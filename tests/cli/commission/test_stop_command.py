@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from cli.__main__ import main
 from cli.commission.stops import Streams
@@ -23,14 +24,19 @@ PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
 CAREFUL = ("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5")
 
 
-def record(path: Path, streams: Streams) -> Path:
+def record(path: Path, *robots: Streams) -> Path:
+    """Record the streams of robot 001, and of 002."""
     messages: list[tuple[str, Message]] = [
-        (key, each) for name, key in PATHS.items() for each in getattr(streams, name)
+        (f"t2/v1/00{number}/{key}", each)
+        for number, streams in enumerate(robots, 1)
+        for name, key in PATHS.items()
+        for each in getattr(streams, name)
     ]
     writer = RecordingWriter(path, Encoder(Vehicle()))
     for key, each in sorted(messages, key=lambda one: one[1].mono_ns):
         at_s = each.mono_ns / NS_PER_S
-        writer.write(bare(key, codec.encode(each), codec.encoding(type(each)), at_s))
+        one = bare("", codec.encode(each), codec.encoding(type(each)), at_s)
+        writer.write(replace(one, key=key))
     writer.write(bare("tel/mine", b"\xc1", at_s=at_s))
     writer.close()
     return path
@@ -106,6 +112,14 @@ def test_a_stop_in_two_recordings_counts_once(
     printed = capsys.readouterr().out
     assert printed.count("a.mcap") == 5
     assert "Left out: 5 in two recordings.\n" in printed
+
+
+def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    merged = str(record(tmp_path / "two.mcap", driven(0.3, -0.3), driven(0.5, first_s=11.0)))
+    assert main(["checkout", "stop", merged]) == 1
+    assert "recordings of 001, 002: choose one with --robot" in capsys.readouterr().err
+    assert main(["checkout", "stop", merged, "--robot", "001", *CAREFUL]) == 0
+    assert capsys.readouterr().out.count("two.mcap") == 2
 
 
 def test_what_it_cannot_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
