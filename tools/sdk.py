@@ -1,19 +1,24 @@
 """The generated modules of the client library ``sdk/``: messages with their keys, and client."""
 
 import ast
+import re
+import textwrap
 from pathlib import Path
 from types import ModuleType
 
 from common import client, keys, messages
+from services.safety.core.causes import RULES
 
-SDK = Path(__file__).parent.parent / "sdk" / "t2"
+ROOT = Path(__file__).parent.parent
+SDK = ROOT / "sdk" / "t2"
+EVENTS = re.compile(r"^\| [\w, ]+ \| (`.*`) \| (?:info|warning|error)", re.MULTILINE)
 HEAD = '''"""Messages and keys; generated from the stack's own by ``make docs``, do not edit.
 
 Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
 forward, y left, counter-clockwise positive. Readers ignore unknown fields.
 """
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -33,7 +38,7 @@ from t2.messages import Drive, ReleaseRequest, ResetDone, ResetRequest, SafetySt
 def generated() -> dict[Path, str]:
     """Return the text of each generated module."""
     return {
-        SDK / "messages.py": f"{HEAD}\n{_body(messages)}{_keys()}",
+        SDK / "messages.py": f"{HEAD}\n{_named(_body(messages))}{_keys()}",
         SDK / "client.py": CLIENT_HEAD + _body(client),
     }
 
@@ -47,6 +52,34 @@ def _body(module: ModuleType) -> str:
         if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
             del lines[node.lineno - 1 : node.end_lineno]
     return "".join(lines).strip("\n") + "\n"
+
+
+def _named(body: str) -> str:
+    """Return the messages with the names of causes and events, for type checkers."""
+    page = (ROOT / "docs" / "operations.md").read_text("utf-8")
+    events = {name for cell in EVENTS.findall(page) for name in re.findall(r"\w+", cell)}
+    names = {"CauseName": [rule.name for rule in RULES], "EventName": sorted(events)}
+    typed = "".join(
+        f"    {kind} = Literal[\n{_wrapped(each)}\n    ]  # fmt: skip\n"
+        for kind, each in names.items()
+    )
+    plain = "".join(f"    {kind} = Name\n" for kind in names)
+    body = body.replace(
+        "Few = Meta(",
+        "# Type checkers know the names. A message with a newer name is decoded all the same.\n"
+        f"if TYPE_CHECKING:\n{typed}else:\n{plain}\nFew = Meta(",
+        1,
+    )
+    body = body.replace("latched: Annotated[tuple[Name", "latched: Annotated[tuple[CauseName")
+    for kind, name in (("Cause", "CauseName"), ("Event", "EventName")):
+        head, found, rest = body.partition(f"\nclass {kind}(")
+        body = head + found + rest.replace("    name: Name\n", f"    name: {name}\n", 1)
+    return body
+
+
+def _wrapped(names: list[str]) -> str:
+    text = " ".join(f'"{name}",' for name in names)
+    return textwrap.fill(text, 99, initial_indent=" " * 8, subsequent_indent=" " * 8)
 
 
 def _keys() -> str:

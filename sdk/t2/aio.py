@@ -76,7 +76,24 @@ class AsyncStream(Generic[M]):
 
     def __init__(self, stream: Stream[M]) -> None:
         self.stream = stream
+        self.key = stream.key
         self.latest = awaited(stream.latest)
+        self.on = stream.on  # the function is called in a thread
+
+    @property
+    def newest(self) -> M | None:
+        """The newest message received; None before the first one, or before the first use."""
+        return self.stream.newest
+
+    @property
+    def age(self) -> float:
+        """Time in s since the newest message was received; infinite before the first one."""
+        return self.stream.age
+
+    @property
+    def invalid(self) -> int:
+        """The number of messages that do not have the topic's type."""
+        return self.stream.invalid
 
     async def __aiter__(self) -> AsyncIterator[M]:
         with self.stream.reading() as queue:
@@ -102,8 +119,23 @@ class AsyncDrive:
 
     def __init__(self, drive: Drive) -> None:
         self._drive = drive
-        self.velocity, self.check = drive.velocity, drive.check  # they return at once
+        self.source = drive.source
+        # They return at once.
+        self.velocity, self.check = drive.velocity, drive.check
+        self.cancel, self.uncancel = drive.cancel, drive.uncancel
         self.forward, self.turn = self._motion(drive.forward), self._motion(drive.turn)
+        self.arc, self.follow = self._motion(drive.arc), self._motion(drive.follow)
+        self.goto = self._motion(drive.goto)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether requests are sent, or will be."""
+        return self._drive.is_open
+
+    @property
+    def obeyed(self) -> bool:
+        """Whether the vehicle follows these requests now."""
+        return self._drive.obeyed
 
     async def __aenter__(self) -> "AsyncDrive":
         try:
@@ -158,6 +190,7 @@ class AsyncRobot:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
+        self.name, self.endpoint = robot.name, robot.endpoint
         self.odometry = AsyncStream(robot.odometry)
         self.safety = AsyncStream(robot.safety)
         self.velocity = AsyncStream(robot.velocity)
@@ -167,7 +200,9 @@ class AsyncRobot:
         self.switches = AsyncStream(robot.switches)
         self.link = AsyncStream(robot.link)
         self.events = AsyncStream(robot.events)
+        self.close = awaited(robot.close)
         self.limit = awaited(robot.limit)
+        self.keepalive = awaited(robot.keepalive)
         self.reset = awaited(robot.reset)
         self.release = awaited(robot.release)
         self.set_pose = awaited(robot.set_pose)

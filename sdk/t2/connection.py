@@ -3,6 +3,7 @@
 import importlib
 import json
 import os
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import zenoh
 
 from t2.errors import LinkError
 from t2.robot import Robot
-from t2.stream import CONNECTED, check_process
+from t2.stream import CONNECTED, check_process, robots_of
 
 LOCAL = "tcp/127.0.0.1:7447"
+SOURCE_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")  # in Zenoh's errors
+SCHEMES = ("tcp/", "tls/", "unixsock-stream/")
 TIMEOUT_MS = 3_000
 MAX_MESSAGE = 8 * 2**20  # larger ones are dropped; the messages of T2 are far smaller
 FILES = {
@@ -22,31 +25,62 @@ FILES = {
 }
 
 
-def connect(robot: str = "001", *, endpoint: str = "", config: str | Path | None = None) -> Robot:
+def connect(robot: str = "", *, endpoint: str = "", config: str | Path | None = None) -> Robot:
     """Connect to the router of a robot; close the result, or use it in ``with``.
 
-    ``endpoint`` is a Zenoh endpoint, by default ``tcp/127.0.0.1:7447``. ``config`` is a settings
-    file of T2 with ``[bus]``, such as the ``bus.toml`` in a folder that ``t2 keys`` made. Raises
-    ``LinkError``.
+    ``robot`` is its id; it may be left out while the router has only one. ``endpoint`` is a Zenoh
+    endpoint, by default ``tcp/127.0.0.1:7447``. ``config`` is a settings file of T2 with ``[bus]``,
+    such as the ``bus.toml`` in a folder that ``t2 keys`` made. Raises ``LinkError``.
 
     >>> with t2.connect("001", endpoint=ENDPOINT) as robot:
     ...     print(robot.bumper.latest().pressed)
     False
     """
-    if not robot or set(robot) & set("/*$#?"):
+    if set(robot) & set("/*$#?"):
         raise LinkError(f"{robot!r} is not the id of one robot, such as 001")
+    session, address = open_session(endpoint, config)
+    return Robot(session, robot or only_robot(session, address), address)
+
+
+def robots(endpoint: str = "", *, config: str | Path | None = None) -> list[str]:
+    """Return the ids of the robots at a router, for ``connect``; arguments and errors as there.
+
+    >>> t2.robots(ENDPOINT)
+    ['001']
+    """
+    session, _ = open_session(endpoint, config)
+    with session:
+        return robots_of(session)
+
+
+def only_robot(session: zenoh.Session, address: str) -> str:
+    """Return the id of the only robot at a router; close the session and raise without one."""
+    names = robots_of(session)
+    if len(names) == 1:
+        return names[0]
+    session.close()
+    found = f"has the robots {', '.join(names)}" if names else "has no robot"
+    raise LinkError(f'the router at {address} {found}: name one, as in t2.connect("001")')
+
+
+def open_session(endpoint: str, config: str | Path | None) -> tuple[zenoh.Session, str]:
+    """Return a session, and the address of its router."""
     bus = read(Path(config)) if config else {}
     check_process()
     CONNECTED.add(os.getpid())
-    endpoints = [endpoint] if endpoint else bus.get("connect") or [LOCAL]
+    addresses = [endpoint] if endpoint else bus.get("connect") or [LOCAL]
+    for address in addresses:
+        if not address.startswith(SCHEMES):
+            known = ", ".join(SCHEMES)
+            raise LinkError(f"{address!r} needs a protocol of {known}: {SCHEMES[0]}{address}")
     try:
-        session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings(endpoints, bus))))
+        made = zenoh.open(zenoh.Config.from_json5(json.dumps(settings(addresses, bus))))
     except zenoh.ZError as error:
         raise LinkError(
-            f"no router answers at {', '.join(endpoints)}: is `t2 up` running there? "
-            "`t2 doctor` finds the reason"
+            f"no router answers at {', '.join(addresses)}: is `t2 up` running there? "
+            f"`t2 doctor` finds the reason. Zenoh: {SOURCE_PLACE.sub('', str(error))}"
         ) from error
-    return Robot(session, robot, endpoints[0])
+    return made, addresses[0]
 
 
 def read(file: Path) -> dict[str, Any]:

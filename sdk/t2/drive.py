@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import zenoh
@@ -11,7 +11,7 @@ import zenoh
 from t2.client import Contest, request
 from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, Stopped, T2Error
 from t2.messages import Odometry, SafetyState
-from t2.motion import STILL, Straight, Target, Turn, finite
+from t2.motion import STILL, Arc, Motion, OnStop, Path, Straight, Target, Turn, finite
 from t2.publisher import FRESH_S, PERIOD_S, DrivePublisher
 from t2.stream import check_process
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the first one
 READY_S = 2.0  # from the first neutral request until we are in control
 PATIENCE_S = 3.0  # without progress
+SPEED, TURN_SPEED = 0.3, 0.5  # m/s, rad/s, of motions
 STANDING = 0.02  # m/s and rad/s
 CLOSED = "this drive is closed, or not entered yet: use `with robot.drive(...) as drive`"
 PASSING = {"no_request", "blocked"}  # stops that end without a neutral request
@@ -37,9 +38,17 @@ class Drive:
     dies, safety stops the vehicle within its lease. After an error the drive requests zero for
     good, and each method raises it: open another one.
 
+    A motion ends with the pose and its covariance, and waits for standstill. It raises ``Blocked``
+    after ``patience`` s without progress. When safety stops the vehicle with a cause that wants a
+    neutral request, ``on_stop="raise"`` raises ``Stopped``; ``"wait"`` sends the neutral request
+    and goes on after the stop. A latched cause always raises.
+
     >>> with robot.drive("nav") as drive:
-    ...     drive.forward(0.1)  # m
-    ...     drive.turn(-math.pi / 8)  # rad
+    ...     pose = drive.forward(0.1)  # m
+    ...     pose = drive.turn(-math.pi / 8, on_stop="wait")  # rad
+    ...     pose = drive.arc(0.5, math.pi / 8)  # m, rad
+    ...     pose = drive.follow([(0.3, 0.0), (0.3, 0.3)])  # m in odom
+    ...     pose = drive.goto(0.2, 0.2, heading=0.0)  # m, m, rad in odom
     ...     drive.velocity(-0.1, 0.2, seconds=0.5)  # m/s, rad/s; returns at once
     ...     time.sleep(0.2)  # something else
     ...     drive.check()
@@ -64,6 +73,19 @@ class Drive:
     def is_open(self) -> bool:
         """Whether requests are sent, or will be."""
         return not self._ended.is_set()
+
+    @property
+    def obeyed(self) -> bool:
+        """Whether the vehicle follows these requests now: safety names the source, and no stop."""
+        state = self._robot.safety.newest
+        return (
+            self.is_open
+            and self._error is None
+            and state is not None
+            and self._robot.safety.age <= FRESH_S
+            and state.source == self.source
+            and state.verdict in {"run", "slow"}
+        )
 
     def __enter__(self) -> "Drive":
         """Start with neutral requests; return once safety would let this source drive.
@@ -127,16 +149,23 @@ class Drive:
     # --- motions ------------------------------------------------------------------------------
 
     def velocity(
-        self, linear: float, angular: float = 0.0, *, seconds: float | None = None
+        self,
+        linear: float,
+        angular: float = 0.0,
+        *,
+        seconds: float | None = None,
+        on_stop: OnStop = "raise",
     ) -> None:
         """Request m/s and rad/s until changed, or for some seconds; return at once.
 
         Open loop: a program that waits for something else keeps driving.
         """
         end_s = math.inf if seconds is None else time.monotonic() + finite(seconds)
-        target = Target(finite(linear), finite(angular), end_s)
+        target = Target(finite(linear), finite(angular), end_s, on_stop)
         self.check()
         self._end_cancelled()
+        self._error = self._error or self._stop_of(target)
+        self._raise()
         self._target = target
 
     def stop(self) -> None:
@@ -144,18 +173,77 @@ class Drive:
         self.velocity(0.0)
         self._until(lambda pose: abs(pose.linear) < STANDING and abs(pose.angular) < STANDING)
 
-    def forward(self, distance: float, speed: float = 0.3, patience: float = PATIENCE_S) -> None:
-        """Drive straight for a distance in m, negative backward, by odometry; wait for the end.
+    def forward(
+        self,
+        distance: float,
+        speed: float = SPEED,
+        patience: float = PATIENCE_S,
+        *,
+        on_stop: OnStop = "raise",
+    ) -> Odometry:
+        """Drive straight for a distance in m, negative backward."""
+        return self._go(Straight(self._pose(), distance, speed), patience, on_stop)
 
-        Raises ``Blocked`` after ``patience`` s without progress, and what else stops the vehicle.
+    def turn(
+        self,
+        angle: float,
+        speed: float = TURN_SPEED,
+        patience: float = PATIENCE_S,
+        *,
+        on_stop: OnStop = "raise",
+    ) -> Odometry:
+        """Turn on the spot by an angle in rad, positive to the left; ``speed`` in rad/s."""
+        return self._go(Turn(self._pose(), angle, speed), patience, on_stop)
+
+    def arc(
+        self,
+        radius: float,
+        angle: float,
+        speed: float = SPEED,
+        patience: float = PATIENCE_S,
+        *,
+        on_stop: OnStop = "raise",
+    ) -> Odometry:
+        """Drive forward along a circle of ``radius`` m by an angle in rad, positive to the left."""
+        return self._go(Arc(self._pose(), radius, angle, speed), patience, on_stop)
+
+    def follow(
+        self,
+        points: Iterable[tuple[float, float]],
+        speed: float = SPEED,
+        patience: float = PATIENCE_S,
+        *,
+        on_stop: OnStop = "raise",
+    ) -> Odometry:
+        """Drive forward along straight lines through points (x, y) in ``odom``, m.
+
+        It cuts corners by up to 0.2 m, and turns on the spot where the next line is not ahead.
         """
-        self._go(Straight(self._robot.odometry.latest(), distance, speed), patience)
+        return self._go(Path(self._pose(), points, speed, TURN_SPEED), patience, on_stop)
 
-    def turn(self, angle: float, speed: float = 0.5, patience: float = PATIENCE_S) -> None:
-        """Turn on the spot by an angle in rad, positive to the left; else as ``forward``."""
-        self._go(Turn(self._robot.odometry.latest(), angle, speed), patience)
+    def goto(
+        self,
+        x: float,
+        y: float,
+        heading: float | None = None,
+        speed: float = SPEED,
+        patience: float = PATIENCE_S,
+        *,
+        on_stop: OnStop = "raise",
+    ) -> Odometry:
+        """Drive to a place in ``odom``, m, straight there; then turn to a heading in rad."""
+        if heading is not None:
+            finite(heading)  # before it drives
+        pose = self.follow([(x, y)], speed, patience, on_stop=on_stop)
+        if heading is None:
+            return pose
+        angle = math.remainder(heading - pose.heading, math.tau)
+        return self.turn(angle, patience=patience, on_stop=on_stop)
 
-    def _go(self, motion: "Straight | Turn", patience: float) -> None:
+    def _pose(self) -> Odometry:
+        return self._robot.odometry.latest()
+
+    def _go(self, motion: Motion, patience: float, on_stop: OnStop) -> Odometry:
         """Follow a motion until little is left; raise ``Blocked`` without progress."""
         patience, least, progress_s = finite(patience), math.inf, time.monotonic()
 
@@ -164,12 +252,15 @@ class Drive:
             left = motion.left(pose)
             if left <= motion.near:
                 return True
-            if left < least - motion.near:
-                least, progress_s = left, time.monotonic()
+            linear, angular = motion.velocity(pose, left)
+            is_turning = linear == 0 and abs(pose.angular) > STANDING  # on the spot, within a path
+            state = self._robot.safety.latest()
+            is_waiting = on_stop == "wait" and is_stopped(state)
+            if left < least - motion.near or is_turning or is_waiting:
+                least, progress_s = min(left, least), time.monotonic()
             elif time.monotonic() - progress_s > patience:
-                state = self._robot.safety.latest()
                 raise Blocked(f"the vehicle does not get on: {state.text}", state.causes)
-            self.velocity(*motion.velocity(pose, left))
+            self.velocity(linear, angular, on_stop=on_stop)
             return False
 
         try:
@@ -177,6 +268,7 @@ class Drive:
         finally:
             self._target = STILL
         self.stop()
+        return self._pose()
 
     def _until(self, arrived: Callable[[Odometry], bool]) -> None:
         stream = self._robot.odometry
@@ -240,7 +332,9 @@ class Drive:
         if cancelled or time.monotonic() >= target.end_s:
             target = STILL
         self._error = self._error or self._trouble(target)
-        if self._error is not None:
+        state = self._robot.safety.newest
+        # In a stop that is waited for, each request is the neutral one that safety wants after it.
+        if self._error is not None or (state is not None and is_stopped(state)):
             target = STILL
         self._publisher.tick(request(target.linear, target.angular))
         self._sent += 1
@@ -250,19 +344,29 @@ class Drive:
         state = safety.newest
         if state is None or safety.age > FRESH_S:
             return NoData("safety is silent, and the vehicle stops; see `t2 doctor`")
-        if state.latched:
-            return Latched.of(state)
+        self._contest.tick(state, requests=target.moves)
+        if stop := self._stop_of(target):
+            return stop
         if self._publisher.denied:
             return NotAllowed(
                 f"the router drops the requests of {self.source!r}: this certificate may not drive "
                 f"robot {self._robot.name} as this source; see `t2 keys list`"
             )
-        self._contest.tick(state, requests=target.moves)
-        if target.moves and not self._contest.other and is_stopped(state):
-            return Stopped(f"{state.text} Open another drive to go on.", state.causes)
         if self._contest.is_lost:
             return Overruled(str(self._contest.other))
         return None
+
+    def _stop_of(self, target: Target) -> Stopped | None:
+        """Return the stop that ends this drive if it requests this now."""
+        state = self._robot.safety.newest
+        if state is None:
+            return None
+        if state.latched:
+            return Latched.of(state)
+        is_raised = target.moves and target.on_stop == "raise" and not self._contest.other
+        if not (is_raised and is_stopped(state)):
+            return None
+        return Stopped(f"{state.text} Open another drive to go on.", state.causes)
 
 
 def is_stopped(state: SafetyState) -> bool:

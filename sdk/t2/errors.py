@@ -13,7 +13,7 @@ class LinkError(T2Error):
     """No router answers, or the settings of the connection are invalid."""
 
 
-class NoData(T2Error, TimeoutError):
+class NoData(T2Error):
     """No message arrived in time."""
 
 
@@ -33,16 +33,23 @@ class Overruled(T2Error):
     """Another source drives; ``by`` is its name."""
 
     def __init__(self, by: str) -> None:
-        super().__init__(f"overruled by {by}, which has a higher priority")
+        super().__init__(by)  # the arguments, so that it survives pickling
         self.by = by
+
+    def __str__(self) -> str:
+        return f"overruled by {self.by}, which has a higher priority"
 
 
 class Stopped(T2Error):
     """Safety stops the vehicle; ``causes`` are the reasons, the worst first."""
 
     def __init__(self, text: str, causes: Sequence[Cause]) -> None:
-        super().__init__(text)
+        super().__init__(text, causes)
+        self.text = text
         self.causes = tuple(causes)
+
+    def __str__(self) -> str:
+        return self.text
 
 
 class Latched(Stopped):

@@ -4,7 +4,7 @@ Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-10
 forward, y left, counter-clockwise positive. Readers ignore unknown fields.
 """
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from msgspec import Meta, Struct
 
@@ -34,6 +34,30 @@ Number = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 MAX_TEXT = 4000
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Name = Annotated[str, Meta(max_length=200)]
+# Type checkers know the names. A message with a newer name is decoded all the same.
+if TYPE_CHECKING:
+    CauseName = Literal[
+        "contact", "estop", "estop_reader", "estop_keepalive", "predecessor", "runaway",
+        "uncommanded_motion", "not_stopping", "driver_left", "driver_right", "flapping", "leaving",
+        "starting", "link", "switches", "bumper", "silent", "unarmed", "limit_stop",
+        "limit_silent", "two_publishers", "neutral", "blocked", "no_request", "release",
+        "bumper_lossy", "limit", "obstacle", "sonar",
+    ]  # fmt: skip
+    EventName = Literal[
+        "barred", "black_box", "black_box_lost", "board_restarted", "cmd_vel_refused", "contact",
+        "disk_full", "disk_room", "drive_link_lost", "drive_link_up", "driver_fault", "estop",
+        "estop_denied", "estop_keepalive", "estop_reader", "estop_unconfirmed", "flapping",
+        "gamepad", "gamepad_silent", "guard_gone", "link_lost", "link_up", "overruled",
+        "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
+        "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
+        "release_refused", "reset", "reset_refused", "reset_unconfirmed", "runaway",
+        "second_authority", "silent", "slip", "slip_over", "source", "stop", "switches_unverified",
+        "terminal_slow", "uncommanded_motion", "unheard", "velocity_back",
+    ]  # fmt: skip
+else:
+    CauseName = Name
+    EventName = Name
+
 Few = Meta(max_length=128)
 Counts = Annotated[dict[Name, int], Few]
 
@@ -154,7 +178,7 @@ class Odometry(Message, frozen=True, kw_only=True):
 class Cause(Struct, frozen=True, kw_only=True):
     """One reason why the vehicle may not move as asked."""
 
-    name: Name
+    name: CauseName
     action: Action
     age: Number  # s since it became active
     text: Text  # text for the operator
@@ -207,7 +231,7 @@ class SafetyState(Message, frozen=True, kw_only=True):
     """Safety's decision and its causes."""
 
     verdict: Verdict
-    latched: Annotated[tuple[Name, ...], Few]  # names of the causes that need a reset
+    latched: Annotated[tuple[CauseName, ...], Few]  # names of the causes that need a reset
     causes: Annotated[tuple[Cause, ...], Few]  # all active ones, the worst first
     source: Name | None  # the driving source
     limits: Limits
@@ -268,7 +292,7 @@ class Motion(Message, frozen=True, kw_only=True):
 class Event(Message, frozen=True, kw_only=True):
     """A transition: contact, stop, release, fault, board restarted, link lost."""
 
-    name: Name
+    name: EventName
     level: Level
     text: Text
     about: Annotated[dict[Name, Text | int | Number | bool | None], Few] = {}

@@ -1,7 +1,9 @@
 """Motions by odometry: how much is left, and which velocity to request. Pure."""
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import Literal, NamedTuple, Protocol
 
 from t2.messages import MAX_NUMBER, Odometry
 
@@ -9,6 +11,10 @@ ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towa
 SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
 NEAR, NEAR_TURN = 0.01, 0.02  # m, rad: of the end
 KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
+AHEAD = 0.3  # m along a path, of the point that is aimed at
+FACING, TURNED = 0.8, 0.1  # rad: off the aim, a path is left for a turn on the spot, until turned
+
+OnStop = Literal["raise", "wait"]
 
 
 class Target(NamedTuple):
@@ -17,6 +23,7 @@ class Target(NamedTuple):
     linear: float  # m/s
     angular: float  # rad/s
     end_s: float = math.inf  # monotonic time
+    on_stop: OnStop = "raise"
 
     @property
     def moves(self) -> bool:
@@ -25,6 +32,18 @@ class Target(NamedTuple):
 
 
 STILL = Target(0.0, 0.0)
+
+
+class Motion(Protocol):
+    """A motion by odometry; ``near`` is the distance from the end, in m or rad, that is enough."""
+
+    near: float
+
+    def left(self, pose: Odometry) -> float:
+        """Return how much is left; called for each pose."""
+
+    def velocity(self, pose: Odometry, left: float) -> tuple[float, float]:
+        """Return the velocity to request: m/s, rad/s."""
 
 
 class Straight:
@@ -71,6 +90,72 @@ class Turn:
         return 0.0, self._sign * slowing(left, self._speed, TURNING, SLOWEST_TURN)
 
 
+class Arc(Turn):
+    """An angle in rad along a circle of this radius in m, positive to the left; forward."""
+
+    near = NEAR
+
+    def __init__(self, start: Odometry, radius: float, angle: float, speed: float) -> None:
+        super().__init__(start, angle, speed)
+        self._radius = positive(radius, "radius")
+
+    def left(self, pose: Odometry) -> float:
+        """Return the distance that is left, m; call it for each pose."""
+        return super().left(pose) * self._radius
+
+    def velocity(self, _: Odometry, left: float) -> tuple[float, float]:
+        """Return the velocity to request: m/s, rad/s."""
+        linear = slowing(left, self._speed, ACCELERATION, SLOWEST)
+        return linear, self._sign * linear / self._radius
+
+
+class Path:
+    """Straight lines from the start through points in ``odom``, m; pure pursuit."""
+
+    near = NEAR
+
+    def __init__(
+        self, start: Odometry, points: Iterable[tuple[float, float]], speed: float, turning: float
+    ) -> None:
+        self._speed, self._turning = positive(speed), positive(turning)
+        corners = [(start.x, start.y), *((finite(x), finite(y)) for x, y in points)]
+        self._lines = [(a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b]
+        self._is_turning = False
+
+    def left(self, pose: Odometry) -> float:
+        """Return the distance that is left along the lines, m; call it for each pose."""
+        while self._lines:
+            left = self._left_of_line(pose)
+            if left > 0:
+                return left + sum(length for *_, length in self._lines[1:])
+            del self._lines[0]  # passed
+        return 0.0
+
+    def _left_of_line(self, pose: Odometry) -> float:
+        (ax, ay), (bx, by), length = self._lines[0]
+        return ((bx - pose.x) * (bx - ax) + (by - pose.y) * (by - ay)) / length
+
+    def _aim(self, pose: Odometry) -> tuple[float, float]:
+        """Return the point ``AHEAD`` along the lines, or the last one."""
+        ahead = AHEAD + self._lines[0][2] - self._left_of_line(pose)
+        for (ax, ay), (bx, by), length in self._lines:
+            if ahead < length:
+                return ax + (bx - ax) * ahead / length, ay + (by - ay) * ahead / length
+            ahead -= length
+        return self._lines[-1][1]
+
+    def velocity(self, pose: Odometry, left: float) -> tuple[float, float]:
+        """Return the velocity to request: m/s, rad/s."""
+        x, y = self._aim(pose)
+        off = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
+        self._is_turning = abs(off) > (TURNED if self._is_turning else FACING)
+        if self._is_turning:
+            return 0.0, math.copysign(slowing(abs(off), self._turning, TURNING, SLOWEST_TURN), off)
+        linear = slowing(left, self._speed * math.cos(off), ACCELERATION, SLOWEST)
+        curvature = 2 * math.sin(off) / max(math.dist((x, y), (pose.x, pose.y)), AHEAD)
+        return linear, linear * curvature
+
+
 def slowing(left: float, speed: float, deceleration: float, slowest: float) -> float:
     """Return the speed at this distance from the end."""
     return max(slowest, min(speed, math.sqrt(2 * deceleration * max(left, 0.0))))
@@ -83,10 +168,9 @@ def finite(number: float) -> float:
     return float(number)
 
 
-def positive(speed: float) -> float:
-    """Return a speed likewise; raise ``ValueError`` for one that is not positive, too."""
-    if not 0 < speed < math.inf:
-        raise ValueError(
-            f"speed must be positive, not {speed}; a negative distance drives backward"
-        )
-    return finite(speed)
+def positive(number: float, what: str = "speed") -> float:
+    """Return a number likewise; raise ``ValueError`` for one that is not positive, too."""
+    if not 0 < number < math.inf:
+        hint = "; a negative distance drives backward" if what == "speed" else ""
+        raise ValueError(f"{what} must be positive, not {number}{hint}")
+    return finite(number)

@@ -50,12 +50,17 @@ class SourcePublisher:
         """Whether safety is there, but the router does not pass our messages on to it."""
         return self._access.is_denied
 
+    @property
+    def matches(self) -> bool:
+        """Whether the router announces a subscriber of safety for our messages."""
+        return bool(self._publisher.matching_status.matching)
+
     def put(self, message: SourceMessage) -> None:
         """Send a message; its header and echo are filled in."""
         state = self._safety.newest
         if state is not None and state is not self._seen:
             self._seen = state
-            self._access.received(state, bool(self._publisher.matching_status.matching))
+            self._access.received(state, self.matches)
         filled = msgspec.structs.replace(
             message,
             seq=next(self._seqs),

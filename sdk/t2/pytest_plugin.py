@@ -1,20 +1,36 @@
 """The pytest fixture ``t2_robot``, loaded by pytest itself when t2-sdk is installed."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, Literal
 
 import pytest
 
-from t2.robot import Robot
-from t2.sim import sim
+from t2.sim import SimulatedRobot, sim
+
+Scope = Literal["session", "package", "module", "class", "function"]
 
 
-@pytest.fixture
-def t2_robot() -> Iterator[Robot]:
-    """Yield a simulated robot that is ready to drive; ``t2.sim`` has options.
+def robot_fixture(
+    world: str = "empty",
+    *,
+    sets: Sequence[str] = (),
+    configs: Sequence[str | Path] = (),
+    command: str = "t2",
+    scope: Scope = "function",
+) -> Callable[..., Any]:
+    """Return a fixture that yields a simulated robot; ``t2.sim`` explains the options.
 
-    >>> def test_lap(t2_robot):
-    ...     with t2_robot.drive("nav") as drive:
-    ...         drive.forward(1.0)
+    >>> office = robot_fixture("office", scope="module")  # in conftest.py
+    >>> def test_patrol(office): ...
     """
-    with sim() as robot:
-        yield robot
+
+    @pytest.fixture(scope=scope)
+    def robot() -> Iterator[SimulatedRobot]:
+        with sim(world, sets=sets, configs=configs, command=command) as it:
+            yield it
+
+    return robot
+
+
+t2_robot = robot_fixture()

@@ -17,13 +17,14 @@ from t2.client import (
 )
 from t2.drive import Drive
 from t2.errors import NoData, NotAllowed, NotConfirmed, Refused
-from t2.limit import SpeedLimit
 from t2.messages import ROOT, TOPICS
 from t2.motion import finite
 from t2.publisher import PERIOD_S, DrivePublisher
 from t2.stream import Stream, check_process
+from t2.third_party import Keepalive, SpeedLimit
 
 A = TypeVar("A", bound=msgspec.Struct)
+R = TypeVar("R", bound="Robot")
 
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
@@ -55,6 +56,7 @@ class Robot:
         self._session = session
         self._drives: list[Drive] = []
         self._limits: dict[str, SpeedLimit] = {}
+        self._keepalives: dict[str, Keepalive] = {}
         self._streams: list[Stream[Any]] = []
         self.odometry: Stream[m.Odometry] = self._stream("odometry")
         self.safety: Stream[m.SafetyState] = self._stream("safety")
@@ -66,7 +68,7 @@ class Robot:
         self.link: Stream[m.Link] = self._stream("link")
         self.events: Stream[m.Event] = self._stream("events", EVENTS_DEPTH, service="*")
 
-    def __enter__(self) -> "Robot":
+    def __enter__(self: R) -> R:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -77,8 +79,8 @@ class Robot:
         check_process()
         for drive in self._drives:
             drive.close()
-        for limit in self._limits.values():
-            limit.end()
+        for each in (*self._limits.values(), *self._keepalives.values()):
+            each.end()
         for stream in self._streams:
             stream.close()
         self._session.close()
@@ -117,6 +119,20 @@ class Robot:
             self._limits[source] = SpeedLimit(self._session, key, source, self.safety)
         self._limits[source].set(linear, angular, reason, seconds=seconds)
         return self._limits[source]
+
+    def keepalive(self, source: str, *, seconds: float) -> Keepalive:
+        """Keep the emergency stop of this name alive, as a pendant, for some seconds from now.
+
+        A thread repeats the sign of life; call this, or the keepalive's ``renew``, in a loop. The
+        end of the program, of the link or of the loop lets safety brake and latch, after
+        ``safety.estop_keepalive_timeout``. Returns once safety's state shows it as alive;
+        ``safety.estop_keepalive`` must list the name. Raises as ``limit``.
+        """
+        if source not in self._keepalives or self._keepalives[source].has_ended:
+            key = self._key("estop_keepalive", source=source)
+            self._keepalives[source] = Keepalive(self._session, key, source, self.safety)
+        self._keepalives[source].renew(seconds=seconds)
+        return self._keepalives[source]
 
     # --- stopping -----------------------------------------------------------------------------
 

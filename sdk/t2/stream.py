@@ -18,9 +18,16 @@ from t2.messages import ROOT, Message
 M = TypeVar("M", bound=Message)
 
 LIVE_S = 0.5  # for the list of robots
+CHECK_S = 0.1  # whether a subscription is closed
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
 logger = logging.getLogger(__name__)
 CONNECTED = set[int]()  # this process, or the one that it was forked from, once it has connected
+
+
+def robots_of(session: zenoh.Session) -> list[str]:
+    """Return the ids of the robots with a running service."""
+    tokens = session.liveliness().get(f"{ROOT}/*/live/**", timeout=LIVE_S)
+    return sorted({str(it.ok.key_expr).split("/")[2] for it in tokens if it.ok is not None})
 
 
 def check_process() -> None:
@@ -83,35 +90,20 @@ class Stream(Generic[M]):
                 return self._newest
         raise NoData(f"no {self._what} within {timeout:g} s on {self.key}: {self._advice()}")
 
-    def on(self, handle: Callable[[M], object]) -> threading.Thread:
-        """Call a function with the newest message, in a thread of its own, until the robot closes.
+    def on(self, handle: Callable[[M], object]) -> "Subscription":
+        """Call a function with the newest message, in a thread of its own; return the subscription.
 
-        A slow function skips messages. Its exceptions are logged, and the next message is handled.
+        It ends with its ``close``, or with the robot. A slow function skips messages. Its
+        exceptions are logged, and the next message is handled.
         """
-        reading = ExitStack()
-        queue = reading.enter_context(self.reading())  # now: no message before the thread is missed
-
-        def run() -> None:
-            with reading:
-                for message in self._messages(queue):
-                    try:
-                        handle(message)
-                    except Exception:
-                        logger.exception("handler of %s", self.key)
-
-        thread = threading.Thread(target=run, name=f"t2 {self._what}", daemon=True)
-        thread.start()
-        return thread
+        return Subscription(self, handle)
 
     def __iter__(self) -> Iterator[M]:
         with self.reading() as queue:
-            yield from self._messages(queue)
-
-    def _messages(self, queue: "deque[M]") -> Iterator[M]:
-        while not self.closed:
-            message = self.after(queue, 1.0)
-            if message is not None:
-                yield message
+            while not self.closed:
+                message = self.after(queue, 1.0)
+                if message is not None:
+                    yield message
 
     @contextmanager
     def reading(self) -> Iterator["deque[M]"]:
@@ -149,13 +141,12 @@ class Stream(Generic[M]):
         """Return what to do about silence; another robot's name is a frequent reason."""
         mine = self.key[len(ROOT) + 1 :].partition("/")[0]
         try:
-            tokens = self._session.liveliness().get(f"{ROOT}/*/live/**", timeout=LIVE_S)
-            robots = {str(it.ok.key_expr).split("/")[2] for it in tokens if it.ok is not None}
+            names = robots_of(self._session)
         except zenoh.ZError:  # the session is closed
             return ADVICE
-        if not robots or mine in robots:
+        if not names or mine in names:
             return ADVICE
-        return f"no robot {mine} at this router, which has {', '.join(sorted(robots))}"
+        return f"no robot {mine} at this router, which has {', '.join(names)}"
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         try:
@@ -168,3 +159,42 @@ class Stream(Generic[M]):
             for queue in self._queues:
                 queue.append(message)
             self._changed.notify_all()
+
+
+class Subscription:
+    """The calls of ``Stream.on``; use it in ``with``, or ``close`` it.
+
+    >>> with robot.odometry.on(lambda pose: print(pose.x)):  # doctest: +SKIP
+    ...     time.sleep(1)
+    """
+
+    def __init__(self, stream: Stream[M], handle: Callable[[M], object]) -> None:
+        self._closed = threading.Event()
+        reading = ExitStack()
+        queue = reading.enter_context(stream.reading())  # now: no message before the thread is lost
+
+        def run() -> None:
+            with reading:
+                while not (self._closed.is_set() or stream.closed):
+                    message = stream.after(queue, CHECK_S)
+                    if message is None or self._closed.is_set():
+                        continue
+                    try:
+                        handle(message)
+                    except Exception:
+                        logger.exception("handler of %s", stream.key)
+
+        self._thread = threading.Thread(target=run, name=f"t2 {stream.key}", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> "Subscription":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the calls; one that runs is waited for, unless it closes the subscription itself."""
+        self._closed.set()
+        if threading.current_thread() is not self._thread:
+            self._thread.join()

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from common.source import DriveSource
 from sim.requests import Bumper, Sonar
 from tests.sdk.library_robot import blocked
 from verification.harness.bus import bus_on, running
-from verification.harness.stack import RunningStack
+from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.timed
@@ -81,6 +82,25 @@ def test_a_distance_and_a_turn_of_numpy_numbers(robot: t2.Robot) -> None:
     robot.set_pose(np.float64(0.5))
 
 
+def test_arcs_and_paths_end_at_their_places(robot: t2.Robot) -> None:
+    robot.set_pose()
+    with robot.drive("nav") as drive:
+        pose = drive.arc(0.5, math.pi / 2)
+        assert (pose.x, pose.y) == pytest.approx((0.5, 0.5), abs=0.1)
+        assert pose.heading == pytest.approx(math.pi / 2, abs=0.1)
+        assert len(pose.pose_covariance) == 9
+        pose = drive.follow([(0.5, 1.0), (np.float64(1.2), 1.0)])
+        assert (pose.x, pose.y) == pytest.approx((1.2, 1.0), abs=0.1)
+        pose = drive.goto(0.6, 0.8, heading=0.0)
+        assert (pose.x, pose.y) == pytest.approx((0.6, 0.8), abs=0.1)
+        assert pose.heading == pytest.approx(0.0, abs=0.1)
+        assert drive.goto(pose.x, pose.y).seq > pose.seq
+        with pytest.raises(ValueError, match="only finite"):
+            drive.goto(0.0, 0.0, math.nan)
+        with pytest.raises(ValueError, match="radius must be positive"):
+            drive.arc(-1.0, 1.0)
+
+
 def test_a_velocity_ends_by_itself_or_with_the_drive(robot: t2.Robot) -> None:
     with robot.drive("nav") as drive:
         drive.velocity(np.float64(0.2), seconds=np.float64(0.6))
@@ -102,7 +122,7 @@ def test_what_is_no_finite_number_is_refused(robot: t2.Robot) -> None:
                 move(text)
         with pytest.raises(ValueError, match="speed must be positive"):
             drive.forward(1.0, speed=-0.3)
-    with pytest.raises(ValueError, match="not negative"):
+    with pytest.raises(ValueError, match="not be negative"):
         robot.limit("detector", linear=-1.0, seconds=1)
     call: Any = robot.limit
     with pytest.raises(TypeError, match="seconds"):
@@ -198,7 +218,7 @@ def test_a_limit_slows_the_vehicle_down_for_its_seconds(robot: t2.Robot) -> None
 
 def test_an_unexpected_error_ends_drive_and_limit_and_frees_their_sources(robot: t2.Robot) -> None:
     limit = robot.limit("detector", linear=0.3, seconds=60)
-    limit._limit = None  # type: ignore[assignment]
+    limit._message = None  # type: ignore[assignment]
     wait_until(lambda: limit.has_ended, "the end of the limit")
     robot.limit("detector", linear=0.2, seconds=60).end()
     with robot.drive("nav") as drive:
@@ -271,6 +291,52 @@ def test_a_protective_stop_is_raised_and_the_next_drive_sends_a_neutral_request(
     with robot.drive("nav") as drive:
         drive.velocity(0.2)
         await_motion(robot)
+
+
+def test_a_motion_waits_for_the_end_of_a_protective_stop(robot: t2.Robot) -> None:
+    start = robot.odometry.latest()
+    stopped: list[bool] = []
+
+    def stop_for_a_while() -> None:
+        await_motion(robot)
+        limit = robot.limit("detector", linear=0.0, seconds=60)
+        wait_until(lambda: abs(robot.velocity.latest().linear) < 0.02, "standstill")
+        stopped.append(drive.obeyed)
+        time.sleep(0.5)
+        limit.set(None, seconds=60)
+
+    with robot.drive("nav") as drive:
+        stopping = threading.Thread(target=stop_for_a_while)
+        stopping.start()
+        pose = drive.forward(0.6, patience=0.3, on_stop="wait")
+        stopping.join()
+        assert stopped == [False]
+        assert math.dist((start.x, start.y), (pose.x, pose.y)) == pytest.approx(0.6, abs=0.1)
+        drive.velocity(0.1, on_stop="wait")
+        wait_until(lambda: drive.obeyed, "an obeyed request")
+        robot.limit("detector", linear=0.0, seconds=60)
+        wait_until(lambda: not drive.obeyed, "the stop")
+        drive.check()
+        with pytest.raises(t2.Stopped):
+            drive.velocity(0.1)
+    robot.limit("detector", seconds=0.1).end()
+
+
+def test_a_keepalive_is_confirmed_and_its_end_latches(tmp_path: Path) -> None:
+    with (
+        running_stack(tmp_path, sets=['safety.estop_keepalive=["pendant"]']) as stack,
+        t2.connect("001", endpoint=stack.endpoint) as robot,
+    ):
+        robot.safety.latest(timeout=20.0)
+        with pytest.raises(t2.NotAllowed, match="it lists pendant"):
+            robot.keepalive("other", seconds=1)
+        pendant = robot.keepalive("pendant", seconds=60)
+        (shown,) = robot.safety.latest().estop_keepalives
+        assert shown.alive
+        assert robot.keepalive("pendant", seconds=60) is pendant
+        wait_until(lambda: not blocked(robot), "a vehicle that may drive")
+        pendant.renew(seconds=0.2)  # and then the program hangs
+        wait_until(lambda: robot.safety.latest().latched == ("estop_keepalive",), "the latch")
 
 
 def test_a_drive_is_entered_once_and_alone(robot: t2.Robot) -> None:

@@ -88,7 +88,8 @@ def test_a_handler_that_fails_is_called_again_until_the_robot_closes(
         if len(seen) == 1:
             raise ValueError("the first one")
 
-    thread: threading.Thread = robot.stream.on(handle)
+    robot.stream.on(handle)
+    (thread,) = (each for each in threading.enumerate() if each.name == f"t2 {KEY}")
 
     def twice() -> bool:
         robot.put(time.monotonic())
@@ -117,10 +118,47 @@ def test_a_handler_gets_a_message_that_comes_before_its_thread(
     wait_until(lambda: seen, "the message")
 
 
-@pytest.mark.parametrize("name", ["", "*", "001/**"])
+def test_a_closed_subscription_calls_no_more(robot: Robot) -> None:
+    closed: list[float] = []
+    other: list[float] = []
+    with (
+        robot.stream.on(lambda velocity: closed.append(velocity.linear)) as subscription,
+        robot.stream.on(lambda velocity: other.append(velocity.linear)),
+    ):
+        robot.put_until_received(1.0)
+        wait_until(lambda: closed and other, "both calls")
+        subscription.close()
+        robot.put_until_received(2.0)
+        wait_until(lambda: 2.0 in other, "the other call")
+    assert set(closed) == {1.0}
+
+
+@pytest.mark.parametrize("name", ["*", "001/**"])
 def test_an_id_of_several_robots_is_refused(name: str) -> None:
     with pytest.raises(t2.LinkError, match="not the id of one robot"):
         t2.connect(name)
+
+
+def test_an_id_may_be_left_out_with_one_robot(endpoint: str) -> None:
+    with zenoh.open(client_config(at(endpoint))) as session:
+        with pytest.raises(t2.LinkError, match="has no robot: name one"):
+            t2.connect(endpoint=endpoint)
+        tokens = [session.liveliness().declare_token("t2/v1/007/live/bridge/1")]
+        wait_until(lambda: t2.robots(endpoint) == ["007"], "the robot")
+        with t2.connect(endpoint=endpoint) as robot:
+            assert robot.name == "007"
+        tokens.append(session.liveliness().declare_token("t2/v1/008/live/bridge/1"))
+        wait_until(lambda: t2.robots(endpoint) == ["007", "008"], "both robots")
+        with pytest.raises(t2.LinkError, match="has the robots 007, 008: name one"):
+            t2.connect(endpoint=endpoint)
+
+
+def test_an_endpoint_needs_a_protocol_and_the_reason_of_zenoh_is_kept() -> None:
+    with pytest.raises(t2.LinkError, match=r"'robot:7447' needs a protocol.*: tcp/robot:7447"):
+        t2.connect("001", endpoint="robot:7447")
+    with pytest.raises(t2.LinkError, match=r"Zenoh: [^/]*\[.*127\.0\.0\.1:9.*\]") as refused:
+        t2.connect("001", endpoint="tcp/127.0.0.1:9")
+    assert "/zenoh/src/" not in str(refused.value)
 
 
 def test_tls_files_go_into_the_settings_of_zenoh() -> None:

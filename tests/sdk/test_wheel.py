@@ -22,7 +22,9 @@ ENVIRONMENT.pop("PYTHONPATH", None)
 PYTHON = ".venv/bin/python"
 FOREIGN = ("common", "services", "sim", "tests")
 TEST = """
+import pytest
 import t2
+from t2.pytest_plugin import robot_fixture
 from common import SIDE  # of this repository
 
 
@@ -31,13 +33,27 @@ def test_forward(t2_robot: t2.Robot) -> None:
     with t2_robot.drive("nav") as drive:
         drive.forward(SIDE)
     assert abs(t2_robot.odometry.latest().x - start - SIDE) < 0.1
+
+
+office = robot_fixture("office", sets=["safety.sources.mine={priority=12, lease=0.3}"])
+
+
+def test_a_hit(office: t2.SimulatedRobot) -> None:
+    office.simulator.place(x=1.0, y=0.0)
+    assert office.simulator.truth()["x"] == 1.0
+    with pytest.raises(t2.Refused):
+        office.simulator.do("sonar", name="roof")
+    with pytest.raises(t2.Latched), office.drive("mine") as drive:
+        office.simulator.press_bumper()
+        drive.forward(1.0)
+    office.simulator.free_bumper()
 """
 USE = """
 import asyncio, t2
 
 assert "site-packages" in t2.__file__
 try:
-    t2.connect(endpoint="tcp/127.0.0.1:9")
+    t2.connect("001", endpoint="tcp/127.0.0.1:9")
 except t2.LinkError as error:
     print(error)
 try:
@@ -82,4 +98,4 @@ def test_a_program_and_then_a_test_in_a_repository_of_its_own(tmp_path: Path) ->
 
     install(repository, wheels["t2"], "pytest")
     (repository / "tests/test_forward.py").write_text(TEST)
-    assert "1 passed" in run(PYTHON, "-m", "pytest", "-q", cwd=repository)
+    assert "2 passed" in run(PYTHON, "-m", "pytest", "-q", cwd=repository)

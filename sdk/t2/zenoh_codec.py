@@ -9,10 +9,7 @@ import secrets
 import time
 from itertools import count
 
-import msgpack
-
-from common import clock
-from common.text import printable
+import msgspec
 
 _BOOT = secrets.randbits(63)
 _seq = count(1)
@@ -23,9 +20,11 @@ def decode(key: object, value: bytes) -> str:
     if not value:
         return "null"
     try:
-        return printable(json.dumps(msgpack.unpackb(value), ensure_ascii=False, default=_shown))
-    except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
+        text = json.dumps(msgspec.msgpack.decode(value), ensure_ascii=False, default=_shown)
+    except (ValueError, TypeError, RecursionError, msgspec.MsgspecError):
         return json.dumps({"not_msgpack": value.hex()})
+    # Control and formatting characters are escaped: a payload does not control the terminal.
+    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in text)
 
 
 def encode(key: str, value: str) -> bytes:
@@ -34,20 +33,17 @@ def encode(key: str, value: str) -> bytes:
     if not isinstance(message, dict):
         raise ValueError('a message is a JSON object, such as {"linear": 0.1, "angular": 0}')
     if "/srv/" in key:  # a request has no header
-        return _packed(message)
+        return msgspec.msgpack.encode(message)
     header = {
         "seq": next(_seq),
         "boot": _BOOT,
         "t_ns": time.time_ns(),
-        "mono_ns": clock.now_ns(),
+        "mono_ns": time.monotonic_ns(),
     }
-    return _packed({**header, **message})
-
-
-def _packed(message: dict[str, object]) -> bytes:
-    packed: bytes = msgpack.packb(message)
-    return packed
+    return msgspec.msgpack.encode({**header, **message})
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, msgspec.msgpack.Ext):
+        return f"Ext({value.code}, {bytes(value.data).hex()})"
     return value.hex() if isinstance(value, bytes) else str(value)

@@ -6,9 +6,9 @@ import math
 import msgpack
 import pytest
 
-from cli.zenoh_codec import decode, encode
 from common import codec
 from common.messages import Drive, PoseRequest
+from t2.zenoh_codec import decode, encode
 
 KEY = "t2/v1/001/@cmd/drive/web"
 
@@ -19,7 +19,8 @@ KEY = "t2/v1/001/@cmd/drive/web"
         ("zu nah: 近", '"zu nah: 近"'),
         ({"raw": b"\x01"}, '{"raw": "01"}'),
         (math.nan, "NaN"),  # shown as it is, though JSON has no word for it
-        (msgpack.Timestamp(1, 2), '"Timestamp(seconds=1, nanoseconds=2)"'),
+        (msgpack.Timestamp(1, 0), '"1970-01-01 00:00:01+00:00"'),
+        (msgpack.ExtType(5, b"x"), '"Ext(5, 78)"'),
     ],
 )
 def test_payloads_as_json(value: object, shown: str) -> None:
