@@ -135,6 +135,11 @@ class Session:
         self._opened += opened
 
 
+def is_viewer(where: BusSettings) -> bool:
+    """Return whether the certificate's role may neither drive nor stop, whatever the robot."""
+    return all(map(is_encrypted, where.endpoints)) and common_name(where).startswith("viewer.")
+
+
 def client(where: BusSettings, post: Post) -> Session:
     """Return a client's session; raise ``ConfigError`` for an unreadable certificate."""
     check_files(where, where.endpoints)

@@ -9,6 +9,7 @@ from typing import Any
 from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
+from common.bus.session import is_viewer
 from common.client import (
     Contest,
     DriveRequests,
@@ -44,6 +45,7 @@ class Robot:
         self.bus = bus
         self.telemetry = TelemetryCache()
         self.driver_lock = DriverLock()
+        self.may_stop = not is_viewer(bus.where)
         self._settings = settings
         self._broadcast = broadcast  # to all viewers of this robot
         self._requests = DriveRequests()
@@ -86,7 +88,7 @@ class Robot:
     @property
     def may_drive(self) -> bool:
         """Whether the router passes our requests on, as far as is known."""
-        return not self._source.denied
+        return self.may_stop and not self._source.denied
 
     def driver_state(self) -> DriverState:
         """Return the viewer with the driver lock and the state of its hold."""
@@ -98,6 +100,7 @@ class Robot:
             other=self._contest.other,
             overruled=self._overruled,
             may=self.may_drive,
+            may_stop=self.may_stop,
         )
 
     @property

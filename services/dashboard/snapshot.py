@@ -39,6 +39,7 @@ class DriverState(Struct, frozen=True):
     other: str | None  # another source that drives
     overruled: bool  # by that one, during a hold
     may: bool  # false: the router drops the requests of this certificate
+    may_stop: bool  # false: its emergency stops, too
 
 
 class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):

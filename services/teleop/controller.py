@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from common import clock, keys
 from common.bus.bus import Arrival, no_answer, not_allowed
+from common.bus.session import is_viewer
 from common.client import Contest, EstopRepetition, EstopStep, ResetCheck, reset_request
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Drive, Event, ResetDone, SafetyState
@@ -51,6 +52,7 @@ class Controller:
     def __init__(self, node: Node[TeleopConfig], event_log: EventLog) -> None:
         self._node, self._bus, self._event_log = node, node.bus, event_log
         self._settings = node.config.teleop
+        self._may_stop = not is_viewer(self._bus.where)
         self._controls = Controls(self._settings)
         self.terminal = self._controls.terminal
         self._gamepad = Gamepad("searching")
@@ -272,8 +274,12 @@ class Controller:
         """Return what the operator must know before anything else; empty for nothing."""
         if self._unconfirmed:
             return self.unconfirmed
+        if not self._may_stop:
+            return (
+                "VIEW ONLY: this terminal can neither drive nor stop. Use the vehicle's own switch"
+            )
         if self._source.denied:
-            return "VIEW ONLY: this certificate may not drive"
+            return "VIEW ONLY: this certificate may not drive, and perhaps not stop"
         if self._overruled_by:
             return f"OVERRULED by {self._overruled_by}: release the controls"
         return ""
@@ -284,6 +290,8 @@ class Controller:
             robot=self._bus.robot,
             source=self._settings.source,
             connected=self._bus.connected,
+            may_drive=self._may_stop and not self._source.denied,
+            may_stop=self._may_stop,
             alarm=self._alarm(),
             gear=controls.gear,
             top=controls.top(),

@@ -81,8 +81,12 @@ def _bumper(view: View) -> Part:
 
 def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
     """Return the keys, and the limit of key repeats or why keys are refused."""
-    keys = SLOW_KEYS if view.keys_refused else KEYS
+    keys: tuple[Part, ...] = SLOW_KEYS if view.keys_refused or not view.may_drive else KEYS
+    if not view.may_drive:
+        keys = keys[1 if view.may_stop else 2 :]
     row = Text(" ", no_wrap=True).join(Text.assemble((key, KEY), f" {what}") for key, what in keys)
+    if not view.may_drive:
+        return row
     if view.keys_refused:
         return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
     limit = (

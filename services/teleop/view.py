@@ -45,6 +45,8 @@ class View:
     robot: str
     source: str
     connected: bool  # to a router
+    may_drive: bool = True
+    may_stop: bool = True
     alarm: str = ""  # what the operator must know first
     gear: int
     top: Twist  # of full deflection in this gear

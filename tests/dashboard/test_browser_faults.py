@@ -119,10 +119,13 @@ def view_only(tmp_path: Path) -> Iterator[Server]:
         yield server
 
 
-def test_a_viewer_is_offered_no_stick(page: Page, view_only: Server) -> None:
+def test_a_viewer_is_offered_no_stick_and_no_stop(page: Page, view_only: Server) -> None:
     page.goto(view_only.url)
     wait_for_text(page, "#driver", "View only")
-    wait_for_text(page, "#view-only", "View only: this certificate may not drive")
+    wait_for_text(page, "#view-only", "this page can neither drive nor stop")
+    assert page.locator("#estop.unable").count() == 1
+    page.click("#estop")
+    wait_for_text(page, "#toasts", "Use the vehicle's own switch")
     for control in ("#take", "#stick", "#gears", "#reset"):
         assert not page.is_visible(control), control
     page.evaluate("document.querySelector('#take').click()")

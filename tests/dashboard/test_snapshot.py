@@ -49,7 +49,9 @@ def full() -> TelemetryCache:
     return telemetry
 
 
-NOBODY = snapshot.DriverState(None, HoldState.FREE, 1, None, overruled=False, may=True)
+NOBODY = snapshot.DriverState(
+    None, HoldState.FREE, 1, None, overruled=False, may=True, may_stop=True
+)
 
 
 def fast(telemetry: TelemetryCache, at: int = AT) -> snapshot.FastSnapshot:

@@ -75,6 +75,22 @@ def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("fields", "keys"),
+    [
+        ({}, ["WASD drive ␣ stop 1-5 gear E ESTOP R reset FB release ZC arcs Q quit", "No key-up"]),
+        ({"keys_refused": "slow"}, ["␣ stop E ESTOP Q quit  KEYS OFF: slow", "Use"]),
+        ({"may_drive": False, "keys_refused": "slow"}, ["E ESTOP Q quit"]),
+        ({"may_drive": False, "may_stop": False}, ["Q quit"]),
+    ],
+)
+def test_the_footer_has_the_keys_that_have_an_effect(
+    fields: dict[str, Any], keys: list[str]
+) -> None:
+    shown = panels.hints(view(**fields), 0.6, 0.3).plain.split("\n")
+    assert [line[: len(key)] for line, key in zip(shown, keys, strict=True)] == keys
+
+
 # --- motion ---------------------------------------------------------------------------------
 
 

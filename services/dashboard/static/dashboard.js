@@ -154,7 +154,7 @@ function stop() {
 }
 
 function reset() {
-  if (!isDriver()) toast(fast?.driver.may === false ? "view_only_why" : "take_first");
+  if (!isDriver()) toast(driving.viewOnly(fast) || "take_first");
   else if (stateBar.resetRefusal(newest())) toast(stateBar.resetRefusal(newest()), "warning");
   else send({ k: "reset", echo: echoOf(drawn) });
 }
@@ -182,7 +182,7 @@ function begin() {
   };
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
-  estop.begin({ send, lost, toast, robot, mayDrive: () => fast?.driver.may !== false });
+  estop.begin({ send, lost, toast, robot, barred: () => driving.viewOnly(fast) });
   showCamera($("page").dataset.camera.replaceAll("{robot}", robot));
   trail.begin();
   showTexts();

@@ -22,6 +22,7 @@ let release = null; // safety's report on it, during a contact
 let mustReset = false; // another cause is latched beside the contact: safety refuses a release
 let driving = false; // whether this viewer has the driver lock
 let another = null; // another source that drives
+let barred = ""; // why this page may not drive
 let sent = false; // whether the server has a hold from here
 
 const shaped = (raw) => {
@@ -89,6 +90,12 @@ function knob(x, y) {
   if (it) it.style.transform = `translate(calc(-50% + ${-y * 78}%), calc(-50% + ${-x * 78}%))`;
 }
 
+/** Return why this page may not drive, as a key; empty if it may, or if that is unknown. */
+export const viewOnly = (fast) => {
+  if (fast?.driver.may !== false) return "";
+  return fast.driver.may_stop ? "view_only_why" : "view_only_stop";
+};
+
 /** Update the driving panel; `fast` is null without a connection. */
 export function show(isDriver, fast) {
   const driver = fast?.driver ?? null;
@@ -98,7 +105,10 @@ export function show(isDriver, fast) {
   const panel = document.querySelector(".driving");
   const hold = driver?.hold ?? "free";
   panel.classList.toggle("is-driver", isDriver);
-  panel.classList.toggle("view-only", driver?.may === false);
+  barred = viewOnly(fast);
+  panel.classList.toggle("view-only", !!barred);
+  write("view-only", barred && page.t(barred));
+  $("estop").classList.toggle("unable", barred === "view_only_stop");
   panel.dataset.hold = hold;
   write("hold", !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
   disable($("leave"), !isDriver);
@@ -170,7 +180,7 @@ export function showGear(gear, isDriver) {
 // --- input events -----------------------------------------------------------------------------
 
 const ready = () => {
-  if (!driving) page.toast(document.querySelector(".driving.view-only") ? "view_only_why" : "take_first");
+  if (!driving) page.toast(barred || "take_first");
   return driving;
 };
 

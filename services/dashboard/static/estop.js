@@ -5,7 +5,7 @@ const TIMEOUT_MS = 3000;
 const POST_MS = 1000;
 const MIN_AGE_MS = 300; // an earlier snapshot may be older than the request
 let page = null;
-let pending = null; // { since, mayDrive }
+let pending = null; // { since, barred }
 
 export function begin(given) {
   page = given;
@@ -13,8 +13,10 @@ export function begin(given) {
 }
 
 export function request() {
-  if (!pending) page.toast("estop_asked", "warning");
-  pending = { since: performance.now(), mayDrive: page.mayDrive() };
+  const barred = page.barred(); // why this page may not drive, and perhaps not stop
+  if (!pending && barred === "view_only_stop") page.toast(barred, "error");
+  else if (!pending) page.toast("estop_asked", "warning");
+  pending = { since: performance.now(), barred };
   sendStop();
 }
 
@@ -27,7 +29,7 @@ function repeat() {
   if (!pending) return;
   if (performance.now() - pending.since < TIMEOUT_MS) sendStop();
   else {
-    page.toast(pending.mayDrive ? "estop_unconfirmed" : "estop_denied", "error");
+    page.toast(pending.barred ? "estop_denied" : "estop_unconfirmed", "error");
     pending = null;
   }
 }
