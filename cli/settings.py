@@ -6,7 +6,8 @@ import json
 from cli.inspect import output
 from common import settings
 from common.cli_args import add_sources, sources
-from common.config import load
+from common.config import flatten, load
+from common.errors import ConfigError
 from services.bridge.config import Bridge
 from services.dashboard.config import Dashboard
 from services.metrics.config import Metrics
@@ -37,14 +38,28 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
+    parser.add_argument(
+        "prefix", nargs="?", default="", metavar="PREFIX",
+        help="only the settings whose path begins with it, such as safety.sources",
+    )  # fmt: skip
+    parser.add_argument(
+        "--changed", action="store_true", help="only the values that differ from the defaults"
+    )
     add_sources(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print every setting with its value and source."""
-    first, *others = (
+    """Print the chosen settings with their values and sources."""
+    loaded = load(Everything, sources(options))
+    defaults, values = dict(flatten(Everything())), dict(flatten(loaded.config))
+    found = [path for path in values if path.startswith(options.prefix)]
+    if not found:
+        raise ConfigError(f"no setting begins with {options.prefix!r}")
+    rows = [
         (path, json.dumps(setting.value, ensure_ascii=False), setting.origin)
-        for path, setting in load(Everything, sources(options)).settings.items()
-    )
-    print(output.table(first, others))
+        for path, setting in loaded.settings.items()
+        if path in found and not (options.changed and values[path] == defaults.get(path))
+    ]
+    if rows:
+        print(output.table(rows[0], rows[1:]))
     return 0

@@ -1,6 +1,7 @@
 """Command-line options, exit codes and version that all programs of T2 share."""
 
 import argparse
+import os
 import re
 import shlex
 import sys
@@ -15,6 +16,8 @@ from common.text import printable
 
 # As in `pyproject.toml`; reading it from the installed package's metadata takes 20 ms.
 VERSION = "0.1.0"
+
+FILES_ENV = "T2_CONFIG"  # settings files, separated as in PATH; programs pass it to their children
 
 EXIT_CONFIG = 78  # EX_CONFIG: a restart does not help
 EXIT_LINK = 69  # EX_UNAVAILABLE: a port or an endpoint is taken
@@ -37,7 +40,8 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
     """Add the options that name sources of settings."""
     parser.add_argument(
         "--config", action="append", type=Path, metavar="FILE", default=None,
-        help="TOML file on top of config/t2.toml; may be repeated, the last one wins",
+        help="TOML file on top of config/t2.toml and of those in T2_CONFIG (FILE:FILE...); may be "
+        "repeated, the last one wins",
     )  # fmt: skip
     parser.add_argument(
         "--set", action="append", dest="sets", metavar="PATH=VALUE", default=[],
@@ -46,8 +50,9 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 
 
 def sources(options: argparse.Namespace) -> Sources:
-    """Return the sources of settings named by the options."""
-    return Sources(files=(DEFAULT_FILE, *(options.config or ())), sets=options.sets)
+    """Return the sources of settings named by the environment and the options."""
+    named = map(Path, filter(None, os.environ.get(FILES_ENV, "").split(os.pathsep)))
+    return Sources(files=(DEFAULT_FILE, *named, *(options.config or ())), sets=options.sets)
 
 
 def source_words(options: argparse.Namespace) -> list[str]:

@@ -203,7 +203,7 @@ def _value(kind: Any, value: Any, path: str, given: Given) -> Any:
         what = str(error).partition(" - at `$")[0]  # the element of a tuple
         shown = f" = {given[path].value!r}" if path in given else ""
         raise ConfigError(
-            f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}"
+            f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}{_meaning(path)}"
         ) from None
 
 
@@ -226,8 +226,9 @@ def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) ->
     try:
         return kind(**values)
     except ValueError as error:
-        shown = f"{path}: " if path else ""
-        raise ConfigError(f"{_origin(path, given)}: {shown}{error}") from None
+        shown, setting = (f"{path}: ", f"{path}.") if path else ("", "")
+        meaning = _meaning(setting + str(error).partition(" = ")[0])
+        raise ConfigError(f"{_origin(path, given)}: {shown}{error}{meaning}") from None
 
 
 def _is_struct(kind: Any) -> bool:
@@ -244,6 +245,24 @@ def _origin(path: str, given: Given) -> str:
     inside = [s for at, s in given.items() if f"{at}.".startswith(f"{path}." if path else "")]
     named = [s for s in inside if s.origin != DEFAULT] or inside
     return ", ".join(dict.fromkeys(setting.origin for setting in named))
+
+
+def _meaning(path: str) -> str:
+    """Return a setting's unit and meaning in parentheses, as the shipped file has them.
+
+    A field of a table with free names has that of the table.
+    """
+    section = meaning = ""
+    for line in DEFAULT_FILE.read_text(encoding="utf-8").splitlines():
+        code, _, comment = line.removeprefix("# ").partition(" # ")
+        if code.startswith("["):
+            section = code.strip("[]")
+            name = section if "." in section else None
+        else:
+            name = f"{section}.{code.partition(' = ')[0]}"
+        if name and comment and f"{path}.".startswith(f"{name}."):
+            meaning = f" ({comment.partition(';')[0]})"
+    return meaning
 
 
 def _allowed(kind: Any) -> str:

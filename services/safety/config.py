@@ -90,7 +90,8 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
     }
     # s that processes of this computer stall: every time limit and ``react`` is longer
     stall: settings.Stall = 0.0
-    # sources on @cmd/drive/NAME; operator: a person holds it, and may creep past a faulty sonar
+    # sources on @cmd/drive/NAME, lease in s; operator: a person holds it, and may creep past a
+    # faulty sonar
     sources: Annotated[dict[SourceName, Source], Sources] = msgspec.field(default_factory=_sources)
     # names that must be received on @cmd/estop_keepalive/NAME, or the robot brakes and latches
     estop_keepalive: Annotated[tuple[SourceName, ...], Sources] = ()
@@ -151,9 +152,12 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
         self.check(allowed, given)
         if len(set(self.estop_keepalive)) < len(self.estop_keepalive):
             raise ValueError(f"estop_keepalive names a source twice: {self.estop_keepalive}")
-        priorities = [source.priority for source in self.sources.values()]
-        if len(set(priorities)) < len(priorities):
-            raise ValueError(f"sources must have different priorities, not {sorted(priorities)}")
+        names: dict[int, str] = {}  # by priority
+        for name, source in self.sources.items():
+            if (other := names.setdefault(source.priority, name)) != name:
+                raise ValueError(
+                    f"sources {other} and {name} have the same priority, {source.priority}"
+                )
 
 
 class SafetyConfig(settings.Shared, frozen=True, kw_only=True):

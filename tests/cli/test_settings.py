@@ -26,6 +26,31 @@ def test_every_setting_has_its_value_and_source(
     assert ["robot.id", '"007"', "--set robot.id=007"] in rows
 
 
+def shown(capsys: pytest.CaptureFixture[str], *words: str) -> list[list[str]]:
+    assert main(["config", *words]) == 0
+    return [line.split(maxsplit=2) for line in capsys.readouterr().out.splitlines()]
+
+
+def test_some_of_the_settings(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("T2__ROBOT__REALTIME", raising=False)
+    assert shown(capsys, "--changed") == []
+    files = [tmp_path / name for name in ("a.toml", "b.toml", "c.toml")]
+    for number, file in enumerate(files):
+        file.write_text(f"[board]\nport = {5000 + number}\n[safety]\nmargin = 0.2\n")
+    monkeypatch.setenv("T2_CONFIG", f"{files[0]}:{files[1]}:")
+    port = ["board.port", "5001", str(files[1])]
+    assert shown(capsys, "--changed") == [port]
+    assert shown(capsys, "--changed", "safety") == []
+    last = ["--config", str(files[2]), "--set", "board.listen_ports=4002,4001"]
+    assert shown(capsys, "--changed", *last) == [["board.port", "5002", str(files[2])]]
+    paths = [path for path, *_ in shown(capsys, "safety.max")]
+    assert paths == ["safety.max_linear", "safety.max_angular"]
+    assert main(["config", "safty"]) == EXIT_CONFIG
+    assert "no setting begins with 'safty'" in capsys.readouterr().err
+
+
 def test_an_invalid_setting_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["config", "--set", "bord.port=1"]) == EXIT_CONFIG
     shown = capsys.readouterr()

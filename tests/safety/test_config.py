@@ -50,7 +50,7 @@ def test_zero_never_means_off(name: str) -> None:
 
 
 def test_priorities_are_unique() -> None:
-    with pytest.raises(ConfigError, match="different priorities"):
+    with pytest.raises(ConfigError, match=r"sources teleop and web have the same priority"):
         read("safety.sources.web.priority=30")
     assert read("safety.sources.web.priority=5").sources["web"] == Source(
         priority=5, lease=0.3, operator=True
