@@ -19,7 +19,8 @@ from tools.fields import fields_of
 HEAD = """\
 # T2's settings and their defaults. To change one, remove the `#` before it, or name it in a file of
 # your own (--config FILE, or T2_CONFIG), in the environment (T2__BOARD__PORT=4002) or in
-# --set board.port=4002; the later one wins. `t2 config` shows the effective settings and their sources.
+# --set board.port=4002; the later one wins. `t2 config` shows the effective settings and their
+# sources.
 # Generated from the code by `make docs`.
 """
 

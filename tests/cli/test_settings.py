@@ -47,8 +47,8 @@ def test_some_of_the_settings(
     assert shown(capsys, "--changed", *last) == [["board.port", "5002", str(files[2])]]
     paths = [path for path, *_ in shown(capsys, "safety.max")]
     assert paths == ["safety.max_linear", "safety.max_angular"]
-    assert main(["config", "safty"]) == EXIT_CONFIG
-    assert "no setting begins with 'safty'" in capsys.readouterr().err
+    assert main(["config", "nothing"]) == EXIT_CONFIG
+    assert "no setting begins with 'nothing'" in capsys.readouterr().err
 
 
 def test_an_invalid_setting_is_named(capsys: pytest.CaptureFixture[str]) -> None:
