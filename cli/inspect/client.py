@@ -23,7 +23,7 @@ from common.client import DriveRequests, EstopRepetition, EstopStep, ResetCheck
 from common.codec import Sample
 from common.errors import RobotError
 from common.keys import Call, Topic
-from common.messages import Drive, ResetDone, SafetyState, SourceMessage
+from common.messages import Drive, Event, ResetDone, SafetyState, SourceMessage
 
 TICK_S = 0.05  # as ``common.client`` expects
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
@@ -83,12 +83,21 @@ class SafetyClient:
 
     def put(self, topic: Topic[Any], message: SourceMessage) -> None:
         """Publish a message of this source, with its header and the newest heartbeat."""
-        whole = replace(
-            message, seq=next(self._seq), t_ns=time.time_ns(), mono_ns=clock.now_ns(),
-            echo=self.state.heartbeat if self.state else 0, **self._header,
-        )  # fmt: skip
+        echo = self.state.heartbeat if self.state else 0
+        whole = replace(message, echo=echo, **self._stamp())
         key = topic.on(self.robot, source=self._source)
         self.probe.put(key, codec.encode(whole), codec.encoding(topic.message), topic.service)
+
+    def _stamp(self) -> dict[str, int]:
+        now = {"seq": next(self._seq), "t_ns": time.time_ns(), "mono_ns": clock.now_ns()}
+        return now | self._header
+
+    def report_stop(self, robot: str, user: str) -> None:
+        """Publish the event of an emergency stop by this user."""
+        text = f"emergency stop requested by {user}"
+        event = Event(name="estop", level="warning", text=text, about={"by": user}, **self._stamp())
+        key = keys.EVENTS.on(robot, service="estop")
+        self.probe.put(key, codec.encode(event), codec.encoding(Event), keys.EVENTS.service)
 
     def order_stop(self, robot: str) -> None:
         """Publish an emergency stop once."""

@@ -52,16 +52,16 @@ def run(options: argparse.Namespace) -> int:
         try:
             with open_session(options) as session:
                 client = SafetyClient(session.probe, session.robot)
-                return stop(client, source_words(options))
+                return stop(client, session.user, source_words(options))
         except LinkError as error:
             if time.monotonic() > end_s:
                 raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
 
 
-def stop(client: SafetyClient, settings: Sequence[str] = ()) -> int:
+def stop(client: SafetyClient, user: str, settings: Sequence[str] = ()) -> int:
     """Stop one robot, or several by a key expression; return 1 if one does not confirm in time.
 
-    ``settings`` are the options that advised commands repeat.
+    The event names the ``user``. ``settings`` are the options that advised commands repeat.
     """
     probe, robot = client.probe, client.robot
     client.order_stop(robot)  # before anything else
@@ -69,6 +69,9 @@ def stop(client: SafetyClient, settings: Sequence[str] = ()) -> int:
     if "*" in robot:
         with suppress(LinkError):  # without the list: until one robot at least has confirmed
             expected = {name for name, service in services(probe, robot) if service in MOVES}
+    for each in expected:
+        if "*" not in each:
+            client.report_stop(each, user)
     # By name, too: a driver's certificate may allow its own robots only, not an expression.
     confirmed = client.stop(expected)
     missing = sorted(expected - confirmed)
@@ -130,7 +133,7 @@ def keep_alive(options: argparse.Namespace) -> int:
         print(f"Keeping the emergency stop of robot {robot} alive as {name}.")
         print("Enter: EMERGENCY STOP. Ctrl-C ends this program: the robot then brakes and latches.")
         with until_interrupt():
-            follow(client, name)
+            follow(client, name, session.user)
     print(f"Ended: within {ours.timeout:g} s robot {robot} brakes and latches.", end=" ")
     print("To go on, start this again, then reset.")
     return 0
@@ -145,7 +148,7 @@ def kept(state: SafetyState, name: str) -> KeepaliveState:
     return known[name]
 
 
-def follow(client: SafetyClient, name: str) -> None:
+def follow(client: SafetyClient, name: str, user: str) -> None:
     """Publish at 10 Hz, print each change of state, and stop the robot on Enter."""
     shown = ""
     watched: list[TextIO] = [sys.stdin] if sys.stdin else []  # closed in some supervisors
@@ -156,7 +159,7 @@ def follow(client: SafetyClient, name: str) -> None:
             shown = line
         if select.select(watched, [], [], 0)[0]:
             if sys.stdin.readline():
-                stop(client)
+                stop(client, user)
             else:
                 watched = []  # the end of a file is no key
         client.until(lambda: False, KEEPALIVE_S)

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from cli.inspect.addressing import EVERY_ROBOT, chunks, parse_site
 from common import codec, keys
 from common.bus.probe import Answer, Probe, probe
+from common.bus.session import operator_name
 from common.cli_args import add_sources, sources
 from common.codec import Sample
 from common.config import Sources, load
@@ -24,6 +25,7 @@ class BusSession:
 
     probe: Probe
     robot: str
+    user: str  # who uses this command
 
 
 def add_options(parser: argparse.ArgumentParser, *, every: bool = True) -> None:
@@ -88,7 +90,8 @@ def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
     config = settings(options)
     several = options.robot and "*" in options.robot
     with probe(config.bus) as opened:
-        yield BusSession(opened, options.robot if several else config.robot.id)
+        robot = options.robot if several else config.robot.id
+        yield BusSession(opened, robot, operator_name(config.bus))
 
 
 def services(opened: Probe, robot: str, service: str = "*") -> list[tuple[str, str]]:

@@ -49,7 +49,7 @@ QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
 
 # The services of a laptop: a member may publish as these and as no others. A recorder is not one of
 # them: a recorder on a laptop must not hide that the one on board is dead.
-LAPTOP_SERVICES = ("dashboard", "metrics")
+LAPTOP_SERVICES = ("dashboard", "estop", "metrics")
 DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
 
 COMMANDS: Mapping[str, Sequence[keys.Topic[Any]]] = {  # besides the emergency stop
@@ -153,6 +153,7 @@ def site() -> Rights:
                 for topic in (keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE)
             ),
             keys.estop_key(ANY),
+            *(keys.EVENTS.on(ANY, service=name) for name in DRIVER_SERVICES),
         ),
     }
 

@@ -1,8 +1,11 @@
 """Zenoh sessions: of clients, of the drive link, and of the embedded router."""
 
 import contextlib
+import getpass
 import itertools
 import json
+import os
+import socket
 import ssl
 import threading
 import time
@@ -157,9 +160,9 @@ def router(
 ) -> Iterator[None]:
     """Run the embedded router for the context; raise ``LinkError`` if it cannot listen."""
     check_files(where, (*where.listen, *where.uplink))
-    for socket in (each for each in where.listen if each.startswith("unixsock-stream/")):
+    for file in (each for each in where.listen if each.startswith("unixsock-stream/")):
         with contextlib.suppress(OSError):  # Zenoh reports the error
-            Path(socket.partition("/")[2]).parent.mkdir(parents=True, exist_ok=True)
+            Path(file.partition("/")[2]).parent.mkdir(parents=True, exist_ok=True)
     try:
         session = zenoh.open(_parsed(router_config(where, access, robot)))
     except zenoh.ZError as error:
@@ -201,6 +204,17 @@ def common_name(where: BusSettings) -> str:
         return ""
 
 
+def operator_name(where: BusSettings) -> str:
+    """Return who uses this program: the name in its certificate, or its login name and host."""
+    if all(map(is_encrypted, where.endpoints)) and (name := common_name(where)):
+        return name
+    try:
+        user = getpass.getuser()
+    except (OSError, KeyError):  # a user without a name, in a container
+        user = str(os.getuid())
+    return f"{user}@{socket.gethostname()}"
+
+
 def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
     """Raise ``ConfigError`` for an unreadable certificate file of these endpoints."""
     if not any(map(is_encrypted, endpoints)):
@@ -228,9 +242,9 @@ def client_config(where: BusSettings, attempt: int = 0) -> zenoh.Config:
     return _parsed(_common(where) | {"mode": "client", "connect": connect})
 
 
-def drive_config(where: BusSettings, socket: Path, *, listens: bool) -> zenoh.Config:
+def drive_config(where: BusSettings, path: Path, *, listens: bool) -> zenoh.Config:
     """Return the configuration of one end of the drive link: one socket and no other endpoint."""
-    here, nowhere = {"endpoints": [f"unixsock-stream/{socket}"]}, {"endpoints": list[str]()}
+    here, nowhere = {"endpoints": [f"unixsock-stream/{path}"]}, {"endpoints": list[str]()}
     ends: dict[str, object] = {"listen": here, "connect": nowhere}
     if not listens:
         ends = {"listen": nowhere, "connect": {**here, "retry": REDIAL}}

@@ -15,9 +15,10 @@ from common import client as machine
 from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
+from common.bus.session import operator_name
 from common.errors import RobotError
 from common.loop import Loop
-from common.messages import Drive, ResetRequest
+from common.messages import Drive, Event, ResetRequest
 from common.settings import BusSettings as Where
 from common.source import DriveSource
 from tests.factories import safety_state
@@ -37,6 +38,7 @@ class OnBoard:
     def __init__(self, join: Join, endpoint: str, robot: str = "001") -> None:
         self.received: list[Arrival[Drive]] = []
         self.estops: list[int] = []
+        self.events: list[Arrival[Event]] = []
         join(at(endpoint), robot, self.declare)
 
     def declare(self, bus: Bus) -> None:
@@ -44,6 +46,7 @@ class OnBoard:
         for source in ("teleop", "web", "nav"):  # as safety does for each in its settings
             bus.on_any(keys.DRIVE.on(bus.robot, source=source), lambda _: None)
         bus.on_any(keys.estop_key(bus.robot), self.estops.append)
+        bus.subscribe(keys.EVENTS, self.events.append, service="estop")
         bus.serve(keys.RESET, lambda _, __: None)
         bus.live(keys.live_key(bus.robot, "safety", "1"))
         self.state = bus.publisher(keys.SAFETY)
@@ -159,6 +162,11 @@ def test_members_reach_their_own_robots_through_the_sites_router(site: Site, joi
             return bool(first.estops and second.estops)
 
         wait_until(stopped, "all robots stopped")
+        room = connecting(site.settings("fleet", "room"), center)
+        with probe(room) as session:
+            SafetyClient(session, "001").report_stop("001", operator_name(room))
+            wait_until(lambda: first.events, "its event")
+        assert first.events[0].message.text.startswith("emergency stop requested by fleet.room.")
 
 
 def test_a_revoked_certificate_has_no_rights(join: Join, tmp_path: Path) -> None:

@@ -9,17 +9,25 @@ import pytest
 from cli.inspect import estop, robots
 from cli.inspect.client import SafetyClient
 from common import client as machine
+from common import keys
+from common.bus.bus import Arrival, Bus
+from common.bus.session import operator_name
 from common.cli_args import EXIT_LINK
+from common.messages import Event
 from tests.cli.inspect.tool import FakeSafety, Tool, pretend
 from tests.common.bus_fixture import BusFixture
-from verification.harness.bus import router_process
+from verification.harness.bus import at, router_process
 from verification.harness.ports import free_port
+from verification.harness.waiting import wait_until
 
 Join = Callable[[str], BusFixture]
+USER = operator_name(at("tcp/127.0.0.1:1"))  # without a certificate: login name and host
 
 
-def robot(buses: BusFixture, obeys: bool = True) -> FakeSafety:
-    return FakeSafety(buses, obeys=obeys, source="web", text="Drives.")
+def robot(
+    buses: BusFixture, obeys: bool = True, declare: Callable[[Bus], object] = lambda _: None
+) -> FakeSafety:
+    return FakeSafety(buses, declare, obeys=obeys, source="web", text="Drives.")
 
 
 @pytest.fixture
@@ -45,13 +53,23 @@ def t2(shared_router: str, capsys: pytest.CaptureFixture[str]) -> Tool:
 
 
 def test_stop_of_one_site(join: Join, t2: Tool) -> None:
-    berlin = [robot(join(name)) for name in ("berlin-001", "berlin-002")]
+    events: list[Arrival[Event]] = []
+
+    def record(bus: Bus) -> None:
+        bus.subscribe(keys.EVENTS, events.append, service="*")
+
+    berlin = [robot(join(name), declare=record) for name in ("berlin-001", "berlin-002")]
     others = [robot(join(name)) for name in ("munich-001", "berlinale-001", "001")]
     result = t2("estop", "--site", "berlin")
     assert (result.code, result.err) == (0, "")
     assert [line.split()[1] for line in result.out.splitlines()] == ["berlin-001", "berlin-002"]
     assert all(each.stops for each in berlin)
     assert not any(each.stops for each in others)
+    wait_until(lambda: len(events) == 2, "an event for each robot")
+    key, event = events[0].key, events[0].message
+    assert key in ("t2/v1/berlin-001/evt/estop", "t2/v1/berlin-002/evt/estop")
+    assert (event.name, event.text) == ("estop", f"emergency stop requested by {USER}")
+    assert event.about == {"by": USER}
 
 
 def test_unconfirmed_robots_are_named(
