@@ -1,6 +1,7 @@
 """``t2 checkout``: checks of a real vehicle before its first drive."""
 
 import argparse
+import shlex
 import signal
 import time
 from collections.abc import Sequence
@@ -58,7 +59,8 @@ def run(options: argparse.Namespace) -> int:
         signal.signal(number, signal.default_int_handler)  # as Ctrl-C
     report = checkout(loaded, options.only)
     file.write_text(render(report), encoding="utf-8")
-    print(f"\n{'Passed' if report.passed else 'NOT PASSED'}. The report: {file}", flush=True)
+    outcome = "Passed" if report.passed else "NOT PASSED"
+    print(f"\n{outcome}. The report: {shlex.quote(str(file))}", flush=True)
     return 0 if report.passed else 1
 
 

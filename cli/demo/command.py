@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import shlex
 import socket
 import time
 from functools import partial
@@ -64,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     print(f"\n{output.table(('the lap', 'result', ''), body)}")
     file = options.out / "lap.png"
     plot.save(file, load_plan(WORLD, config.vehicle), config.vehicle, trace, odometry)
-    print(f"\nplot: {file}")
+    print(f"\nplot: {shlex.quote(str(file))}")
     return 0 if good(rows) else 1
 
 

@@ -1,6 +1,7 @@
 """``t2 info``: the content of a recording."""
 
 import argparse
+import shlex
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,18 +66,18 @@ def as_text(reader: "Reader", timeline: Timeline) -> str:
     lines += [*warnings(timeline, reader), ""]
     lines.append(output.table(["key", "type", "messages", "Hz", "lost"], rows))
     stops = [
-        f"{stop.begins_s:8.2f} s  {stop.verdict:9}  for {stop.lasts_s:.1f} s: "
+        f"{moment(timeline, stop.begins_s)}  {stop.verdict:9}  for {stop.lasts_s:.1f} s: "
         + " ".join(f"{name}: {printable(text)}" for name, text in stop.reasons.items())
         for stop in timeline.stops
     ]
     events = [
-        f"{each.at_s:8.2f} s  {each.event.level:9}  {each.service}: {each.event.name}: "
+        f"{moment(timeline, each.at_s)}  {each.event.level:9}  {each.service}: {each.event.name}: "
         f"{printable(each.event.text)}"
         for each in timeline.events
     ]
     for title, texts in (("stops", stops), ("events", events)):
         if texts:
-            lines += ["", f"{title}:", *texts]
+            lines += ["", f"{title} (since the start, and UTC):", *texts]
     return "\n".join(lines)
 
 
@@ -87,7 +88,7 @@ def summary(timeline: Timeline, reader: "Reader") -> dict[str, str]:
     versions = ", ".join(f"{name} {version}" for name, version in sorted(timeline.versions.items()))
     while_driving = sum(stop.was_driving for stop in timeline.stops)
     return {
-        "file": f"{reader.path}, {reader.size} bytes",
+        "file": f"{shlex.quote(str(reader.path))}, {reader.size} bytes",
         "robot": ", ".join(robots),
         "start": f"{began:%Y-%m-%d %H:%M:%S} UTC" if timeline.streams else "",
         "duration": clock(timeline.lasted_s),
@@ -109,6 +110,11 @@ def warnings(timeline: Timeline, reader: "Reader") -> list[str]:
     if undecoded:
         found.append(f"{undecoded} messages could not be decoded.")
     return found
+
+
+def moment(timeline: Timeline, at_s: float) -> str:
+    """Format a moment as seconds since the start, and UTC."""
+    return f"{at_s:8.2f} s  {timeline.utc(at_s)}"
 
 
 def clock(seconds: float) -> str:

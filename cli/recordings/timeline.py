@@ -11,6 +11,7 @@ NaN in a gap, so that no line is drawn through it.
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from itertools import pairwise
 
 from cli.inspect.addressing import chunks, topic_of
@@ -220,6 +221,11 @@ class Timeline:
         self.streams.setdefault(key, Stream(key, kind)).add(at_s, message)
         if message is not None:
             self._add(message, key, at_s)
+
+    def utc(self, at_s: float) -> str:
+        """Return the time of day of a moment, by the recorder's clock."""
+        at = datetime.fromtimestamp((self.began_ns or 0) / NS_PER_S + at_s, UTC)
+        return f"{at:%H:%M:%S}"
 
     @property
     def messages(self) -> int:

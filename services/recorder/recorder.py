@@ -1,5 +1,6 @@
 """The recorder's shell: subscribes to every key, writes files, stops before the disk is full."""
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -121,7 +122,8 @@ class Recorder:
         recording.close()
         path, messages = str(recording.path), recording.messages
         if "-latch-" in recording.path.name:
-            text = f"black box written to {path}"
+            # From any folder it can be pasted after `t2 report`.
+            text = f"black box written to {shlex.quote(str(recording.path.absolute()))}"
             self._node.event("black_box", "info", text, file=path, messages=messages)
         else:
             self._node.log.info("recorded", file=path, messages=messages)

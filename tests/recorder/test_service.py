@@ -130,6 +130,8 @@ def test_every_key_is_recorded_with_raw_frames(buses: BusFixture, tmp_path: Path
 def test_a_latch_writes_the_black_box_and_old_recordings_make_room(
     buses: BusFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    tmp_path /= "my recordings"
+    tmp_path.mkdir()
     old = [f"{buses.robot}-20260101-00000{n}.mcap" for n in range(2)]
     for name in old:
         (tmp_path / name).write_bytes(bytes(MB))
@@ -151,6 +153,8 @@ def test_a_latch_writes_the_black_box_and_old_recordings_make_room(
         latched.append("contact")
         wait_until(lambda: "black_box" in [each.name for each in events], "the black box")
     (path,) = tmp_path.glob("*-latch-contact.mcap")
+    (event,) = (each for each in events if each.name == "black_box")
+    assert event.text == f"black box written to '{path}'"
     with Reader(path) as reader:
         found = list(reader)
     states = [each.message.latched for each in found if isinstance(each.message, m.SafetyState)]

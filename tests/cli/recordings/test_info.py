@@ -16,7 +16,7 @@ from tests.recorder.samples import bare, sample
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    made = RecordingWriter(tmp_path / "a.mcap", Encoder(Vehicle()))
+    made = RecordingWriter(tmp_path / "a b.mcap", Encoder(Vehicle()))
     health = Health(
         service="odom", version="1.2", uptime=0, rates={}, counters={}, lateness=0, rss=0
     )
@@ -35,14 +35,14 @@ def test_the_content_of_a_recording(path: Path, capsys: pytest.CaptureFixture[st
     assert main(["info", str(path)]) == 0
     shown = capsys.readouterr().out
     for line in (
-        f"file: {path}, {path.stat().st_size} bytes",
+        f"file: '{path}', {path.stat().st_size} bytes",
         "duration: 2.0 s",
         "messages: 16 on 5 keys",
         "services: odom 1.2",
         "1 messages could not be decoded.",
         "001/tel/bridge/velocity  Velocity           11  10.0     0",
-        "    1.50 s  brake      for 0.0 s: contact: The bumper was hit.",
-        "    1.50 s  error      bridge: contact: hit",
+        "    1.50 s  22:13:21  brake      for 0.0 s: contact: The bumper was hit.",
+        "    1.50 s  22:13:21  error      bridge: contact: hit",
     ):
         assert f"\n{line}" in f"\n{shown}", shown
 

@@ -36,6 +36,7 @@ def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "tel/bridge/velocity", "bridge 0.1.0", "4.0 m", "2023-11-14 22:13:20 UTC",
     ):  # fmt: skip
         assert word in text, word
+    assert re.search(r'<td class="n">22:13:\d\d</td>', text)  # of a stop
     # It loads nothing, and content of the bus is escaped.
     assert not re.findall(r"<script|(?:src|href|action|data|poster)=[^#]{2}", text)
     assert text.count("<svg") == 2
