@@ -35,7 +35,7 @@ Number = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 MAX_TEXT = 4000
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Name = Annotated[str, Meta(max_length=200)]
-Few = Meta(max_length=128)
+Few: Meta = Meta(max_length=128)
 Counts = Annotated[dict[Name, int], Few]
 
 Ranges = Annotated[tuple[Number | None, ...], Meta(min_length=8, max_length=8)]

@@ -29,7 +29,7 @@ async def connected(_: MCPServer[Any]) -> AsyncIterator[None]:
     """Keep one connection while the server runs."""
     async with t2.aconnect("001", endpoint="".join(sys.argv[1:])) as robot:
         robots.append(robot)
-        robot.robot.events.on(events.append)
+        robot.events.on(events.append)
         yield
 
 

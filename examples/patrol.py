@@ -12,9 +12,9 @@ import t2
 def patrol(endpoint: str) -> None:
     """Drive; raises ``t2.Latched``, ``t2.Blocked``, ``t2.Overruled``, ``t2.NotAllowed``, ..."""
     with t2.connect("001", endpoint=endpoint) as robot, robot.drive("patrol") as drive:
-        drive.forward(0.4)
-        drive.turn(math.pi / 2)
-        drive.turn(-math.pi / 2)
+        drive.forward(0.4, on_stop="wait")
+        drive.turn(math.pi / 2, on_stop="wait")
+        drive.turn(-math.pi / 2, on_stop="wait")
 
 
 if __name__ == "__main__":

@@ -17,8 +17,8 @@ def square(endpoint: str) -> None:
         start = robot.odometry.latest(timeout=5)
         with robot.drive("nav") as drive:
             for _ in range(4):
-                drive.forward(SIDE, speed=0.4)
-                drive.turn(math.pi / 2)
+                drive.forward(SIDE, speed=0.4, on_stop="wait")
+                drive.turn(math.pi / 2, on_stop="wait")
         end = robot.odometry.latest()
         print(f"{math.dist((start.x, start.y), (end.x, end.y)):.2f} m from the start")
 

@@ -65,9 +65,9 @@ def _named(body: str) -> str:
     )
     plain = "".join(f"    {kind} = Name\n" for kind in names)
     body = body.replace(
-        "Few = Meta(",
+        "Few: Meta = Meta(",
         "# Type checkers know the names. A message with a newer name is decoded all the same.\n"
-        f"if TYPE_CHECKING:\n{typed}else:\n{plain}\nFew = Meta(",
+        f"if TYPE_CHECKING:\n{typed}else:\n{plain}\nFew: Meta = Meta(",
         1,
     )
     body = body.replace("latched: Annotated[tuple[Name", "latched: Annotated[tuple[CauseName")

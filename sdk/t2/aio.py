@@ -3,15 +3,26 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
-from typing import Any, Generic, ParamSpec, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 from t2.connection import connect
 from t2.drive import Drive
-from t2.messages import Message
+from t2.messages import (
+    Bumper,
+    Event,
+    Link,
+    Message,
+    Mileage,
+    Odometry,
+    SafetyState,
+    Switches,
+    Ultrasonic,
+    Velocity,
+)
 from t2.robot import Robot
-from t2.stream import Stream
+from t2.stream import Stream, Subscription
 
 M = TypeVar("M", bound=Message)
 P = ParamSpec("P")
@@ -51,18 +62,39 @@ def _close(opening: "asyncio.Task[Robot]") -> None:
         opening.result().close()
 
 
-def awaited(call: Callable[P, R]) -> Callable[P, Coroutine[Any, Any, R]]:
-    """Return a call as a coroutine function, which waits for it in a thread."""
+Method = Callable[Concatenate[Any, P], R]
+Coroutines = Callable[Concatenate[Any, P], Coroutine[Any, Any, R]]
 
-    @wraps(call)
-    async def run(*args: P.args, **kwargs: P.kwargs) -> R:
-        return await asyncio.to_thread(call, *args, **kwargs)
 
-    return run
+def awaited(method: Method[P, R]) -> Callable[[object], Coroutines[P, R]]:
+    """Return a decorator that makes a method of the twin ours: a thread runs it."""
+
+    def decorate(_: object) -> Coroutines[P, R]:
+        @wraps(method)
+        async def run(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
+            result: R = await self.run(partial(method, self.twin, *args, **kwargs))
+            return result
+
+        return run
+
+    return decorate
+
+
+def at_once(method: Method[P, R]) -> Callable[[object], Method[P, R]]:
+    """Return a decorator that makes a method of the twin ours: it returns at once."""
+
+    def decorate(_: object) -> Method[P, R]:
+        @wraps(method)
+        def call(self: Any, /, *args: P.args, **kwargs: P.kwargs) -> R:
+            return method(self.twin, *args, **kwargs)
+
+        return call
+
+    return decorate
 
 
 class AsyncStream(Generic[M]):
-    """A ``Stream`` for asyncio; ``stream`` is the twin.
+    """A ``Stream`` for asyncio; ``twin`` is the stream itself.
 
     ``async for`` yields each new message, never a backlog, and ends when the robot is closed.
 
@@ -74,30 +106,35 @@ class AsyncStream(Generic[M]):
     True
     """
 
-    def __init__(self, stream: Stream[M]) -> None:
-        self.stream = stream
-        self.key = stream.key
-        self.latest = awaited(stream.latest)
-        self.on = stream.on  # the function is called in a thread
+    def __init__(self, twin: Stream[M]) -> None:
+        self.twin: Stream[M] = twin
 
     @property
     def newest(self) -> M | None:
         """The newest message received; None before the first one, or before the first use."""
-        return self.stream.newest
+        return self.twin.newest
 
     @property
     def age(self) -> float:
         """Time in s since the newest message was received; infinite before the first one."""
-        return self.stream.age
+        return self.twin.age
 
     @property
     def invalid(self) -> int:
         """The number of messages that do not have the topic's type."""
-        return self.stream.invalid
+        return self.twin.invalid
+
+    async def latest(self, timeout: float = 1.0) -> M:
+        """Return the newest message as ``Stream.latest`` does."""
+        return await asyncio.to_thread(self.twin.latest, timeout)
+
+    def on(self, handle: Callable[[M], object]) -> Subscription:
+        """Call a function as ``Stream.on`` does, in a thread."""
+        return self.twin.on(handle)
 
     async def __aiter__(self) -> AsyncIterator[M]:
-        with self.stream.reading() as queue:
-            while not self.stream.closed:
+        with self.twin.reading() as queue:
+            while not self.twin.closed:
                 if queue:
                     yield queue.popleft()
                 else:
@@ -110,72 +147,82 @@ class AsyncDrive:
     >>> async def main():
     ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
     ...         async with robot.drive("nav") as drive:
-    ...             await drive.forward(0.1)
-    ...             await drive.turn(math.pi / 8)
+    ...             pose = await drive.forward(0.1, on_stop="wait")
+    ...             pose = await drive.turn(math.pi / 8)
     ...             drive.velocity(0.1)
     ...             await drive.stop()
     >>> asyncio.run(main())
     """
 
-    def __init__(self, drive: Drive) -> None:
-        self._drive = drive
-        self.source = drive.source
-        # They return at once.
-        self.velocity, self.check = drive.velocity, drive.check
-        self.cancel, self.uncancel = drive.cancel, drive.uncancel
-        self.forward, self.turn = self._motion(drive.forward), self._motion(drive.turn)
-        self.arc, self.follow = self._motion(drive.arc), self._motion(drive.follow)
-        self.goto = self._motion(drive.goto)
+    def __init__(self, twin: Drive) -> None:
+        self.twin: Drive = twin
+        self.source: str = twin.source
 
     @property
     def is_open(self) -> bool:
         """Whether requests are sent, or will be."""
-        return self._drive.is_open
+        return self.twin.is_open
 
     @property
     def obeyed(self) -> bool:
         """Whether the vehicle follows these requests now."""
-        return self._drive.obeyed
+        return self.twin.obeyed
 
     async def __aenter__(self) -> "AsyncDrive":
         try:
-            await self._motion(self._drive.__enter__)()
+            await self.run(self.twin.__enter__)
         except asyncio.CancelledError:
-            self._drive.end()  # at once: the task may be cancelled again
-            await asyncio.to_thread(self._drive.close)
+            self.twin.end()  # at once: the task may be cancelled again
+            await asyncio.to_thread(self.twin.close)
             raise
         return self
 
     async def __aexit__(self, *raised: Any) -> None:
-        self._drive.end()  # at once: a thread may not be free
-        await asyncio.to_thread(self._drive.__exit__, *raised)
+        self.twin.end()  # at once: a thread may not be free
+        await asyncio.to_thread(self.twin.__exit__, *raised)
+
+    @at_once(Drive.velocity)
+    def velocity(self) -> None: ...  # noqa: D102 - the twin's docstring
+
+    @at_once(Drive.check)
+    def check(self) -> None: ...  # noqa: D102
+
+    @awaited(Drive.forward)
+    def forward(self) -> None: ...  # noqa: D102
+
+    @awaited(Drive.turn)
+    def turn(self) -> None: ...  # noqa: D102
+
+    @awaited(Drive.arc)
+    def arc(self) -> None: ...  # noqa: D102
+
+    @awaited(Drive.follow)
+    def follow(self) -> None: ...  # noqa: D102
+
+    @awaited(Drive.goto)
+    def goto(self) -> None: ...  # noqa: D102
 
     async def stop(self) -> None:
         """Stop as ``Drive.stop`` does."""
-        self._drive.velocity(0.0)  # at once: a thread may not be free
-        await self._motion(self._drive.stop)()
+        self.twin.velocity(0.0)  # at once: a thread may not be free
+        await self.run(self.twin.stop)
 
-    def _motion(self, motion: Callable[P, R]) -> Callable[P, Coroutine[Any, Any, R]]:
-        """Return a motion as a coroutine function that ends it when it is cancelled."""
-
-        @wraps(motion)
-        async def run(*args: P.args, **kwargs: P.kwargs) -> R:
-            task = asyncio.create_task(asyncio.to_thread(motion, *args, **kwargs))
-            try:
-                return await asyncio.shield(task)
-            except asyncio.CancelledError:
-                self._drive.cancel()
-                while not task.done():  # however often this task is cancelled
-                    with suppress(Exception, asyncio.CancelledError):
-                        await asyncio.shield(task)
-                self._drive.uncancel()  # the motion had ended by itself
-                raise
-
-        return run
+    async def run(self, motion: Callable[[], R]) -> R:
+        """Wait for a motion of the twin, and end it when this task is cancelled."""
+        task = asyncio.create_task(asyncio.to_thread(motion))
+        try:
+            return await asyncio.shield(task)
+        except asyncio.CancelledError:
+            self.twin.cancel()
+            while not task.done():  # however often this task is cancelled
+                with suppress(Exception, asyncio.CancelledError):
+                    await asyncio.shield(task)
+            self.twin.uncancel()  # the motion had ended by itself
+            raise
 
 
 class AsyncRobot:
-    """A ``Robot`` for asyncio, from ``aconnect``; ``robot`` is the twin.
+    """A ``Robot`` for asyncio, from ``aconnect``; ``twin`` is the robot itself.
 
     Each stream is an ``AsyncStream``.
 
@@ -188,31 +235,48 @@ class AsyncRobot:
     >>> asyncio.run(main())
     """
 
-    def __init__(self, robot: Robot) -> None:
-        self.robot = robot
-        self.name, self.endpoint = robot.name, robot.endpoint
-        self.odometry = AsyncStream(robot.odometry)
-        self.safety = AsyncStream(robot.safety)
-        self.velocity = AsyncStream(robot.velocity)
-        self.mileage = AsyncStream(robot.mileage)
-        self.ultrasonic = AsyncStream(robot.ultrasonic)
-        self.bumper = AsyncStream(robot.bumper)
-        self.switches = AsyncStream(robot.switches)
-        self.link = AsyncStream(robot.link)
-        self.events = AsyncStream(robot.events)
-        self.close = awaited(robot.close)
-        self.limit = awaited(robot.limit)
-        self.keepalive = awaited(robot.keepalive)
-        self.reset = awaited(robot.reset)
-        self.release = awaited(robot.release)
-        self.set_pose = awaited(robot.set_pose)
-        self.led = awaited(robot.led)
+    def __init__(self, twin: Robot) -> None:
+        self.twin: Robot = twin
+        self.name: str = twin.name
+        self.endpoint: str = twin.endpoint
+        self.odometry: AsyncStream[Odometry] = AsyncStream(twin.odometry)
+        self.safety: AsyncStream[SafetyState] = AsyncStream(twin.safety)
+        self.velocity: AsyncStream[Velocity] = AsyncStream(twin.velocity)
+        self.mileage: AsyncStream[Mileage] = AsyncStream(twin.mileage)
+        self.ultrasonic: AsyncStream[Ultrasonic] = AsyncStream(twin.ultrasonic)
+        self.bumper: AsyncStream[Bumper] = AsyncStream(twin.bumper)
+        self.switches: AsyncStream[Switches] = AsyncStream(twin.switches)
+        self.link: AsyncStream[Link] = AsyncStream(twin.link)
+        self.events: AsyncStream[Event] = AsyncStream(twin.events)
 
     def drive(self, source: str) -> AsyncDrive:
         """Return a drive as this source, for ``async with``."""
-        return AsyncDrive(self.robot.drive(source))
+        return AsyncDrive(self.twin.drive(source))
+
+    @awaited(Robot.limit)
+    def limit(self) -> None: ...  # noqa: D102
+
+    @awaited(Robot.keepalive)
+    def keepalive(self) -> None: ...  # noqa: D102
+
+    @awaited(Robot.reset)
+    def reset(self) -> None: ...  # noqa: D102
+
+    @awaited(Robot.release)
+    def release(self) -> None: ...  # noqa: D102
+
+    @awaited(Robot.set_pose)
+    def set_pose(self) -> None: ...  # noqa: D102
+
+    async def led(self, channel: int, mode: int, **settings: int) -> None:
+        """Set one lamp channel as ``Robot.led`` does."""
+        await self.run(partial(self.twin.led, channel, mode, **settings))
 
     async def estop(self) -> None:
         """Stop and latch as ``Robot.estop`` does; a cancelled task does not end the attempts."""
-        self.robot.put_estop()  # at once: a thread may not be free
-        await asyncio.to_thread(self.robot.estop)
+        self.twin.put_estop()  # at once: a thread may not be free
+        await asyncio.to_thread(self.twin.estop)
+
+    async def run(self, call: Callable[[], R]) -> R:
+        """Wait for a call of the twin."""
+        return await asyncio.to_thread(call)

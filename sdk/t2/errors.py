@@ -34,7 +34,7 @@ class Overruled(T2Error):
 
     def __init__(self, by: str) -> None:
         super().__init__(by)  # the arguments, so that it survives pickling
-        self.by = by
+        self.by: str = by
 
     def __str__(self) -> str:
         return f"overruled by {self.by}, which has a higher priority"
@@ -45,8 +45,8 @@ class Stopped(T2Error):
 
     def __init__(self, text: str, causes: Sequence[Cause]) -> None:
         super().__init__(text, causes)
-        self.text = text
-        self.causes = tuple(causes)
+        self.text: str = text
+        self.causes: tuple[Cause, ...] = tuple(causes)
 
     def __str__(self) -> str:
         return self.text

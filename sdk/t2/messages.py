@@ -58,7 +58,7 @@ else:
     CauseName = Name
     EventName = Name
 
-Few = Meta(max_length=128)
+Few: Meta = Meta(max_length=128)
 Counts = Annotated[dict[Name, int], Few]
 
 Ranges = Annotated[tuple[Number | None, ...], Meta(min_length=8, max_length=8)]

@@ -37,7 +37,7 @@ class SourcePublisher:
     ) -> None:
         safety.open()
         self._safety = safety
-        self.boot = BOOTS[str(session.info.routers_zid())]
+        self.boot: int = BOOTS[str(session.info.routers_zid())]
         self._seqs = SEQS[key]
         self._access = Access()
         self._seen: SafetyState | None = None

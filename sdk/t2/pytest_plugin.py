@@ -33,4 +33,4 @@ def robot_fixture(
     return robot
 
 
-t2_robot = robot_fixture()
+t2_robot: Callable[..., Any] = robot_fixture()

@@ -33,8 +33,8 @@ class Recording:
     """
 
     def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        self.is_cut = False
+        self.path: Path = Path(path)
+        self.is_cut: bool = False
 
     def __iter__(self) -> Iterator[Entry]:
         try:

@@ -20,7 +20,7 @@ M = TypeVar("M", bound=Message)
 LIVE_S = 0.5  # for the list of robots
 CHECK_S = 0.1  # whether a subscription is closed
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
-logger = logging.getLogger(__name__)
+logger: logging.Logger = logging.getLogger(__name__)
 CONNECTED = set[int]()  # this process, or the one that it was forked from, once it has connected
 
 
@@ -55,13 +55,13 @@ class Stream(Generic[M]):
     def __init__(
         self, session: zenoh.Session, key: str, kind: type[M], what: str, depth: int = 1
     ) -> None:
-        self.key = key
-        self.invalid = 0
+        self.key: str = key
+        self.invalid: int = 0
         self._session = session
         self._decoder: msgspec.msgpack.Decoder[M] = msgspec.msgpack.Decoder(kind)
         self._what = what
-        self.depth = depth
-        self.closed = False
+        self.depth: int = depth
+        self.closed: bool = False
         self._changed = threading.Condition()
         self._newest: M | None = None
         self._received_s = 0.0

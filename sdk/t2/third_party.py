@@ -4,7 +4,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import zenoh
 
@@ -23,11 +23,13 @@ SHOWN_S, POLL_S = 1.0, 0.01  # until safety's state shows a message; its period 
 class ThirdParty:
     """The messages of one source; a thread repeats the last one, 10 times a second."""
 
+    kind: ClassVar[str]  # of the message
+    what: ClassVar[str]  # for texts
+
     def __init__(
-        self, session: zenoh.Session, key: str, kind: str, source: str, safety: Stream[SafetyState]
+        self, session: zenoh.Session, key: str, source: str, safety: Stream[SafetyState]
     ) -> None:
-        self._publisher = SourcePublisher(session, key, kind, safety)
-        self._kind = kind
+        self._publisher = SourcePublisher(session, key, self.kind, safety)
         self._source = source
         self._safety = safety
         self._message: Limit | EstopKeepalive = EstopKeepalive(echo=0)
@@ -35,7 +37,9 @@ class ThirdParty:
         self._error: Exception | None = None  # of the thread
         self._lock = threading.Lock()
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"t2 {kind} {source}", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, name=f"t2 {self.what} {source}", daemon=True
+        )
 
     @property
     def has_ended(self) -> bool:
@@ -60,7 +64,7 @@ class ThirdParty:
         """
         if self.has_ended:
             raise T2Error(
-                f"this {self._kind} has ended; the robot returns another one"
+                f"this {self.what} has ended; the robot returns another one"
             ) from self._error
         if finite(seconds) < 0:
             raise ValueError(f"seconds must not be negative, as {seconds} is")
@@ -76,7 +80,7 @@ class ThirdParty:
                 return
             time.sleep(POLL_S)
         raise NotAllowed(
-            f"safety does not show the {self._kind} of {self._source!r}: the router admits those "
+            f"safety does not show the {self.what} of {self._source!r}: the router admits those "
             "of a certificate of role device with this source, of one program; see `t2 keys list`"
         )
 
@@ -100,10 +104,8 @@ class SpeedLimit(ThirdParty):
     >>> limit.end()
     """
 
-    def __init__(
-        self, session: zenoh.Session, key: str, source: str, safety: Stream[SafetyState]
-    ) -> None:
-        super().__init__(session, key, "Limit", source, safety)
+    kind: ClassVar[str] = "Limit"
+    what: ClassVar[str] = "limit"
 
     def set(
         self,
@@ -140,10 +142,8 @@ class Keepalive(ThirdParty):
     >>> pendant.renew(seconds=0.5)  # doctest: +SKIP
     """
 
-    def __init__(
-        self, session: zenoh.Session, key: str, source: str, safety: Stream[SafetyState]
-    ) -> None:
-        super().__init__(session, key, "EstopKeepalive", source, safety)
+    kind: ClassVar[str] = "EstopKeepalive"
+    what: ClassVar[str] = "keepalive"
 
     def renew(self, *, seconds: float) -> None:
         """Repeat it for some seconds from now. Returns and raises as ``Robot.keepalive``."""

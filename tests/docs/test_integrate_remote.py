@@ -2,7 +2,6 @@
 
 import os
 import re
-import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,7 +11,6 @@ import pytest
 
 import t2
 from cli.demo import host_stalls
-from tests.cli.stack import ports
 from tests.docs.integrator import (
     ENVIRONMENT,
     LEASES,
@@ -87,10 +85,7 @@ def test_the_test_file_of_the_page(tmp_path: Path) -> None:
     """It drives the simulated vehicle, with settings for the stalls of this host."""
     save_files(tmp_path)
     stalls = host_stalls.settings(max(host_stalls.measured(), 0.3))
-    relaxed = {"bridge.unsafe_overrides", *(one.partition("=")[0] for one in stalls)}
-    own = [one for one in ports() if one.partition("=")[0] not in relaxed]
-    control = f"sim.control_port={free_port(socket.SOCK_DGRAM)}"
-    sets = host_stalls.with_accepted_joined([*own, *stalls, LEASES[0], control])
+    sets = host_stalls.with_accepted_joined([*stalls, LEASES[0]])
     given = dict(one.split("=", 1) for one in sets)
     env = {f"T2__{name.upper().replace('.', '__')}": value for name, value in given.items()}
     env["PATH"] = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
@@ -98,7 +93,7 @@ def test_the_test_file_of_the_page(tmp_path: Path) -> None:
     for _ in range(TRIES):
         done = subprocess.run(
             [sys.executable, "-m", "pytest", *words, "test_patrol.py"],
-            cwd=tmp_path, env={**ENVIRONMENT, **env, "ROUTER": given["bus.listen"]},
+            cwd=tmp_path, env={**ENVIRONMENT, **env},
             capture_output=True, text=True, timeout=90, check=False,
         )  # fmt: skip
         if done.returncode == 0:
