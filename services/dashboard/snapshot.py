@@ -21,6 +21,7 @@ from common.messages import (
     Switches,
     Ultrasonic,
 )
+from common.root_cause import RootCause, root_cause
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.telemetry_cache import TelemetryCache
 
@@ -46,6 +47,7 @@ class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
     """The values that change with the motion."""
 
     connected: bool  # to a router
+    root: RootCause
     measured: tuple[float, ...] | None  # linear and angular, as the next two
     requested: tuple[float, ...] | None
     allowed: tuple[float, ...] | None
@@ -95,6 +97,7 @@ def fast_snapshot(
     )
     return FastSnapshot(
         connected=connected,
+        root=root_cause(connected, state, link),
         measured=(velocity.linear, velocity.angular) if velocity else None,
         requested=(drive.linear, drive.angular) if drive else None,
         allowed=(motion.linear, motion.angular) if motion else None,

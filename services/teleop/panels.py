@@ -16,6 +16,7 @@ from common.messages import (
     Ultrasonic,
     Verdict,
 )
+from common.root_cause import TEXTS, RootCause, root_cause
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.view import Line, View
 
@@ -58,19 +59,25 @@ def rows_of(*rows: Text) -> Text:
 
 def header(view: View) -> Text:
     """Return the header: robot, connections, gear."""
-    bus = ("● bus", GOOD) if view.connected else ("○ no router yet", WARN)
+    bus = ("● bus", GOOD) if view.connected else ("○ no router", BAD)
     gear = (f"gear {view.gear}/5", "bold")
     top = (f"{view.top.linear:.2f} m/s {view.top.angular:.2f} rad/s", "")
-    parts = [(f"T2 {view.robot}", "bold"), bus, _board(view), _bumper(view), gear, top]
+    hops = [_board(view), _bumper(view)] if view.connected else []  # unknown without a router
+    parts = [(f"T2 {view.robot}", "bold"), bus, *hops, gear, top]
     return Text("  ", no_wrap=True).join(Text(*part) for part in parts)
 
 
 def _board(view: View) -> Part:
     if view.link is None:
-        return ("○ no bridge", WARN)
+        missing = _root(view).part == "bridge"
+        return ("○ bridge missing", BAD) if missing else ("○ no data of the bridge", WARN)
     if view.link.state == "up":
         return ("● board", GOOD)
     return ("○ board lost" if view.link.state == "lost" else "○ board never seen", BAD)
+
+
+def _root(view: View) -> RootCause:
+    return root_cause(view.connected, view.safety, view.link)
 
 
 def _bumper(view: View) -> Part:
@@ -127,10 +134,11 @@ def safety(view: View, rows: int) -> Text:
             else (" NO ROUTER ", "no connection to the router")
         )
         return rows_of(*lines, Text.assemble((badge, BADGES["inhibited"]), f"  {text}"))
-    badge = f" {state.verdict.upper()} "
-    lines.append(Text.assemble((badge, BADGES[state.verdict]), f"  {state.text}"))
+    badge, root = f" {state.verdict.upper()} ", _root(view)
+    text = TEXTS.get(root.part, state.text)
+    lines.append(Text.assemble((badge, BADGES[state.verdict]), f"  {text}"))
     lines += release(view)
-    return rows_of(*lines, *_causes(state, rows - len(lines)))
+    return rows_of(*lines, *_causes(state, root, rows - len(lines)))
 
 
 def release(view: View) -> list[Text]:
@@ -161,9 +169,10 @@ def _key(known: Release, direction: Direction, held: str) -> Text:
     return Text.assemble(key, f" {direction}", (", held" if held == direction else "", WARN))
 
 
-def _causes(state: SafetyState, rows: int) -> list[Text]:
+def _causes(state: SafetyState, root: RootCause, rows: int) -> list[Text]:
     """Return one row per cause, or all names in one row if there are too few rows."""
-    causes = [cause for cause in state.causes if cause.name != "no_request"]
+    hidden = ("no_request", *root.folded)
+    causes = [cause for cause in state.causes if cause.name not in hidden]
     causes.sort(key=lambda cause: cause.name not in state.latched)
     if len(causes) <= rows:
         return [_cause(cause, cause.text, state) for cause in causes]

@@ -7,6 +7,7 @@ from typing import get_args
 import pytest
 
 from common.messages import Direction, FaultName, LinkState, Verdict
+from common.root_cause import TEXTS as ROOT_TEXTS
 from services.dashboard import server
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.i18n import EVENTS, PHRASES, TEXTS
@@ -43,7 +44,7 @@ def test_every_used_key_has_a_text() -> None:
     [
         ("verdict", [*get_args(Verdict), "none", "lost", "no_router"]),
         ("text", ["none", "lost", "no_router"]),
-        ("link", [*get_args(LinkState), "none"]),
+        ("link", [*get_args(LinkState), "none", "missing"]),
         ("fault", [*get_args(FaultName), "reserved"]),
         ("hold", list(HoldState)),
         ("bumper", ["true", "false", "none"]),
@@ -56,6 +57,8 @@ def test_every_name_of_the_messages_has_its_text(prefix: str, names: list[str]) 
 def test_the_causes_have_the_texts_of_safety_and_each_direction_its_texts() -> None:
     for rule in RULES:
         assert TEXTS[f"cause.{rule.name}"][0] == rule.text
+    for part, text in ROOT_TEXTS.items():
+        assert TEXTS[f"root.{part}"][0] == text
     directions = get_args(Direction)
     for prefix in ("release", "release_forbidden", "believed", "moved"):
         assert {f"{prefix}_{direction}" for direction in directions} <= set(TEXTS)

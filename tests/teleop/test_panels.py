@@ -54,6 +54,17 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
             2,
             [" BRAKE   The bumper is pressed.", "LATCHED The bumper was hit. 12 s, R resets"],
         ),
+        (  # what follows from a silent board is folded
+            {
+                "safety": safety_state(latched=("contact",), causes=(SILENT, CONTACT)),
+                "link": link(state="lost"),
+            },
+            2,
+            [
+                " RUN   The board is silent: check its power and cable.",
+                "LATCHED The bumper was hit. 12 s, R resets",
+            ],
+        ),
         (  # with few rows the causes are named in one line
             {"safety": safety_state(latched=("contact",), causes=(SILENT, CONTACT))},
             2,

@@ -120,7 +120,7 @@ function draw() {
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
   sonarView.draw(fast, t);
-  panels.showCauses(fast.safety, t, language);
+  panels.showCauses(fast, t, language);
   trail.draw(fast.pose);
   charts.draw(t);
 }

@@ -40,13 +40,25 @@ export function causeText(cause, safety, t) {
   return `${t(`limited.${cause.name}`)} ${each.join(", ")}`;
 }
 
-export function showCauses(safety, t, language) {
-  const causes = safety?.causes ?? [];
+/** Return what is missing between safety and the wheels; empty if nothing is. */
+export const rootText = ({ root }, t) => (["", "router", "safety"].includes(root.part) ? "" : t(`root.${root.part}`));
+
+function rootLine({ root, safety }, t, language) {
+  const line = create("li", t(`root.${root.part}`), { "data-action": "stop", "data-cause": root.part });
+  const following = safety.causes.filter((it) => root.folded.includes(it.name)).map((it) => translated(it.text, language));
+  if (following.length) line.append(create("small", `${t("follows")} ${following.join(" ")}`));
+  return line;
+}
+
+export function showCauses(fast, t, language) {
+  const { safety, root } = fast;
+  const causes = (safety?.causes ?? []).filter((it) => !root.folded.includes(it.name));
   const shown = causes.map((it) => [it, it.age < 10 ? it.age?.toFixed(1) : Math.floor(it.age)]);
-  const stamp = JSON.stringify([shown.map(([it, age]) => [it.name, it.text, age]), safety?.latched, t("why")]);
-  if (!causes.length) {
+  const roots = rootText(fast, t) ? [rootLine(fast, t, language)] : [];
+  const stamp = JSON.stringify([roots.map((it) => it.textContent), shown.map(([it, age]) => [it.name, it.text, age]), safety?.latched, t("why")]);
+  if (!causes.length && !roots.length) {
     fill($("causes"), stamp, () => [create("li", t(safety ? "no_causes" : "unknown"))]);
-  } else fill($("causes"), stamp, () => shown.map(([it]) => {
+  } else fill($("causes"), stamp, () => [...roots, ...shown.map(([it]) => {
     const text = causeText(it, safety, t);
     const line = create("li", text, { "data-action": it.action, "data-cause": it.name });
     const latched = safety.latched.includes(it.name) ? ` · ${t("latched")}` : "";
@@ -55,7 +67,7 @@ export function showCauses(safety, t, language) {
     const more = same ? "" : `${details} · `;
     line.append(create("small", `${more}${t("since")} ${duration(it.age)}${latched}`));
     return line;
-  }));
+  })]);
   const limits = safety?.limits;
   fill($("limits"), JSON.stringify([limits, t("why")]), () => [
     ["forward", limits?.forward, "m/s"], ["backward", limits?.backward, "m/s"],

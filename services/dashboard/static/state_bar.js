@@ -1,5 +1,5 @@
 // The state bar and the chips of the header: verdict, reason, speed, connections, driver.
-import { causeText } from "./panels.js";
+import { causeText, rootText } from "./panels.js";
 import { translated } from "./phrases.js";
 
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
@@ -36,8 +36,9 @@ function showState(view) {
 // The other latched causes, and what to do.
 function detail({ fast, t, language, isDriver }, worst) {
   const { safety } = fast;
-  const others = safety.causes.filter((it) => it !== worst && safety.latched.includes(it.name));
-  const more = language !== "en" && worst ? translated(worst.text, language) : "";
+  const root = rootText(fast, t);
+  const others = safety.causes.filter((it) => (root || it !== worst) && safety.latched.includes(it.name));
+  const more = language !== "en" && worst && !root ? translated(worst.text, language) : "";
   return [
     more === (worst && causeText(worst, safety, t)) ? "" : more,
     others.length ? `${t("also_latched")} ${others.map((it) => causeText(it, safety, t)).join(" ")}` : "",
@@ -72,6 +73,8 @@ function due(fast) {
 
 function sentence({ fast, t, language }, worst) {
   const { safety } = fast;
+  const root = rootText(fast, t);
+  if (root) return root;
   if (language === "en") return safety.text;
   if (!worst) return translated(safety.text, language); // the source in control
   return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t(due(fast)) : "");
@@ -80,8 +83,8 @@ function sentence({ fast, t, language }, worst) {
 function showHead(view) {
   const { fast, t, isDriver, viewer, keepsAlive } = view;
   const off = !fast?.connected; // without a router all values are old
-  chip("link", off ? "" : t(`link.${fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
-  chip("bumper", off ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
+  chip("link", off ? "" : t(`link.${fast.root.part === "bridge" ? "missing" : fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
+  chip("bumper", off || rootText(fast, t) ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
   chip("driver", off ? "" : driver(view), isDriver && !fast.driver.other ? "clear" : "slow");
   const keeper = off || !keepsAlive ? "" : fast.keeper === viewer ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");

@@ -1,0 +1,56 @@
+"""The first part between a screen and the wheels that is missing, and what follows from it. Pure.
+
+Safety reports what it lacks, so a missing part shows as several causes of it. A screen names the
+part, in this order, and folds the causes below it. It changes no decision.
+
+====== ===========================================================================
+part   missing when
+====== ===========================================================================
+router there is no connection
+safety no state of safety arrives
+bridge no state of the link arrives, and safety lacks data, too
+relay  the bridge reports that the configured relay is silent
+board  the bridge reports that the board is silent
+====== ===========================================================================
+"""
+
+from typing import Literal
+
+from msgspec import Struct
+
+from common.messages import Link, SafetyState
+
+Part = Literal["", "router", "safety", "bridge", "relay", "board"]
+
+TEXTS: dict[Part, str] = {
+    "bridge": "The bridge does not run, or it hangs: start it on the robot.",
+    "relay": "The relay is silent: check its power and cable.",
+    "board": "The board is silent: check its power and cable.",
+}
+# Causes of safety that a missing bridge, relay or board has as well. One that latches, or that
+# brakes a moving vehicle, is not among them.
+FOLLOWING = (
+    "starting", "link", "switches", "bumper", "silent", "unarmed", "bumper_lossy", "sonar",
+)  # fmt: skip
+
+
+class RootCause(Struct, frozen=True):
+    """The missing part; empty if there is none."""
+
+    part: Part = ""
+    folded: tuple[str, ...] = ()  # names of safety's causes that follow from it
+
+
+def root_cause(connected: bool, state: SafetyState | None, link: Link | None) -> RootCause:
+    """Return what is missing first; None stands for a message that is too old or never came."""
+    if not connected:
+        return RootCause("router")
+    if state is None:
+        return RootCause("safety")
+    folded = tuple(cause.name for cause in state.causes if cause.name in FOLLOWING)
+    if link is None:
+        return RootCause("bridge", folded) if folded else RootCause()
+    if link.state == "up":
+        return RootCause()
+    is_relay = link.relay is not None and link.relay.state != "up"
+    return RootCause("relay" if is_relay else "board", folded)
