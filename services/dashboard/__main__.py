@@ -4,7 +4,14 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from common.cli_args import add_setting, add_sources, needs_extra, run_program, sources
+from common.cli_args import (
+    add_setting,
+    add_sources,
+    needs_extra,
+    run_program,
+    source_words,
+    sources,
+)
 from common.config import load
 from services.dashboard.config import DashboardConfig
 
@@ -23,7 +30,7 @@ def run(options: argparse.Namespace) -> int:
     loaded = load(DashboardConfig, sources(options))
     with needs_extra("dashboard", "the page"):
         from services.dashboard.host import Host
-    return Host(loaded).run()
+    return Host(loaded, source_words(options)).run()
 
 
 def main(argv: Sequence[str] | None = None) -> int:

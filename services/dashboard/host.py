@@ -10,6 +10,7 @@ import ssl
 import sys
 import threading
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from common import clock, log
@@ -20,14 +21,15 @@ from common.systemd import Systemd
 from services.dashboard.auth import TOKEN_MIN, Credentials
 from services.dashboard.config import Dashboard, DashboardConfig
 from services.dashboard.fleet import Fleet
-from services.dashboard.server import listen, reachable, serving
+from services.dashboard.server import listen, page, reachable, serving
 from services.dashboard.websocket_hub import WebSocketHub
 
 
 class Host:
     """The dashboard's process: node, fleet and web server."""
 
-    def __init__(self, loaded: Loaded[DashboardConfig]) -> None:
+    def __init__(self, loaded: Loaded[DashboardConfig], words: Sequence[str]) -> None:
+        """``words`` are the options that name sources of settings, for hints."""
         settings = loaded.config.dashboard
         self._credentials = Credentials(token(settings))
         check_certificate(settings)
@@ -47,6 +49,7 @@ class Host:
             self._credentials,
             hub,
             self._socket,
+            template=page(settings, loaded.config.bus.endpoints, words),
             alive=self._alive,
         )
         self._error: BaseException | None = None

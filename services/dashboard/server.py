@@ -3,9 +3,10 @@
 import html
 import json
 import re
+import shlex
 import socket
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ipaddress import ip_address
 from pathlib import Path
 from string import Template
@@ -41,6 +42,7 @@ def serving(
     hub: WebSocketHub,
     listener: Listener,
     *,
+    template: str,
     alive: Callable[[], None],
 ) -> uvicorn.Server:
     """Return the server, ready to run; it calls ``alive`` in its own loop, once a second."""
@@ -50,7 +52,7 @@ def serving(
 
     return uvicorn.Server(
         uvicorn.Config(
-            AuthMiddleware(_application(settings, robot, hub, listener), credentials, settings),
+            AuthMiddleware(_application(template, robot, hub, listener), credentials, settings),
             loop="asyncio",  # the listener needs it
             http="h11",
             h11_max_incomplete_event_size=HEADER_MAX,
@@ -76,11 +78,8 @@ def serving(
     )
 
 
-def _application(
-    settings: Dashboard, robot: str, hub: WebSocketHub, listener: Listener
-) -> Starlette:
+def _application(template: str, robot: str, hub: WebSocketHub, listener: Listener) -> Starlette:
     """Return the application behind the authentication."""
-    template = page(settings)
 
     async def index(request: Request) -> Response:
         shown = request.query_params.get("robot", robot)
@@ -117,12 +116,17 @@ def _script(content: object) -> str:
     return json.dumps(content, ensure_ascii=False).replace("<", "\\u003c")
 
 
-def page(settings: Dashboard) -> str:
-    """Return the page, with ``ROBOT_ID`` in place of the robot that it shows."""
+def page(settings: Dashboard, router: Sequence[str], words: Sequence[str]) -> str:
+    """Return the page, with ``ROBOT_ID`` in place of the robot that it shows.
+
+    Without a connection it names the router's endpoints, and `t2 doctor` with the option ``words``.
+    """
+    doctor = f"t2 doctor --robot {ROBOT_ID} {shlex.join(words)}".strip()
     template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
     return template.substitute(
         robot=ROBOT_ID, texts=_script(table()), phrases=_script(phrases()),
-        camera=html.escape(settings.camera),
+        camera=html.escape(settings.camera), router=html.escape(", ".join(router)),
+        doctor=html.escape(doctor),
     )  # fmt: skip
 
 

@@ -15,7 +15,14 @@ from collections.abc import Callable, Sequence
 from types import FrameType
 
 from common import log
-from common.cli_args import add_setting, add_sources, needs_extra, run_program, sources
+from common.cli_args import (
+    add_setting,
+    add_sources,
+    needs_extra,
+    run_program,
+    source_words,
+    sources,
+)
 from common.config import Loaded, load
 from common.errors import RobotError
 from common.service import Node
@@ -46,13 +53,13 @@ def run(options: argparse.Namespace) -> int:
     loaded = load(TeleopConfig, sources(options))
     if not terminal_is_there():
         raise RobotError("driving needs a terminal on standard input and output")
-    return TeleopProcess(loaded).run()
+    return TeleopProcess(loaded, source_words(options)).run()
 
 
 class TeleopProcess:
     """Teleop's process: the node's loop, the controller and the screen."""
 
-    def __init__(self, loaded: Loaded[TeleopConfig]) -> None:
+    def __init__(self, loaded: Loaded[TeleopConfig], words: Sequence[str]) -> None:
         with needs_extra("teleop", "the screen"):
             from services.teleop.app import TeleopApp
         self._screen = TeleopApp
@@ -60,7 +67,7 @@ class TeleopProcess:
         event_log.capture_logs(loaded.config.log)
         self._settings = loaded.config
         self._node = node = Node("teleop", loaded)
-        self._controller = controller = Controller(node, event_log)
+        self._controller = controller = Controller(node, event_log, words)
         node.announce()
         node.loop.every(TERMINAL_POLL_S, self._check_terminal)
         node.loop.post(lambda: controller.use_gamepad(find(self._settings.teleop)))

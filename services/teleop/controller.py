@@ -4,6 +4,7 @@ The screen runs in another thread. It posts key presses to this loop and reads `
 terminal can therefore delay a key, but never a zero request. ``Controls`` decides what counts.
 """
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -12,6 +13,7 @@ from msgspec.structs import replace
 from common import clock, keys
 from common.bus.bus import Arrival, no_answer, not_allowed
 from common.bus.session import is_viewer
+from common.cli_args import with_options
 from common.client import Contest, EstopRepetition, EstopStep, ResetCheck, reset_request
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Drive, Event, ResetDone, SafetyState
@@ -28,7 +30,7 @@ PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 SCREEN_TIMEOUT_S = 1.0  # without a redraw the terminal is lost: the gamepad is released
 UNHEARD_TICKS = 10  # without a fresh state of safety; with its own 0.5 s this is 1 s
 RESET_TIMEOUT_S = 1.0  # safety refuses an older reset
-UNHEARD = "no state of safety for 1 s: controls released; check it with `t2 doctor`"
+UNHEARD = "no state of safety for 1 s: controls released"
 NOT_CONFIRMED = (
     "RESET NOT CONFIRMED: safety's state does not show the effect of the reset; "
     "look at the vehicle, then at `t2 ls --services`"
@@ -49,7 +51,11 @@ TOPICS: dict[str, tuple[Any, float, str]] = {
 class Controller:
     """Key presses in, requests out, and a view of the state; all methods in the loop's thread."""
 
-    def __init__(self, node: Node[TeleopConfig], event_log: EventLog) -> None:
+    def __init__(
+        self, node: Node[TeleopConfig], event_log: EventLog, words: Sequence[str] = ()
+    ) -> None:
+        """``words`` are the options that name sources of settings, for hints."""
+        self._doctor = with_options("`t2 doctor`", words)
         self._node, self._bus, self._event_log = node, node.bus, event_log
         self._settings = node.config.teleop
         self._may_stop = not is_viewer(self._bus.where)
@@ -272,6 +278,8 @@ class Controller:
 
     def _alarm(self) -> str:
         """Return what the operator must know before anything else; empty for nothing."""
+        if self._estop.is_pending and not self._bus.connected:
+            return "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch"
         if self._unconfirmed:
             return self.unconfirmed
         if not self._may_stop:
@@ -290,6 +298,8 @@ class Controller:
             robot=self._bus.robot,
             source=self._settings.source,
             connected=self._bus.connected,
+            router=", ".join(self._bus.where.endpoints),
+            doctor=self._doctor,
             may_drive=self._may_stop and not self._source.denied,
             may_stop=self._may_stop,
             alarm=self._alarm(),

@@ -63,7 +63,8 @@ def header(view: View) -> Text:
     gear = (f"gear {view.gear}/5", "bold")
     top = (f"{view.top.linear:.2f} m/s {view.top.angular:.2f} rad/s", "")
     hops = [_board(view), _bumper(view)] if view.connected else []  # unknown without a router
-    parts = [(f"T2 {view.robot}", "bold"), bus, *hops, gear, top]
+    shown = [gear, top] if view.safety else []  # a limit beside "no safety" looks live
+    parts = [(f"T2 {view.robot}", "bold"), bus, *hops, *shown]
     return Text("  ", no_wrap=True).join(Text(*part) for part in parts)
 
 
@@ -129,16 +130,20 @@ def safety(view: View, rows: int) -> Text:
     state, lines = view.safety, [Text(view.alarm, style=BAD)] if view.alarm else []
     if state is None:
         badge, text = (
-            (" NO SAFETY ", "no state of safety received; check it with `t2 doctor`")
+            (" NO SAFETY ", f"no state of safety arrives through {view.router}")
             if view.connected
-            else (" NO ROUTER ", "no connection to the router")
+            else (" NO ROUTER ", f"no answer at {view.router}")
         )
-        return rows_of(*lines, Text.assemble((badge, BADGES["inhibited"]), f"  {text}"))
+        lines.append(Text.assemble((badge, BADGES["inhibited"]), f"  {text}"))
+        return rows_of(*lines, Text(f"To stop, use the vehicle's own switch. Next: {view.doctor}"))
     badge, root = f" {state.verdict.upper()} ", _root(view)
     text = TEXTS.get(root.part, state.text)
     lines.append(Text.assemble((badge, BADGES[state.verdict]), f"  {text}"))
     lines += release(view)
-    return rows_of(*lines, *_causes(state, root, rows - len(lines)))
+    lines += _causes(state, root, rows - len(lines))
+    if root.part in TEXTS and len(lines) < rows:
+        lines.append(Text(f"Next: {view.doctor}", style=DIM))
+    return rows_of(*lines)
 
 
 def release(view: View) -> list[Text]:

@@ -45,6 +45,8 @@ class View:
     robot: str
     source: str
     connected: bool  # to a router
+    router: str = ""  # its endpoints
+    doctor: str = "`t2 doctor`"  # with the options of this program
     may_drive: bool = True
     may_stop: bool = True
     alarm: str = ""  # what the operator must know first

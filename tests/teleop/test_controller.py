@@ -102,6 +102,12 @@ def test_an_estop_that_is_not_latched_is_reported(
     assert operator.controller.view.alarm != alarm
 
 
+def test_an_estop_without_a_router_is_reported_at_once(operator: Operator) -> None:
+    operator.press("e")
+    operator.ticks(1)
+    assert operator.controller.view.alarm.startswith("EMERGENCY STOP NOT SENT YET")
+
+
 # --- rules ----------------------------------------------------------------------------------
 
 

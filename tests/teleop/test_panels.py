@@ -18,6 +18,7 @@ from tests.teleop.support import view
 
 CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
 SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too old.")
+NEXT = "To stop, use the vehicle's own switch. Next: `t2 doctor`"
 IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.")
 
 
@@ -27,7 +28,16 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
 @pytest.mark.parametrize(
     ("fields", "rows", "expected"),
     [
-        ({}, 2, [" NO SAFETY   no state of safety received; check it with `t2 doctor`"]),
+        (
+            {"router": "tcp/a:1"},
+            2,
+            [" NO SAFETY   no state of safety arrives through tcp/a:1", NEXT],
+        ),
+        (
+            {"router": "tcp/a:1", "connected": False},
+            2,
+            [" NO ROUTER   no answer at tcp/a:1", NEXT],
+        ),
         (
             {"alarm": "NOT CONFIRMED", "safety": safety_state(text="Stands.")},
             3,
@@ -40,7 +50,8 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
                     latched=("contact",),
                     causes=(SILENT, CONTACT, IDLE),
                     text="No.",
-                )
+                ),
+                "link": link(),
             },
             3,
             [
@@ -59,14 +70,18 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
                 "safety": safety_state(latched=("contact",), causes=(SILENT, CONTACT)),
                 "link": link(state="lost"),
             },
-            2,
+            3,
             [
                 " RUN   The board is silent: check its power and cable.",
                 "LATCHED The bumper was hit. 12 s, R resets",
+                "Next: `t2 doctor`",
             ],
         ),
         (  # with few rows the causes are named in one line
-            {"safety": safety_state(latched=("contact",), causes=(SILENT, CONTACT))},
+            {
+                "safety": safety_state(latched=("contact",), causes=(SILENT, CONTACT)),
+                "link": link(),
+            },
             2,
             [" RUN   Driving.", "LATCHED contact 12 s, R resets  stop silent 5 min"],
         ),

@@ -32,7 +32,8 @@ let drawn; // the drawn snapshot; null without a connection
 const t = (key) => texts[language][key] ?? key;
 const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
-const robot = $("page").dataset.robot;
+const off = () => lost() || !fast.connected;
+const { robot, router, doctor } = $("page").dataset;
 // The heartbeat of safety in a snapshot: its age is the age of what the operator saw.
 const echoOf = (snapshot) => snapshot?.safety?.heartbeat ?? 0;
 // A hold is sent only while the socket is not congested: a burst of old answers is useless.
@@ -105,7 +106,7 @@ const newest = () => (lost() ? null : fast);
 
 /** What the state bar and the header show; `fast` is null without a connection. */
 const view = () => ({
-  fast: newest(), t, language, robot, isDriver: isDriver(), viewer: hello?.id,
+  fast: newest(), t, language, robot, router, doctor, isDriver: isDriver(), viewer: hello?.id,
   keepsAlive: !!hello?.keepalive, viewers: slow?.viewers ?? 0,
 });
 
@@ -113,7 +114,7 @@ function draw() {
   requestAnimationFrame(draw);
   if (newest() === drawn) return;
   drawn = newest();
-  document.body.classList.toggle("stale", lost());
+  document.body.classList.toggle("stale", off());
   stateBar.show(view());
   driving.show(isDriver(), newest());
   notices.place();
@@ -182,7 +183,7 @@ function begin() {
   };
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
-  estop.begin({ send, lost, toast, robot, barred: () => driving.viewOnly(fast) });
+  estop.begin({ send, off, toast, robot, barred: () => driving.viewOnly(fast) });
   showCamera($("page").dataset.camera.replaceAll("{robot}", robot));
   trail.begin();
   showTexts();

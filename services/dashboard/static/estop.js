@@ -15,6 +15,7 @@ export function begin(given) {
 export function request() {
   const barred = page.barred(); // why this page may not drive, and perhaps not stop
   if (!pending && barred === "view_only_stop") page.toast(barred, "error");
+  else if (page.off()) page.toast("estop_not_sent", "error");
   else if (!pending) page.toast("estop_asked", "warning");
   pending = { since: performance.now(), barred };
   sendStop();
@@ -36,7 +37,7 @@ function repeat() {
 
 function sendStop() {
   page.send({ k: "estop" });
-  const failed = () => { if (page.lost()) page.toast("estop_unconfirmed", "error"); };
+  const failed = () => { if (page.off()) page.toast("estop_not_sent", "error"); };
   // With keepalive it is sent even if the page is being closed.
   fetch(`/estop/${page.robot}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
     .then((response) => {

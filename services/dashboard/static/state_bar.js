@@ -28,13 +28,19 @@ function showState(view) {
   const known = !WITHOUT_STATE.includes(verdict);
   const reason = known ? sentence(view, worst) : t(`text.${verdict}`);
   set("sentence", overruler ? `${t("overruled_by")} ${overruler}${view.language === "en" ? ". " : "。"}${reason}` : reason);
-  set("detail", known ? detail(view, worst) : "");
+  set("detail", known ? detail(view, worst) : whatNext(view, verdict));
   set("speed", !fast?.measured ? "–" : fast.measured[0].toFixed(2));
   set("turn", !fast?.measured ? "–" : fast.measured[1].toFixed(2));
 }
 
+// Which address does not answer, and the command that finds out why.
+function whatNext({ fast, t, router, doctor }, verdict) {
+  const address = fast ? router : location.host;
+  return `${t(verdict === "none" ? "router_at" : "no_answer_at")} ${address} · ${t("next_step")} ${doctor}`;
+}
+
 // The other latched causes, and what to do.
-function detail({ fast, t, language, isDriver }, worst) {
+function detail({ fast, t, language, isDriver, doctor }, worst) {
   const { safety } = fast;
   const root = rootText(fast, t);
   const others = safety.causes.filter((it) => (root || it !== worst) && safety.latched.includes(it.name));
@@ -43,6 +49,7 @@ function detail({ fast, t, language, isDriver }, worst) {
     more === (worst && causeText(worst, safety, t)) ? "" : more,
     others.length ? `${t("also_latched")} ${others.map((it) => causeText(it, safety, t)).join(" ")}` : "",
     safety.latched.length && !isDriver && fast.driver.may ? t("take_to_reset") : "",
+    root ? `${t("next_step")} ${doctor}` : "",
   ].filter(Boolean).join(" ");
 }
 
