@@ -20,7 +20,7 @@ PERIOD_S = 0.1
 SHOWN_S, POLL_S = 1.0, 0.01  # until safety's state shows a message; its period is 0.05 s
 
 
-class ThirdParty:
+class Repetition:
     """The messages of one source; a thread repeats the last one, 10 times a second."""
 
     kind: ClassVar[str]  # of the message
@@ -96,7 +96,7 @@ class ThirdParty:
             self._publisher.close()
 
 
-class SpeedLimit(ThirdParty):
+class SpeedLimit(Repetition):
     """The limit of one source.
 
     >>> limit = robot.limit("detector", linear=0.5, seconds=1)
@@ -135,7 +135,7 @@ class SpeedLimit(ThirdParty):
         return shown(self._source, self._safety.latest().limit_sources, "safety.limits")
 
 
-class Keepalive(ThirdParty):
+class Keepalive(Repetition):
     """An emergency stop that is kept alive under one name, as a pendant does.
 
     >>> pendant = robot.keepalive("pendant", seconds=0.5)  # doctest: +SKIP
