@@ -6,6 +6,7 @@
 import contextlib
 import json
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -143,6 +144,7 @@ def stop_and_reset(robot: Robot) -> str:
     assert stopped["success"], stopped
     wait_until(lambda: "estop" in robot.client.latched, "the latch")
     assert robot.last("/hardware/e_stop", "std_msgs/msg/Bool")["data"]
+    time.sleep(1.0)  # a reset that may be older than the stop is refused
     (cleared,) = robot.node("call", "/hardware/e_stop_reset")
     assert cleared["success"], cleared
     wait_until(lambda: not robot.client.latched, "no latch after the reset")
