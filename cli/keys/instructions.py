@@ -7,8 +7,7 @@ from cli.keys.member_list import EVERY_ROBOT
 from cli.keys.members import OPERATORS_SOURCES, Member, Profile
 
 PLACE = "/etc/t2/keys"  # on a router's machine, as in the systemd units and compose.yaml
-# A container's router starts with generated rules: they must be generated again first.
-IN_CONTAINERS = "docker compose up -d --force-recreate router-settings router"
+IN_CONTAINERS = "docker compose restart router"
 
 
 def authority_created(folder: str, site: str, until: str) -> Iterator[str]:

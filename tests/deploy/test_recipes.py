@@ -19,15 +19,17 @@ from verification.harness.waiting import wait_until
 from verification.system.containers import compose
 
 ROOT = Path(__file__).parents[2]
-OWN_ROUTER, TLS = "deploy/compose/own-router.yaml", "deploy/compose/tls.yaml"
+ZENOHD, TLS = "deploy/compose/zenohd.yaml", "deploy/compose/tls.yaml"
 REALTIME = "deploy/compose/realtime.yaml"
-OF_T2 = {"router", "router-settings", "bridge", "safety", "odom", "recorder", "dashboard"}
-OPTIONAL = {"sim", "laptop", "ros2"}  # services, each with a profile of its name
+CHAIN = {"router", "bridge", "safety"}
+OF_T2 = CHAIN | {"odom", "recorder", "dashboard"}
+# Services with a profile.
+OPTIONAL = {"sim": "sim", "laptop": "laptop", "ros2": "ros2", "router-settings": "zenohd"}
 HOST_NETWORK, NO_NETWORK = {"bridge", "sim"}, {"safety", "odom", "recorder"}
 ISOLATED = (  # each container
     "\n    read_only: true\n", "\n    init: true\n", "\n    cap_drop:\n +- ALL\n",
-    "no-new-privileges:true", " cpus: ", " mem_limit: ", " memswap_limit: ", " pids_limit: ",
-    " max-size: ", "\n    restart: ",
+    "no-new-privileges:true", " cpus(et)?: ", " mem_limit: ", " memswap_limit: ", " pids_limit: ",
+    " max-size: ", "\n    restart: ", "\n    stop_grace_period: ",
 )  # fmt: skip
 SHIPPED = {"common", "services", "sim", "cli", "config", "deploy"}
 
@@ -37,7 +39,7 @@ def config(*overlays: str, **environ: str) -> dict[str, str]:
     if not any(map(shutil.which, ("docker", "docker-compose"))):
         pytest.skip("Compose is not installed")
     files = [word for file in ("compose.yaml", *overlays) for word in ("-f", file)]
-    profiles = [word for name in sorted(OPTIONAL) for word in ("--profile", name)]
+    profiles = [word for name in OPTIONAL.values() for word in ("--profile", name)]
     whole = subprocess.run(
         [*compose(), "--env-file", "deploy/compose/robot.env", *files, *profiles, "config"],
         cwd=ROOT, env={"PATH": os.environ["PATH"]} | environ,
@@ -49,15 +51,20 @@ def config(*overlays: str, **environ: str) -> dict[str, str]:
     return dict(zip(parts[::2], parts[1::2], strict=True))
 
 
-@pytest.mark.parametrize("overlays", [(TLS, REALTIME), (OWN_ROUTER, TLS, REALTIME)])
+@pytest.mark.parametrize("overlays", [(TLS, REALTIME), (ZENOHD, TLS, REALTIME)])
 def test_compose_gives_each_container_its_rights_only(overlays: tuple[str, ...]) -> None:
     services = config(*overlays, T2_ROBOT="002")
-    assert services.keys() == OF_T2 | OPTIONAL
+    assert services.keys() == OF_T2 | OPTIONAL.keys()
     assert all(re.search(r"\n +T2__ROBOT__ID: .?002", text) for text in services.values())
     drive = {name for name, text in services.items() if re.search(r"[ :]/run/t2-drive\b", text)}
     assert drive == {"bridge", "safety"}
     granted = {name for name, text in services.items() if f"rtprio: {realtime.GUARD}\n" in text}
-    assert granted == {"router", "bridge", "safety"}
+    assert granted == CHAIN
+    assert {name for name, text in services.items() if "cpuset: " in text} == CHAIN
+    assert not [name for name in CHAIN if " cpus: " in services[name]]
+    checked = {name for name, text in services.items() if "healthcheck:" in text}
+    assert checked == OF_T2 | {"ros2"}
+    assert (ZENOHD in overlays) == ("target: zenohd" in services["router"])
     assert "T2__BUS__CONNECT: tls/192.168.201.1:7447\n" in services["laptop"]
     for name, text in services.items():
         assert not [rule for rule in ISOLATED if not re.search(rule, f"\n{text}")], name

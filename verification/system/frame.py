@@ -21,6 +21,7 @@ from verification.harness.waiting import becomes_true, wait_until
 ROOT = Path(__file__).parents[2]
 SUITE = os.environ.get("SUITE", "bookworm")  # of Debian, as in deploy/image/base.sh
 PACKAGES = "systemd-sysv,dbus,udev,kmod,iproute2,python3"
+TOOLS = {"docker": "docker.io", "debootstrap": "debootstrap", "ip": "iproute2"}  # Debian packages
 PATIENCE_S, BUILD_S = 60.0, 3600.0
 SPEED, MOVING = 0.3, 0.1  # m/s
 # Like --privileged, without SYS_RESOURCE, which not every host grants: systemd then skips
@@ -45,9 +46,9 @@ def lacking() -> str:
     """Return what this host lacks for the tests; empty when nothing is missing."""
     if os.geteuid() != 0:
         return "root is required"
-    absent = [tool for tool in ("docker", "debootstrap", "ip") if not shutil.which(tool)]
+    absent = [package for tool, package in TOOLS.items() if not shutil.which(tool)]
     if absent:
-        return f"not installed: {', '.join(absent)}"
+        return f"a program is missing: apt install {' '.join(absent)}"
     answer = attempt("docker", "info")
     return f"the Docker engine does not answer: {answer.stderr}" if answer.returncode else ""
 

@@ -35,5 +35,5 @@ def test_a_ros_computers_environment() -> None:
 
 def test_the_services_of_containers_exist() -> None:
     compose = (DOCS.parent / "compose.yaml").read_text(encoding="utf-8")
-    for service in instructions.IN_CONTAINERS.partition("--force-recreate ")[2].split():
+    for service in instructions.IN_CONTAINERS.partition(" restart ")[2].split():
         assert f"\n  {service}:\n" in compose
