@@ -1,4 +1,4 @@
-"""Recordings of T2: the messages of an MCAP file. Needs ``pip install 't2-sdk[recording]'``."""
+"""Recordings of T2: the messages of an MCAP file. Needs the extra ``recording`` of t2-sdk."""
 
 import struct
 from collections.abc import Iterator
@@ -40,7 +40,7 @@ class Recording:
         try:
             from mcap.exceptions import McapError
         except ImportError as error:
-            raise T2Error(f"{error}: pip install 't2-sdk[recording]'") from error
+            raise T2Error(f"a recording needs the extra [recording] of t2-sdk: {error}") from error
         has_begun = self.is_cut = False
         try:
             with self.path.open("rb") as file:
