@@ -307,6 +307,7 @@ class Controller:
             top=controls.top(),
             requested=self._requested,
             keys_refused=self.terminal.refusal(now_ns),
+            keys_muted=controls.is_muted(now_ns),
             gamepad=self._gamepad.status,
             move_stick=controls.is_gamepad_due(now_ns),
             lines=self._event_log.lines(),

@@ -97,6 +97,8 @@ def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
         return row
     if view.keys_refused:
         return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
+    if view.keys_muted:
+        return row.append(f"\nKEYS OFF: release all keys for {hold_first_s:g} s", style=BAD)
     limit = (
         f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
         f"a hold {hold_s:g} s past its last repeat"
@@ -115,7 +117,7 @@ def events(view: View, rows: int, width: int = 200) -> Text:
 
 
 def _wrapped(line: Line, width: int) -> list[Text]:
-    first, *rest = wrap(line.text, width) or [""]
+    first, *rest = wrap(line.text, width, break_on_hyphens=False) or [""]
     style = LEVELS[line.level]
     time = f"{datetime.fromtimestamp(line.t_ns / 1e9):%H:%M:%S} "
     head = Text.assemble((time, DIM), (f"{line.service:<7} ", "cyan"), (first, style))

@@ -54,6 +54,7 @@ class View:
     top: Twist  # of full deflection in this gear
     requested: Drive | None = None  # None: silent
     keys_refused: str = ""  # why keys are refused
+    keys_muted: bool = False  # until they were released
     gamepad: str = ""  # its status
     move_stick: bool = False  # the gamepad drives and sent no event for a while
     safety: SafetyState | None = None
@@ -85,6 +86,8 @@ class EventLog:
             if self._lines and replace(self._lines[-1], t_ns=t_ns) == added:
                 self._lines.pop()
             self._lines.append(added)
+            if len(self._lines) > 1 and self._lines[-2].t_ns > t_ns:  # history of another service
+                self._lines = deque(sorted(self._lines, key=lambda each: each.t_ns), LINES)
 
     def lines(self) -> tuple[Line, ...]:
         """Return the lines, the newest last."""

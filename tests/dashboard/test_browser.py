@@ -63,6 +63,11 @@ def test_the_content_of_the_page(page: Page) -> None:
     wait_for_text(page, "#driver", "No driver")
     wait_for_text(page, "#bumper", "clear")
     assert page.locator("#sonar-view .sector[data-tone=clear]").count() == 8  # an empty world
+    wait_for_text(page, "#events", "Link up: the board is connected")
+    page.keyboard.down("w")  # without control; it says so while it is held
+    wait_for_text(page, "#hold", "Take control first.")
+    page.keyboard.up("w")
+    page.wait_for_function("() => !document.querySelector('#hold').textContent")
     for service in ("bridge", "safety", "odom", "dashboard"):
         page.wait_for_selector(f"tr[data-service={service}][data-state=alive]")
     wait_for_text(page, "#ultrasonic_brake", "on")

@@ -34,6 +34,13 @@ def test_a_line_is_printable_and_has_a_greatest_length() -> None:
     assert line.text.isprintable()
 
 
+def test_lines_are_in_the_order_of_their_times() -> None:
+    event_log = EventLog()
+    for t_ns in (3, 1, 2):
+        event_log.add("safety", "info", f"event {t_ns}", t_ns)
+    assert [line.t_ns for line in event_log.lines()] == [1, 2, 3]
+
+
 def test_a_repeated_line_is_kept_once_with_its_last_time() -> None:
     event_log = EventLog()
     for t_ns, text in ((1, "stop"), (2, "refused"), (3, "refused"), (4, "stop")):

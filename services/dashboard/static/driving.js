@@ -23,6 +23,7 @@ let mustReset = false; // another cause is latched beside the contact: safety re
 let driving = false; // whether this viewer has the driver lock
 let another = null; // another source that drives
 let barred = ""; // why this page may not drive
+let refused = null; // { code, key }: a key that is held, and why it is refused
 let sent = false; // whether the server has a hold from here
 
 const shaped = (raw) => {
@@ -79,7 +80,7 @@ function free() {
 export function letGo() {
   down.clear();
   stick = null;
-  releasing = null;
+  releasing = refused = null;
   seenUp.clear();
   if (driving) free();
   knob(0, 0);
@@ -100,7 +101,7 @@ export const viewOnly = (fast) => {
 export function show(isDriver, fast) {
   const driver = fast?.driver ?? null;
   const next = nextStep(fast);
-  const refused = resetRefusal(fast);
+  const noReset = resetRefusal(fast);
   another = driver?.other ?? null;
   const panel = document.querySelector(".driving");
   const hold = driver?.hold ?? "free";
@@ -110,11 +111,11 @@ export function show(isDriver, fast) {
   write("view-only", barred && page.t(barred));
   $("estop").classList.toggle("unable", barred === "view_only_stop");
   panel.dataset.hold = hold;
-  write("hold", !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
+  write("hold", refused ? page.t(refused.key) : !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
   disable($("leave"), !isDriver);
   disable($("take"), isDriver);
-  disable($("reset"), !isDriver || !!refused);
-  $("reset").title = refused ? page.t(refused) : "";
+  disable($("reset"), !isDriver || !!noReset);
+  $("reset").title = noReset ? page.t(noReset) : "";
   const off = !fast?.connected;
   $("stick").classList.toggle("disabled", off);
   $("stick").title = off ? page.t("no_router") : "";
@@ -179,10 +180,15 @@ export function showGear(gear, isDriver) {
 
 // --- input events -----------------------------------------------------------------------------
 
-const ready = () => {
-  if (!driving) page.toast(barred || "take_first");
+const ready = (code = "") => {
+  if (!driving) refuse(code, barred || "take_first");
   return driving;
 };
+
+function refuse(code, key) {
+  page.toast(key, "warning");
+  if (code) refused = { code, key };
+}
 
 function listenToStick() {
   const it = $("stick");
@@ -212,10 +218,10 @@ function listenToStick() {
 }
 
 // Two directions at once release.
-function holdRelease(direction) {
-  if (!ready()) return;
-  const refused = refusal(direction);
-  if (refused) page.toast(refused, "warning");
+function holdRelease(direction, code = "") {
+  if (!ready(code)) return;
+  const key = refusal(direction);
+  if (key) refuse(code, key);
   else if (releasing && releasing !== direction) letGo();
   else releasing = direction;
 }
@@ -255,8 +261,8 @@ function keyDown(event) {
   else if (KEYS[event.code]) {
     event.preventDefault();
     // A repeat is no press: after a release the key must come up first.
-    if (!event.repeat && ready()) down.add(event.code);
-  } else if (RELEASE_KEYS[event.code] && !event.repeat) holdRelease(RELEASE_KEYS[event.code]);
+    if (!event.repeat && ready(event.code)) down.add(event.code);
+  } else if (RELEASE_KEYS[event.code] && !event.repeat) holdRelease(RELEASE_KEYS[event.code], event.code);
   else if (/^Digit[1-5]$/.test(event.code)) page.send({ k: "gear", gear: Number(event.code.at(-1)) });
 }
 
@@ -266,6 +272,7 @@ function keyUp(event) {
     event.stopPropagation();
   }
   if (modified(event)) letGo();
+  if (refused?.code === event.code) refused = null;
   if (releasing && RELEASE_KEYS[event.code] === releasing) letGo();
   if (down.delete(event.code) && !down.size) letGo();
 }

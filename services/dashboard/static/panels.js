@@ -126,9 +126,9 @@ function showDrivers(slow, t) {
 
 const bits = (all) => [...Array(32).keys()].filter((bit) => Math.floor(all / 2 ** bit) % 2);
 
-// An event of the catalogue by its name; its own text follows, as it has the figures.
+// The kind of an event, in English by its name; its own text follows, as it has the figures.
 function eventTexts({ service, name, text }, t, language) {
-  if (language === "en") return [text];
+  if (language === "en") return [`${name[0]?.toUpperCase() ?? ""}${name.slice(1).replaceAll("_", " ")}: `, text];
   const keys = [`event.${service}.${name}`, `event.${name}`];
   const key = keys.find((it) => t(it) !== it); // a newer service may have other events
   const details = translated(text, language);

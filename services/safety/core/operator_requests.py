@@ -56,7 +56,7 @@ def carry_out(
     after = replace(state, latches=held, fault_budget=budget)
     text = _remaining(after, inputs, settings)
     # ``disarmed`` has already disarmed every source while the cause was held.
-    text = text or "Reset: a neutral request is due before the vehicle moves."
+    text = text or "Reset. Release the controls, then drive."
     return after, Reply(True, text, cleared)
 
 

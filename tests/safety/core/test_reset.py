@@ -140,9 +140,7 @@ def test_a_reset_clears_what_it_names_and_says_what_stays() -> None:
     assert latched(fixture.state.latches) == ("driver_left",)
     assert fixture.reset(estop, driver).startswith("A cause that the reset names")  # half of it
     assert fixture.reset(driver) == ""
-    assert fixture.reply() == Reply(
-        True, "Reset: a neutral request is due before the vehicle moves.", (driver,)
-    )
+    assert fixture.reply() == Reply(True, "Reset. Release the controls, then drive.", (driver,))
     assert fixture.drive().command == "run"
 
 
