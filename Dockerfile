@@ -5,7 +5,6 @@
 # libraries: no shell, no pip, no package manager. Wheels come from build/wheelhouse (`make wheelhouse
 # SET=laptop`) if it exists, including T2's own; otherwise from pip's index, and T2 from this folder.
 ARG BASE=python:3.13-slim
-ARG ROUTER=scratch
 
 FROM ${BASE} AS build
 LABEL t2.stage=build
@@ -39,6 +38,3 @@ RUN cd /opt/src/deploy/image && sh install.sh requirements-laptop.lock && sh col
 FROM dashboard AS laptop
 COPY --from=build-laptop /opt/laptop /
 ENTRYPOINT ["t2"]
-
-# Another router: deploy/compose/zenohd.yaml names it.
-FROM ${ROUTER} AS zenohd

@@ -92,7 +92,7 @@ def part_at(start: int, datagram: bytes, kinds: Kinds) -> Received | Rejected:
 def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:
     """Return why no complete frame of these kinds begins at ``start``."""
     if not datagram.startswith(MAGIC, start):
-        return Reason.NO_MAGIC, "does not start with 47 53"
+        return Reason.NO_MAGIC, f"does not start with {MAGIC.hex(' ')}"
     left = len(datagram) - start
     if left < HEADER.size:
         return Reason.TRUNCATED, f"{left} bytes of an 8-byte header"
