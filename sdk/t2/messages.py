@@ -50,9 +50,10 @@ if TYPE_CHECKING:
         "gamepad", "gamepad_silent", "guard_gone", "link_lost", "link_up", "overruled",
         "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
         "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
-        "release_refused", "reset", "reset_refused", "reset_unconfirmed", "runaway",
-        "second_authority", "silent", "slip", "slip_over", "source", "stop", "switches_unverified",
-        "terminal_slow", "uncommanded_motion", "unheard", "velocity_back",
+        "release_refused", "reset", "reset_refused", "reset_request", "reset_unconfirmed",
+        "runaway", "second_authority", "silent", "slip", "slip_over", "source", "stop",
+        "switches_unverified", "take_over", "terminal_slow", "uncommanded_motion", "unheard",
+        "velocity_back",
     ]  # fmt: skip
 else:
     CauseName = Name

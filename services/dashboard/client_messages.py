@@ -11,6 +11,7 @@ from msgspec import Meta, Struct
 from common.messages import Direction, Number
 from services.dashboard.config import GEARS
 
+NAME_MAX = 40  # characters, of a viewer
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
 
 
@@ -18,7 +19,13 @@ class ClientMessage(Struct, frozen=True, tag_field="k", tag=str.lower, forbid_un
     """A message from a viewer."""
 
 
-class Take(ClientMessage, frozen=True):
+class Named(ClientMessage, frozen=True, kw_only=True):
+    """A message of which an event reports the sender."""
+
+    name: Annotated[str, Meta(max_length=NAME_MAX)] = ""  # as typed on the page
+
+
+class Take(Named, frozen=True):
     """Take the driver lock; with ``force`` also from another viewer."""
 
     force: bool = False
@@ -56,11 +63,11 @@ class Alive(ClientMessage, frozen=True):
     echo: int
 
 
-class Estop(ClientMessage, frozen=True):
+class Estop(Named, frozen=True):
     """Emergency stop, latched, from any viewer."""
 
 
-class Reset(ClientMessage, frozen=True):
+class Reset(Named, frozen=True):
     """Reset the causes that the answered snapshot shows as latched."""
 
     echo: int

@@ -9,7 +9,7 @@ from typing import Any
 from common import clock, keys
 from common import messages as m
 from common.bus.bus import Arrival, Bus
-from common.bus.session import is_viewer
+from common.bus.session import common_name, is_viewer
 from common.client import (
     Contest,
     DriveRequests,
@@ -60,6 +60,7 @@ class Robot:
         self._requests_path = path_of(keys.DRIVE.on(bus.robot, source=settings.source))
         self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
         self._log = Logger(robot=bus.robot)
+        self._events = bus.publisher(keys.EVENTS, service="dashboard")
         for topic in FIXED_TOPICS:
             bus.subscribe(topic, self._on_message)
         for side in ("left", "right"):
@@ -113,13 +114,20 @@ class Robot:
         if self.driver_lock.driver is not None:
             self.driver_lock.leave(self.driver_lock.driver)
 
+    def event(self, name: str, level: m.Level, text: str) -> None:
+        """Publish and log what a viewer did, with the certificate of this dashboard."""
+        by = common_name(self.bus.where)
+        text = f"{text} ({by})" if by else text
+        self._events.put(m.Event(name=name, level=level, text=text))
+        getattr(self._log, level)(text, event_name=name)
+
     def estop(self, requested_by: str) -> None:
         """Stop the robot; the stop is repeated until safety has latched it."""
         self.driver_lock.lapse()
         self._requests.stop()
         self.bus.estop()
         if not self._estop.is_pending:  # a page repeats its requests
-            self._log.warning("emergency stop", requested_by=requested_by)
+            self.event("estop", "warning", f"emergency stop requested by {requested_by}")
         self._estop.start(self.telemetry.newest(keys.SAFETY, clock.now_ns()))
 
     def keep_alive(self, viewer: str, answered: int, now_ns: int) -> None:
@@ -129,13 +137,14 @@ class Robot:
         if echo is not None and self._keepalives:
             self._keepalives.beat(echo)
 
-    def reset(self, echo: int, notify: Notify) -> None:
+    def reset(self, echo: int, requested_by: str, notify: Notify) -> None:
         """Clear the causes that a snapshot showed as latched; report the confirmation later."""
         shown = self.telemetry.shown(echo)
         if shown is None:
             notify("warning", "too_late", "")
             return
         check = ResetCheck(shown.value)
+        self.event("reset_request", "info", f"reset requested by {requested_by}")
 
         def answered(done: m.ResetDone) -> None:
             check.answer(done)

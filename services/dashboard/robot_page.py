@@ -64,8 +64,8 @@ class RobotPage:
         match message:
             case client.Alive(echo):
                 self.robot.keep_alive(viewer, echo, clock.now_ns())
-            case client.Take(force):
-                self._take(viewer, force)
+            case client.Take():
+                self._take(viewer, message)
             case _ if self.robot.driver_lock.driver == viewer:
                 self._drive(viewer, message)
             case client.Gear() | client.Reset():
@@ -92,15 +92,17 @@ class RobotPage:
         if self._ticks % SLOW_TICKS == 1:
             self._send_events()
 
-    def _take(self, viewer: str, force: bool) -> None:
+    def _take(self, viewer: str, message: client.Take) -> None:
         lock = self.robot.driver_lock
         before = lock.driver
         if not self.robot.may_drive:
             self._notify(viewer, "error", "barred")
-        elif not lock.take(viewer, force):
+        elif not lock.take(viewer, message.force):
             self._send([viewer], {"k": "taken"})
         elif before not in (None, viewer):
             self._notify(str(before), "warning", "taken_over")
+            who = message.name or f"viewer {viewer}"
+            self.robot.event("take_over", "info", f"{who} takes control from viewer {before}")
 
     def _drive(self, viewer: str, message: client.AnyMessage) -> None:
         robot, lock, notify = self.robot, self.robot.driver_lock, partial(self._notify, viewer)
@@ -114,8 +116,8 @@ class RobotPage:
                 lock.leave(viewer)
             case client.Gear(gear):
                 lock.gear = gear
-            case client.Reset(echo):
-                robot.reset(echo, notify)
+            case client.Reset(echo, name=name):
+                robot.reset(echo, name or f"viewer {viewer}", notify)
 
     def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
         self._send_text([viewer], notice(level, text, about), False)

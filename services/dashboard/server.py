@@ -21,7 +21,7 @@ from starlette.websockets import WebSocket
 
 from common.errors import LinkError
 from services.dashboard.auth import AuthMiddleware, Credentials
-from services.dashboard.client_messages import ROBOT
+from services.dashboard.client_messages import NAME_MAX, ROBOT
 from services.dashboard.config import Dashboard
 from services.dashboard.i18n import phrases, table
 from services.dashboard.listener import BACKLOG, Listener
@@ -90,8 +90,9 @@ def _application(template: str, robot: str, hub: WebSocketHub, listener: Listene
     # Besides the WebSocket: a stop must arrive when that is congested or closed.
     async def stop(request: Request) -> Response:
         host = request.client.host if request.client else "unknown"
+        name = request.query_params.get("name", "")[:NAME_MAX] or host
         robot = request.path_params["robot"]
-        if not hub.estop(robot, host):
+        if not hub.estop(robot, name):
             return PlainTextResponse(
                 f"robot {robot!r} is unknown; no stop was sent\n", status_code=404
             )

@@ -130,7 +130,7 @@ class WebSocketHub:
                     await socket.close(code=1003, reason="invalid message")
                     return
                 if isinstance(message, Estop):
-                    self.estop(robot, f"viewer {viewer}")
+                    self.estop(robot, message.name or f"viewer {viewer}")
                 else:
                     self._inbox.put(partial(self._fleet.handle, robot, viewer, message))
 

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from common import clock, keys
 from common.bus.bus import Arrival, no_answer, not_allowed
-from common.bus.session import is_viewer
+from common.bus.session import is_viewer, operator_name
 from common.cli_args import with_options
 from common.client import Contest, EstopRepetition, EstopStep, ResetCheck, reset_request
 from common.freshness import NS_PER_S, Latest, fresh
@@ -58,6 +58,7 @@ class Controller:
         self._doctor = with_options("`t2 doctor`", words)
         self._node, self._bus, self._event_log = node, node.bus, event_log
         self._settings = node.config.teleop
+        self._operator = operator_name(self._bus.where)
         self._may_stop = not is_viewer(self._bus.where)
         self._controls = Controls(self._settings)
         self.terminal = self._controls.terminal
@@ -124,7 +125,11 @@ class Controller:
             return
         state = self._state(now_ns)
         self._enforce_rules(state, now_ns)
+        was_silent = self._controls.is_silent
         self._requested = self._controls.tick(self._read_stick(now_ns), now_ns)
+        if was_silent and not self._controls.is_silent and (other := self._contest.other):
+            text = f"{self._operator} requests motion while {other} is in control"
+            self._node.event("take_over", "info", text)
         if self._requested is not None:
             self._source.put(self._requested)
         self._repeat_estop(state)
@@ -190,7 +195,7 @@ class Controller:
         self._bus.estop()
         self._estop.start(state)
         if not is_known:
-            self._node.event("estop", "warning", "emergency stop requested by the operator")
+            self._node.event("estop", "warning", f"emergency stop requested by {self._operator}")
 
     def _repeat_estop(self, state: SafetyState | None) -> None:
         step = self._estop.tick(state)
@@ -225,6 +230,7 @@ class Controller:
         if self._reset is not None and not self._reset.is_answered:
             return  # a held key repeats
         self._reset = check = ResetCheck(shown)
+        self._node.event("reset_request", "info", f"reset requested by {self._operator}")
         self._bus.call(
             keys.RESET,
             replace(reset_request(shown), echo=newest.heartbeat),

@@ -5,7 +5,7 @@ import pytest
 from common import keys
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER, ESTOP_TICKS, OVERRULED_TICKS
-from common.messages import Direction, Drive, ResetDone, ResetRequest
+from common.messages import Direction, Drive, Event, ResetDone, ResetRequest
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
 from services.dashboard.robot import Robot
@@ -121,7 +121,7 @@ def reset(fixture: RobotFixture) -> RobotFixture:
     for heartbeat, cause in ((1, CONTACT), (2, NEWER)):
         state = safety_state(heartbeat=heartbeat, latched=("contact",), causes=(cause,))
         fixture.bus.deliver(keys.SAFETY, state, 0)
-    fixture.robot.reset(1, lambda *words: fixture.notices.append(words))
+    fixture.robot.reset(1, "Anna", lambda *words: fixture.notices.append(words))
     return fixture
 
 
@@ -148,3 +148,13 @@ def test_a_reset_is_confirmed_by_the_state_of_safety(
 def test_a_refusal_is_reported(reset: RobotFixture) -> None:
     reset.bus.answers[-1][1]("The call is 1.4 s old.")
     assert reset.notices == [("warning", "The call is 1.4 s old.", "reset_refused")]
+
+
+def test_an_event_names_who_stopped_and_who_reset(reset: RobotFixture) -> None:
+    events = next(p for p in reset.bus.publishers if p.topic is keys.EVENTS)
+    assert isinstance(events.last, Event)
+    assert (events.last.name, events.last.text) == ("reset_request", "reset requested by Anna")
+    for name in ("Bob", "Eve"):  # a page repeats its stop
+        reset.robot.estop(name)
+    assert isinstance(events.last, Event)
+    assert (events.last.name, events.last.text) == ("estop", "emergency stop requested by Bob")

@@ -32,6 +32,7 @@ let drawn; // the drawn snapshot; null without a connection
 const t = (key) => texts[language][key] ?? key;
 const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
+const name = () => $("name").value.trim();
 const off = () => lost() || !fast.connected;
 const { robot, router, doctor } = $("page").dataset;
 // The heartbeat of safety in a snapshot: its age is the age of what the operator saw.
@@ -96,7 +97,7 @@ const HANDLERS = {
   },
   notice: (message) => toast(message.text, message.level, message.about),
   taken: () => confirm("take_over", `${stateBar.driverName(fast, t)} ${t("take_over_from")}`,
-    () => send({ k: "take", force: true })),
+    () => send({ k: "take", force: true, name: name() })),
 };
 const handle = (message) => HANDLERS[message.k]?.(message);
 
@@ -157,7 +158,7 @@ function stop() {
 function reset() {
   if (!isDriver()) toast(driving.viewOnly(fast) || "take_first");
   else if (stateBar.resetRefusal(newest())) toast(stateBar.resetRefusal(newest()), "warning");
-  else send({ k: "reset", echo: echoOf(drawn) });
+  else send({ k: "reset", echo: echoOf(drawn), name: name() });
 }
 
 function showCamera(url) {
@@ -173,7 +174,9 @@ function begin() {
   phrases.begin(JSON.parse($("phrases").textContent));
   const on = (id, call) => { $(id).onclick = call; };
   on("estop", stop);
-  on("take", () => send({ k: "take", force: false }));
+  $("name").value = stored("name", "");
+  $("name").onchange = () => localStorage.setItem("t2.name", name());
+  on("take", () => send({ k: "take", force: false, name: name() }));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
   $("language").onclick = () => {
@@ -183,7 +186,7 @@ function begin() {
   };
   notices.begin({ t, language: () => language });
   driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
-  estop.begin({ send, off, toast, robot, barred: () => driving.viewOnly(fast) });
+  estop.begin({ send, off, toast, robot, name, barred: () => driving.viewOnly(fast) });
   showCamera($("page").dataset.camera.replaceAll("{robot}", robot));
   trail.begin();
   showTexts();

@@ -36,10 +36,10 @@ function repeat() {
 }
 
 function sendStop() {
-  page.send({ k: "estop" });
+  page.send({ k: "estop", name: page.name() });
   const failed = () => { if (page.off()) page.toast("estop_not_sent", "error"); };
   // With keepalive it is sent even if the page is being closed.
-  fetch(`/estop/${page.robot}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
+  fetch(`/estop/${page.robot}?name=${encodeURIComponent(page.name())}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
     .then((response) => {
       if (response.status === 404) page.toast("estop_unknown", "error");
       else if (!response.ok) failed();

@@ -59,7 +59,10 @@ RULES = (
     # latched
     Rule("contact", "brake", Clears.RESET, "The bumper was hit."),
     Rule("estop", "brake", Clears.RESET, "Emergency stop."),
-    Rule("estop_reader", "brake", Clears.RESET, "The emergency stop cannot be received."),
+    Rule(
+        "estop_reader", "brake", Clears.RESET,
+        "The emergency stop could not be received for a while.",
+    ),
     Rule(
         "estop_keepalive", "brake", Clears.RESET, "The emergency stop is no longer kept alive.",
     ),
