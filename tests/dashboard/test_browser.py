@@ -68,6 +68,8 @@ def test_the_content_of_the_page(page: Page) -> None:
     wait_for_text(page, "#hold", "Take control first.")
     page.keyboard.up("w")
     page.wait_for_function("() => !document.querySelector('#hold').textContent")
+    assert not page.is_visible("#services")  # an operator does not need it
+    page.click("#technical summary")
     for service in ("bridge", "safety", "odom", "dashboard"):
         page.wait_for_selector(f"tr[data-service={service}][data-state=alive]")
     wait_for_text(page, "#ultrasonic_brake", "on")
