@@ -155,7 +155,7 @@ function believed() {
   if (!free) return page.t("release_unknown");
   const motion = page.t(free === "forward" ? "moved_backward" : "moved_forward");
   const ago = age == null ? "–" : `${age.toFixed(age < 10 ? 1 : 0)} s`;
-  return `${page.t(`believed_${free}`)} ${motion} ${metres(Math.abs(travelled))}, ${ago} ${page.t("ago")}`;
+  return `${page.t(`believed_${free}`)} ${motion} ${metres(Math.abs(travelled))}, ${page.t("ago").replace("{}", ago)}`;
 }
 
 const metres = (value) => (Number.isFinite(value) ? `${value.toFixed(2)} m` : "– m");
