@@ -4,13 +4,26 @@ ROS messages carry the time of the sender's clock, which need not agree with our
 publisher the difference of our receive time and that time has a minimum: the fastest delivery so
 far. A command that took ``HELD_BACK_NS`` longer, until it was judged, was held back by the network
 or by a busy host, and must not move the robot. A burst of old commands at the start has no such
-minimum yet: commands are taken only from a publisher whose minimum has been steady for
-``SETTLE_NS``. The minimum rises slowly, as clocks drift. A publisher that was silent for
-``IDLE_NS`` counts as a new one.
+minimum yet: commands are taken only when the minimum has been steady for ``SETTLE_NS``. It rises
+slowly, as clocks drift.
 
-One publisher drives at a time, and begins with a neutral command. Safety cannot require that: to it
-all publishers are one source. A command is passed on once, as it is: it is never repeated, and no
-neutral command is invented.
+One publisher drives at a time, and each was neutral before. In ROS no request is silence, so a
+pause of ``PAUSE_NS`` is neutral, by its clock and ours: what a network held back or lost is none.
+
+| state      | event                                              | next       | to safety         |
+| ---------- | -------------------------------------------------- | ---------- | ----------------- |
+| (new)      | its first command                                  | must pause |                   |
+| must pause | a command after a pause, while no other one drives | settling   | a neutral request |
+| settling   | a delivery that shows that the pause was a delay   | must pause |                   |
+| settling   | a command ``SETTLE_NS`` later                      | drives     | the command       |
+| drives     | a command                                          | drives     | the command       |
+| any        | motion while safety bars it, or another one drives | must pause |                   |
+| any        | a command after ``LAPSE_NS`` without one           | must pause |                   |
+
+The state changes before the command is judged: after a silence the same command begins anew. The
+neutral request is sent when the pause ends, not when the publisher has settled, so that what bars
+motion in between bars it by safety's own rule. With ``by_zero`` a pause is not neutral: a publisher
+settles first, and its next zero counts. A command is passed on once, as it is.
 """
 
 from typing import NamedTuple
@@ -23,10 +36,11 @@ from services.ros2.cdr import Attachment
 
 HELD_BACK_NS = NS_PER_S // 5
 SETTLE_NS = NS_PER_S // 2
+PAUSE_NS = NS_PER_S // 2  # silence, or zeros, that count as neutral
+LAPSE_NS = NS_PER_S  # safety wants a neutral request after a source's lease and so much
 FASTER_NS = NS_PER_S // 50  # a delivery this much faster starts the settling anew
 DRIFT = 5e-4  # s of the minimum per s: what clocks that are slewed drift apart at most
 OWNER_NS = NS_PER_S // 2  # silence after which another publisher may drive
-IDLE_NS = 60 * NS_PER_S  # silence after which a publisher is forgotten
 MAX_PUBLISHERS = 64  # remembered; the one that was silent longest is dropped first
 
 Axes = tuple[float, float, float]
@@ -49,6 +63,7 @@ class Refusal(NamedTuple):
 
     name: str  # for counters and events
     text: str
+    is_neutral: bool = False  # whether safety gets a neutral request instead
 
 
 OUT_OF_ORDER = Refusal("out_of_order", "A command arrived again, or after a later one.")
@@ -57,11 +72,17 @@ HELD_BACK = Refusal(
     "A command took over 0.2 s longer than the fastest of its publisher. The network held it back, "
     "or the publisher's clock was set: restart that node.",
 )
-SETTLING = Refusal("settling", "A publisher is new, or its delay changes. Commands are taken soon.")
-SECOND_PUBLISHER = Refusal("second_publisher", "Another publisher drives. One at a time may.")
-NOT_NEUTRAL = Refusal(
-    "not_neutral", "A publisher that begins to drive must send a neutral command."
+SETTLING = Refusal(
+    "settling", "A publisher begins, or its delay changes. Its commands are taken after 0.5 s."
 )
+BEGINS = SETTLING._replace(is_neutral=True)
+SECOND_PUBLISHER = Refusal("second_publisher", "Another publisher drives. One at a time may.")
+NOT_PAUSED = Refusal(
+    "not_paused",
+    "A publisher commanded motion while the robot was not allowed to move or another one drove, or "
+    "the network interrupted it. Stop publishing for 0.5 s, then publish again.",
+)
+NOT_ZERO = Refusal("not_zero", 'ros2.neutral is "zero": publish zero before motion.')
 NOT_FINITE = Refusal("not_finite", "A command has a number that is not finite, or over 1e9.")
 OTHER_AXES = Refusal(
     "other_axes",
@@ -84,7 +105,43 @@ class Publisher(Struct):
     anchor_ns: int  # the fastest delivery when the settling began
     settling_ns: int  # when it began
     received_ns: int
-    sequence: int = 0
+    moved_ns: int  # when it last commanded motion, or may have
+    moved_source_ns: int  # the same by its clock
+    sequence: int
+    begun_ns: int | None = None  # the delivery of the command by which it began; None: it must
+
+    def note(self, about: Attachment, twist: Twist, now_ns: int) -> bool:
+        """Note a delivery; return whether the publisher had paused before."""
+        if about.sequence != self.sequence + 1:  # what is lost may have commanded motion
+            self._move(about, now_ns)
+        pause_ns = min(now_ns - self.moved_ns, about.source_ns - self.moved_source_ns)
+        if twist.moves:
+            self._move(about, now_ns)
+        silent_ns, delivery_ns = now_ns - self.received_ns, now_ns - about.source_ns
+        self.least_ns = min(self.least_ns + round(DRIFT * silent_ns), delivery_ns)
+        if silent_ns >= LAPSE_NS:
+            self.begun_ns = None
+        if silent_ns >= LAPSE_NS or self.least_ns < self.anchor_ns - FASTER_NS:
+            self.settle(now_ns)
+        self.received_ns, self.sequence = now_ns, about.sequence
+        return pause_ns >= PAUSE_NS
+
+    def settle(self, now_ns: int) -> None:
+        """Start the settling anew."""
+        self.anchor_ns, self.settling_ns = self.least_ns, now_ns
+
+    @property
+    def is_settling(self) -> bool:
+        """Whether its delay was not steady for long enough when it was last received."""
+        return self.received_ns - self.settling_ns < SETTLE_NS
+
+    @property
+    def began_late(self) -> bool:
+        """Whether the command by which it began was held back, as faster ones show."""
+        return self.begun_ns is not None and self.begun_ns - self.least_ns > HELD_BACK_NS
+
+    def _move(self, about: Attachment, now_ns: int) -> None:
+        self.moved_ns, self.moved_source_ns = now_ns, about.source_ns
 
 
 class Commands:
@@ -92,64 +149,83 @@ class Commands:
 
     _owned_ns: int  # when the owner drove last
 
-    def __init__(self) -> None:
+    def __init__(self, *, by_zero: bool = False) -> None:
         self.owner: bytes | None = None  # GID of the publisher that drives
+        self._by_zero = by_zero  # whether only zeros are neutral
+        self._since_ns = 0
         self._known: dict[bytes, Publisher] = {}
 
+    def listen(self, now_ns: int) -> None:
+        """Begin to receive: what an unknown publisher did before is unknown."""
+        self._since_ns = now_ns
+
     def judge(
-        self, about: Attachment, twist: Twist, received_ns: int, now_ns: int
+        self, about: Attachment, twist: Twist, received_ns: int, now_ns: int, *, barred: bool
     ) -> Request | Refusal:
-        """Return the request of a command, or the refusal; times are of our monotonic clock."""
-        known = self._known.get(about.gid)
-        if known is not None and received_ns - known.received_ns > IDLE_NS:
-            self.gone(about.gid)
-            known = None
-        if known is not None and about.sequence <= known.sequence:
+        """Return the request of a command, or the refusal; times are of our monotonic clock.
+
+        ``barred`` means that safety wants a neutral request before the next motion.
+        """
+        known = self._publisher(about, received_ns)
+        if about.sequence <= known.sequence:
             return OUT_OF_ORDER
-        delay_ns = self._noted(about, received_ns) + now_ns - received_ns
+        has_paused = known.note(about, twist, received_ns)
         if refusal := _of_content(twist):
             return refusal
-        if delay_ns > HELD_BACK_NS:
+        if now_ns - about.source_ns - known.least_ns > HELD_BACK_NS:
             return HELD_BACK
-        if self._is_settling(about.gid, received_ns):
-            return SETTLING
-        return self._of_owner(about.gid, received_ns, twist) or Request(
-            twist.linear[0], twist.angular[2]
-        )
+        if self._another_drives(about.gid, received_ns):
+            known.begun_ns = None
+            return SECOND_PUBLISHER
+        if (barred and twist.moves) or (self.owner != about.gid and known.began_late):
+            known.begun_ns = None
+        if refusal := self._of_beginning(known, about, twist, has_paused=has_paused):
+            return refusal
+        self.owner, self._owned_ns = about.gid, received_ns
+        return Request(twist.linear[0], twist.angular[2])
 
     def gone(self, gid: bytes) -> None:
-        """Forget a publisher whose token disappeared."""
-        self._known.pop(gid, None)
+        """Let others drive: the publisher's token disappeared."""
         if self.owner == gid:
             self.owner = None
 
-    def _noted(self, about: Attachment, now_ns: int) -> int:
-        """Note a delivery; return how much longer it took than the fastest one."""
-        passed_ns = now_ns - about.source_ns
+    def _publisher(self, about: Attachment, now_ns: int) -> Publisher:
         known = self._known.pop(about.gid, None)
         if known is None:
-            known = Publisher(passed_ns, passed_ns, now_ns, now_ns)
-        least_ns = known.least_ns + round(DRIFT * (now_ns - known.received_ns))
-        known.least_ns = min(least_ns, passed_ns)
-        if known.least_ns < known.anchor_ns - FASTER_NS:
-            known.anchor_ns, known.settling_ns = known.least_ns, now_ns
-        known.received_ns, known.sequence = now_ns, about.sequence
+            delivery_ns = now_ns - about.source_ns
+            known = Publisher(
+                least_ns=delivery_ns,
+                anchor_ns=delivery_ns,
+                settling_ns=now_ns,
+                received_ns=now_ns,
+                moved_ns=self._since_ns,
+                moved_source_ns=self._since_ns - delivery_ns,
+                sequence=about.sequence - 1,
+            )
         self._known[about.gid] = known  # the last one of the dictionary
         if len(self._known) > MAX_PUBLISHERS:
             del self._known[next(iter(self._known))]
-        return passed_ns - known.least_ns
+        return known
 
-    def _is_settling(self, gid: bytes, now_ns: int) -> bool:
-        return now_ns - self._known[gid].settling_ns < SETTLE_NS
+    def _another_drives(self, gid: bytes, now_ns: int) -> bool:
+        return self.owner not in (None, gid) and now_ns - self._owned_ns < OWNER_NS
 
-    def _of_owner(self, gid: bytes, now_ns: int, twist: Twist) -> Refusal | None:
-        """Return the refusal of a publisher that does not drive; a neutral command begins."""
-        if self.owner != gid:
-            if self.owner is not None and now_ns - self._owned_ns < OWNER_NS:
-                return SECOND_PUBLISHER
+    def _of_beginning(
+        self, known: Publisher, about: Attachment, twist: Twist, *, has_paused: bool
+    ) -> Refusal | None:
+        """Return the refusal of a publisher that does not drive yet."""
+        if known.begun_ns is None and not self._by_zero:
+            if not has_paused:
+                return NOT_PAUSED
+            known.begun_ns = known.received_ns - about.source_ns
+            known.settle(known.received_ns)
+            return BEGINS
+        if known.is_settling:
+            return SETTLING
+        if known.begun_ns is None:
             if twist.moves:
-                return NOT_NEUTRAL
-        self.owner, self._owned_ns = gid, now_ns
+                return NOT_ZERO
+            known.begun_ns = known.received_ns - about.source_ns
         return None
 
 

@@ -17,6 +17,7 @@ class Ros2(settings.Section, frozen=True, kw_only=True):
     namespace: str = "/"  # of the node and its topics, such as /t2_001
     frame_prefix: Frame = ""  # before odom, base_link and the sonars, such as t2_001/
     cmd_vel: Literal["both", "stamped", "plain"] = "both"  # TwistStamped, Twist
+    neutral: Literal["silence", "zero"] = "silence"  # what a publisher does before motion, 0.5 s
     publish_tf: bool = True  # odom to base_link; false for users of another estimator
     no_echo: Literal["max_range", "inf"] = "max_range"  # the range of a sonar without an echo
     sonar_fov: Annotated[float, Meta(gt=0.0, le=3.2)] = 0.5  # rad, the whole opening

@@ -83,8 +83,9 @@ class Endpoints:
         self._session = client(where, post)
         self._session.declare(self._join)
 
-    def open(self) -> None:
-        """Start connecting; returns at once."""
+    def open(self, opened: Callable[[], None]) -> None:
+        """Start connecting; returns at once. ``opened`` is called when the session opens."""
+        self._session.declare(lambda _: opened())
         self._session.open()
 
     def close(self) -> None:

@@ -6,7 +6,7 @@ from common import clock
 from common.service import Node
 from common.source import DriveSource
 from services.ros2 import names, translate
-from services.ros2.calls import Calls
+from services.ros2.calls import FRESH_NS, Calls
 from services.ros2.cdr import Attachment, Value
 from services.ros2.command import MAX_PUBLISHERS, Commands, Refusal, Twist
 from services.ros2.config import Ros2Config
@@ -23,7 +23,8 @@ class Gateway:
     def __init__(self, node: Node[Ros2Config]) -> None:
         settings = node.config.ros2
         self._node, self._namespace = node, settings.namespace
-        self._commands, self._diagnostics = Commands(), translate.Diagnostics()
+        self._commands = Commands(by_zero=settings.neutral == "zero")
+        self._diagnostics = translate.Diagnostics()
         self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
         self._reported: dict[bytes, str] = {}  # the last decision about each, as reported
         ros = names.Node(settings.domain, "", settings.namespace, NODE)
@@ -37,13 +38,17 @@ class Gateway:
                 self._ros.subscribe(self._absolute("cmd_vel"), interface, take, self._unreadable)
         self._ros.watch(self._on_token)
         node.on_exit = self._ros.close
-        self._ros.open()
+        self._ros.open(lambda: self._commands.listen(clock.now_ns()))
 
     def _take(self, stamped: bool, about: Attachment, message: Value, received_ns: int) -> None:
         """Pass on a command, or refuse it."""
-        twist = Twist(*(message[1] if stamped else message))
-        decided = self._commands.judge(about, twist, received_ns, clock.now_ns())
+        twist, now_ns = Twist(*(message[1] if stamped else message)), clock.now_ns()
+        state = self._streams.state(now_ns - FRESH_NS)
+        barred = state is not None and (bool(state.latched) or state.verdict == "inhibited")
+        decided = self._commands.judge(about, twist, received_ns, now_ns, barred=barred)
         if isinstance(decided, Refusal):
+            if decided.is_neutral:
+                self._drive.request(0.0, 0.0)
             self._refuse(decided, about.gid)
             return
         self._drive.request(decided.linear, decided.angular)

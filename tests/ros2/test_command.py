@@ -1,6 +1,7 @@
 """Commands that are passed on, and those that a network held back, doubled or mixed."""
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -9,11 +10,13 @@ from hypothesis import strategies as st
 from common.messages import MAX_NUMBER
 from services.ros2.cdr import Attachment
 from services.ros2.command import (
+    BEGINS,
     FASTER_NS,
     HELD_BACK_NS,
-    IDLE_NS,
+    LAPSE_NS,
     MAX_PUBLISHERS,
     OWNER_NS,
+    PAUSE_NS,
     SETTLE_NS,
     Commands,
     Refusal,
@@ -37,88 +40,184 @@ class Sender:
     def __init__(self, commands: Commands, gid: bytes = NAV) -> None:
         self.commands, self.gid, self.sequence = commands, gid, 0
 
-    def send(self, sent_s: float, delay_s: float = 0.01, motion: Twist | None = None) -> object:
-        """Judge a command; return it, or the refusal's name."""
+    def send(
+        self, sent_s: float, delay_s: float = 0.01, motion: Twist | None = None, *,
+        barred: bool = False,
+    ) -> object:  # fmt: skip
+        """Judge a command; return it, or what is refused."""
         self.sequence += 1
         about = Attachment(self.sequence, CLOCK + round(sent_s * S), self.gid)
         received_ns = round((sent_s + delay_s) * S)
-        decided = self.commands.judge(about, motion or twist(0.3), received_ns, received_ns)
-        return decided.name if isinstance(decided, Refusal) else decided
+        motion = motion or twist(0.3)
+        return shown(self.commands.judge(about, motion, received_ns, received_ns, barred=barred))
 
-    def settle(self, until_s: float = 1.0) -> "Sender":
-        """Send neutral commands until this time."""
-        for number in range(round(until_s * 20)):
-            decided = self.send(number / 20, motion=twist())
-            assert decided == ("settling" if number < 10 else Request(0.0, 0.0))
+    def drive(self, from_s: float = 0.0) -> "Sender":
+        """Publish motion for 1 s, as a node that starts."""
+        decided = [self.send(from_s + number / 20) for number in range(20)]
+        assert decided == ["begins"] + ["settling"] * 9 + [Request(0.3, 0.0)] * 10
         return self
 
+    def stream(self, from_s: float, seconds: float, **about: Any) -> set[object]:
+        """Publish at 20 Hz; return all that was decided."""
+        times = [from_s + number / 20 for number in range(round(seconds * 20))]
+        return {self.send(each, **about) for each in times}
 
-def test_a_new_publisher_moves_nothing_at_first() -> None:
-    sender = Sender(Commands())
-    assert sender.send(0.0) == "settling"
-    assert sender.send(0.1, motion=twist()) == "settling"  # it may be old, too
-    assert sender.send(0.45) == "settling"
-    assert sender.send(0.55) == "not_neutral"
-    assert sender.send(0.6, motion=twist()) == Request(0.0, 0.0)
-    assert sender.send(0.65) == Request(0.3, 0.0)
+
+def shown(decided: Request | Refusal) -> object:
+    """Return a request, or the name of a refusal; of the one that sends a neutral request, too."""
+    if isinstance(decided, Request):
+        return decided
+    return "begins" if decided is BEGINS else decided.name
+
+
+def test_ros2_topic_pub_drives_after_it_has_settled() -> None:
+    """It starts, and repeats one message."""
+    Sender(started()).drive()
+
+
+def started(**settings: Any) -> Commands:
+    """Return a judge that has listened for long."""
+    commands = Commands(**settings)
+    commands.listen(-60 * S)
+    return commands
+
+
+def test_a_keyboard_that_repeats_nothing_drives_with_its_second_press() -> None:
+    sender = Sender(started())
+    assert [sender.send(each) for each in (0.0, 0.45)] == ["begins", "settling"]
+    assert [sender.send(each) for each in (0.5, 0.53, 1.4)] == [Request(0.3, 0.0)] * 3
+    assert [sender.send(each) for each in (3.0, 3.3, 3.6)] == ["begins", "settling", TAKEN]
+
+
+@pytest.mark.parametrize("pause_s", [1.1, 70.0, 36000.0])
+def test_a_planner_drives_on_after_any_pause_when_it_has_settled(pause_s: float) -> None:
+    Sender(started()).drive().drive(1.0 + pause_s)
+
+
+def test_a_pause_within_the_lapse_of_a_source_ends_at_once() -> None:
+    assert Sender(started()).drive().send(1.9) == TAKEN
+
+
+def test_motion_across_a_reset_is_refused_until_a_pause() -> None:
+    sender = Sender(started()).drive()
+    assert sender.stream(1.0, 1.0, barred=True) == {"not_paused"}
+    assert sender.stream(2.0, 5.0) == {"not_paused"}
+    sender.drive(7.5)
+
+
+def test_motion_while_it_settles_counts_as_motion_across_a_reset() -> None:
+    sender = Sender(started())
+    assert sender.send(0.0) == "begins"
+    assert sender.send(0.3, barred=True) == "not_paused"
+    assert sender.stream(0.35, 2.0) == {"not_paused"}
+
+
+def test_zeros_are_passed_on_while_motion_is_barred_and_are_a_pause() -> None:
+    sender = Sender(started()).drive()
+    assert sender.stream(1.0, 1.0, motion=twist(), barred=True) == {NEUTRAL}
+    assert sender.send(2.0) == TAKEN
+    assert sender.send(2.05, barred=True) == "not_paused"
+    assert sender.stream(2.1, 0.4, motion=twist()) == {"not_paused"}
+    assert sender.send(2.55, motion=twist()) == "begins"
+
+
+def test_a_publisher_that_was_running_when_the_gateway_started_must_pause() -> None:
+    commands = Commands()
+    commands.listen(0)
+    sender = Sender(commands)
+    sender.sequence = 1000
+    assert sender.stream(0.1, 2.0) == {"not_paused"}
+    sender.drive(2.6)
+
+
+def test_what_is_lost_is_no_pause() -> None:
+    """A link that was down for 3 s, and the messages of that time with it."""
+    sender = Sender(started()).drive()
+    sender.sequence += 60
+    assert sender.stream(4.0, 1.0) == {"not_paused"}
+    sender.drive(5.6)
+
+
+def test_what_a_network_holds_back_is_no_pause() -> None:
+    sender = Sender(started()).drive()
+    burst = [sender.send(1.0 + number / 20, 3.0 - number / 20) for number in range(55)]
+    assert set(burst) == {"held_back"}
+    assert sender.stream(3.8, 1.0) == {"not_paused"}
+    sender.drive(5.3)
+
+
+def test_a_clock_that_is_set_is_no_pause() -> None:
+    sender = Sender(started()).drive()
+    assert sender.send(1.0, barred=True) == "not_paused"
+    assert sender.send(1000.05, -998.99) == "not_paused"
+
+
+def test_a_beginning_that_was_held_back_does_not_count() -> None:
+    """The node started before a reset, and its first commands arrive after it."""
+    sender = Sender(started())
+    assert sender.send(0.0, 3.0) == "begins"
+    assert sender.send(2.95, 0.1) == "not_paused"
+    assert sender.stream(3.1, 1.0) == {"not_paused"}
 
 
 @pytest.mark.parametrize(("idle_s", "delay_s"), [(59.0, 0.3), (3600.0, 1.9), (36000.0, 15.0)])
 def test_what_was_held_back_after_a_silence_is_refused(idle_s: float, delay_s: float) -> None:
-    sender = Sender(Commands()).settle()
-    sender.send(1.0)
+    sender = Sender(started()).drive()
     begin_s = 1.0 + idle_s
     burst = [sender.send(begin_s + n / 20, delay_s - n / 20) for n in range(int(delay_s * 20))]
-    assert Request(0.3, 0.0) not in burst[: int((delay_s - 0.25) * 20)]
-
-
-def test_a_burst_after_a_gap_is_refused_and_the_next_live_command_taken() -> None:
-    sender = Sender(Commands()).settle()
-    burst = [sender.send(1.0 + number / 20, 3.0 - number / 20) for number in range(55)]
-    assert set(burst) == {"held_back"}
-    assert sender.send(4.0) == Request(0.3, 0.0)
+    assert TAKEN not in burst
 
 
 def test_a_queue_that_drains_slowly_is_refused() -> None:
     """Each command takes less long than the one before: none of them is fresh."""
-    sender = Sender(Commands())
+    sender = Sender(started())
     decided = [sender.send(number / 20, max(0.01, 3.0 - number / 100)) for number in range(240)]
-    assert set(decided) == {"settling"}
+    assert set(decided) == {"begins", "settling", "not_paused"}
 
 
 def test_a_clock_that_drifts_is_no_delay() -> None:
-    sender = Sender(Commands()).settle()
+    sender = Sender(started()).drive()
     drift = 100e-6
-    for second in range(1, 7200, 10):
-        assert sender.send(float(second), 0.01 + drift * second) == Request(0.3, 0.0)
+    for number in range(72000):
+        sent_s = 1.0 + number / 10
+        assert sender.send(sent_s, 0.01 + drift * sent_s) == TAKEN
 
 
 def test_one_publisher_drives_until_it_is_silent() -> None:
-    commands = Commands()
-    nav, joy = Sender(commands).settle(), Sender(commands, JOY)
+    commands = started()
+    nav, joy = Sender(commands).drive(), Sender(commands, JOY)
     for number in range(20):
         nav.send(1.0 + number / 20)
-        assert joy.send(1.0 + number / 20) in ("settling", "second_publisher")
-    assert joy.send(2.0) == "second_publisher"
-    assert joy.send(2.5) == "not_neutral"
-    assert joy.send(2.51, motion=twist()) == Request(0.0, 0.0)
-    assert joy.send(2.52) == Request(0.3, 0.0)
-    assert nav.send(2.55) == "second_publisher"
+        assert joy.send(1.0 + number / 20) == "second_publisher"
+    assert joy.stream(2.0, 0.45) == {"second_publisher"}
+    assert joy.stream(2.5, 1.0) == {"not_paused"}
+    joy.drive(4.0)
+    assert nav.send(5.0) == "second_publisher"
+
+
+def test_a_publisher_of_zeros_does_not_begin_beside_another_one() -> None:
+    commands = started()
+    nav, joy = Sender(commands).drive(), Sender(commands, JOY)
+    assert nav.stream(1.0, 0.5) == {TAKEN}
+    assert joy.stream(1.0, 0.9, motion=twist()) == {"second_publisher"}
+    assert joy.send(2.0, motion=twist()) == "begins"
+    assert joy.send(2.5) == TAKEN
 
 
 def test_the_next_publisher_may_begin_at_once_when_the_owner_is_gone() -> None:
-    commands = Commands()
-    nav, joy = Sender(commands).settle(), Sender(commands, JOY)
-    assert joy.send(0.3) == "settling"
-    nav.send(1.0)
+    commands = started()
+    nav, joy = Sender(commands), Sender(commands, JOY)
+    assert joy.send(0.2) == "begins"
+    nav.drive()
+    commands.gone(JOY)  # it does not drive
+    assert joy.send(0.95) == "second_publisher"
     commands.gone(NAV)
-    assert joy.send(1.01) == "not_neutral"
-    assert joy.send(1.02, motion=twist()) == Request(0.0, 0.0)
-    assert joy.send(1.03) == Request(0.3, 0.0)
+    assert joy.send(1.5) == "begins"
+    assert joy.send(2.0) == TAKEN
 
 
 def test_a_command_that_is_repeated_or_late_is_refused() -> None:
-    sender = Sender(Commands()).settle()
+    sender = Sender(started()).drive()
     sender.send(1.0)
     sender.sequence -= 1
     assert sender.send(1.05) == "out_of_order"
@@ -128,7 +227,7 @@ def test_a_command_that_is_repeated_or_late_is_refused() -> None:
 
 @pytest.mark.parametrize("axis", range(6))
 def test_numbers_that_are_not_finite_and_other_axes(axis: int) -> None:
-    sender = Sender(Commands()).settle()
+    sender = Sender(started()).drive()
     for number in (math.nan, math.inf, -math.inf, 1.1 * MAX_NUMBER, MAX_NUMBER, 0.01):
         axes = [0.0] * 6
         axes[axis] = number
@@ -139,11 +238,11 @@ def test_numbers_that_are_not_finite_and_other_axes(axis: int) -> None:
 
 
 def test_a_refused_command_does_not_make_an_owner() -> None:
-    commands = Commands()
-    nav, joy = Sender(commands).settle(0.6), Sender(commands, JOY)
+    commands = started()
+    nav, joy = Sender(commands).drive(), Sender(commands, JOY)
     assert joy.send(1.2, motion=twist(sideways=1.0)) == "other_axes"
     assert commands.owner == NAV
-    assert nav.send(1.2) == Request(0.3, 0.0)
+    assert nav.send(1.2) == TAKEN
 
 
 def test_many_publishers_are_not_remembered() -> None:
@@ -151,6 +250,21 @@ def test_many_publishers_are_not_remembered() -> None:
     for number in range(3 * MAX_PUBLISHERS):
         Sender(commands, number.to_bytes(16, "big")).send(number / 100)
     assert len(commands._known) == MAX_PUBLISHERS
+
+
+def test_where_only_zeros_are_neutral_a_publisher_settles_and_sends_zero() -> None:
+    sender = Sender(started(by_zero=True))
+    assert sender.send(0.0) == "settling"
+    assert sender.send(0.1, motion=twist()) == "settling"  # it may be old, too
+    assert sender.send(0.55) == "not_zero"
+    assert sender.send(0.6, motion=twist()) == NEUTRAL
+    assert sender.send(0.65) == TAKEN
+    assert sender.send(0.7, barred=True) == "not_zero"
+    assert sender.send(1.5) == "not_zero"
+    assert sender.send(1.55, motion=twist()) == NEUTRAL
+    assert sender.send(1.6) == TAKEN
+    assert sender.send(2.6, motion=twist()) == "settling"
+    assert sender.send(3.1) == "not_zero"
 
 
 START_NS = 10**12  # our clock; the senders' clocks are 0 then
@@ -163,45 +277,74 @@ def at(
 ) -> object:  # fmt: skip
     """Judge a command that was sent ``late_ns`` before it arrives; return it, or why not."""
     about, now_ns = Attachment(sequence, at_ns - late_ns, gid), START_NS + at_ns
-    decided = commands.judge(about, twist(speed), now_ns, now_ns + waited_ns)
-    return decided.name if isinstance(decided, Refusal) else decided
+    return shown(commands.judge(about, twist(speed), now_ns, now_ns + waited_ns, barred=False))
 
 
 @pytest.fixture
 def commands() -> Commands:
     """Return a judge that has just taken a command of NAV, at 1 s."""
     made = Commands()
-    assert at(made, 0, 0, speed=0.0) == "settling"
-    assert at(made, 1, SETTLE_NS - 1, speed=0.0) == "settling"
-    assert at(made, 2, SETTLE_NS, speed=0.0) == NEUTRAL
-    assert at(made, 3, S) == TAKEN
+    made.listen(START_NS - PAUSE_NS)
+    assert at(made, 1, 0) == "begins"
+    assert at(made, 2, SETTLE_NS - 1) == "settling"
+    assert at(made, 3, SETTLE_NS) == TAKEN
+    assert at(made, 4, S) == TAKEN
     return made
 
 
-def test_the_limit_of_a_faster_delivery_that_settles_anew() -> None:
+def test_the_limit_of_a_pause() -> None:
     made = Commands()
-    at(made, 1, 0, late_ns=FASTER_NS, speed=0.0)
-    assert at(made, 2, SETTLE_NS, speed=0.0) == NEUTRAL  # exactly so much faster
+    made.listen(START_NS)
+    assert at(made, 1, PAUSE_NS - 1) == "not_paused"
+    assert at(made, 2, 2 * PAUSE_NS - 2) == "not_paused"
+    assert at(made, 3, 3 * PAUSE_NS - 2) == "begins"
+
+
+@pytest.mark.parametrize("clock", ["sender", "ours"])
+def test_a_pause_is_one_by_both_clocks(clock: str) -> None:
+    made = Commands()
+    made.listen(START_NS)
+    short_ns = PAUSE_NS - 1
+    at(made, 1, 0)
+    late_ns = 1 if clock == "sender" else -1
+    assert at(made, 2, PAUSE_NS if clock == "sender" else short_ns, late_ns=late_ns) == "not_paused"
+
+
+def test_the_limit_of_a_faster_delivery_that_settles_anew() -> None:
+    made = started()
+    at(made, 1, 0, late_ns=FASTER_NS)
+    assert at(made, 2, SETTLE_NS) == TAKEN  # exactly so much faster
     assert at(made, 3, SETTLE_NS, late_ns=-1) == "settling"
+    assert at(made, 4, 2 * SETTLE_NS - 1) == "settling"
+    assert at(made, 5, 2 * SETTLE_NS) == TAKEN
 
 
 @pytest.mark.parametrize("where", ["late_ns", "waited_ns"])  # in the network, in a busy host
 def test_the_limit_of_what_was_held_back(commands: Commands, where: str) -> None:
-    assert at(commands, 4, S, **{where: HELD_BACK_NS}) == TAKEN  # type: ignore[arg-type]
-    assert at(commands, 5, S, **{where: HELD_BACK_NS + 1}) == "held_back"  # type: ignore[arg-type]
+    assert at(commands, 5, S, **{where: HELD_BACK_NS}) == TAKEN  # type: ignore[arg-type]
+    assert at(commands, 6, S, **{where: HELD_BACK_NS + 1}) == "held_back"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("late_ns", "seen"), [(0, "settling"), (1, "not_paused")])
+def test_the_limit_of_a_beginning_that_was_held_back(late_ns: int, seen: str) -> None:
+    made = started()
+    at(made, 1, 0, late_ns=HELD_BACK_NS + late_ns)
+    assert at(made, 2, S // 10) == seen
+
+
+def test_a_faster_delivery_of_the_one_that_drives_is_no_beginning(commands: Commands) -> None:
+    assert at(commands, 5, S, late_ns=-HELD_BACK_NS - 1) == "settling"
+    assert at(commands, 6, S + SETTLE_NS, late_ns=-HELD_BACK_NS - 1) == TAKEN
 
 
 def test_the_limit_of_the_owners_silence(commands: Commands) -> None:
-    at(commands, 1, S - SETTLE_NS, speed=0.0, gid=JOY)
-    assert at(commands, 2, S + OWNER_NS - 1, gid=JOY) == "second_publisher"
-    assert at(commands, 3, S + OWNER_NS, gid=JOY) == "not_neutral"
+    assert at(commands, 1, S + OWNER_NS - 1, gid=JOY) == "second_publisher"
+    assert at(commands, 2, S + 2 * OWNER_NS, gid=JOY) == "begins"
 
 
-def test_the_limit_of_a_silence_after_which_a_publisher_is_new(commands: Commands) -> None:
-    assert at(commands, 4, S + IDLE_NS) == TAKEN
-    assert at(commands, 5, S + 2 * IDLE_NS + 1) == "settling"
-    assert commands.owner is None
-    commands.gone(JOY)  # unknown
+def test_the_limit_of_a_silence_after_which_a_publisher_begins_anew(commands: Commands) -> None:
+    assert at(commands, 5, S + LAPSE_NS - 1) == TAKEN
+    assert at(commands, 6, S + 2 * LAPSE_NS - 1) == "begins"
 
 
 @given(
@@ -228,7 +371,7 @@ def test_motion_is_never_older_than_allowed(
         sequences[gid] += step
         about = Attachment(sequences[gid], CLOCK + round((now_s - delay_s) * S), gid)
         now_ns = round(now_s * S)
-        decided = commands.judge(about, twist(speed), now_ns, now_ns)
+        decided = commands.judge(about, twist(speed), now_ns, now_ns, barred=False)
         if step or gid not in fastest:
             fastest[gid] = min(fastest.get(gid, math.inf), delay_s)
         if isinstance(decided, Request):

@@ -1,6 +1,7 @@
 """The gateway on the real stack, with a node of zenoh-ros2-sdk on the other side."""
 
 import math
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,16 @@ def reset(node: RosPeer) -> bool:
     return answer is not None and (answer.success or "Nothing" in answer.message)
 
 
+def make_ready(node: RosPeer) -> list[Any]:
+    """Reset, and wait until only a request is missing; return the diagnostics."""
+    wait_until(lambda: reset(node), "a reset")
+    came = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+    wait_until(
+        lambda: "No source" in getattr(statuses(came).get("t2: safety"), "message", ""), "ready"
+    )
+    return came
+
+
 def test_streams_arrive(node: RosPeer) -> None:
     odom = node.subscribe("/odom", "nav_msgs/msg/Odometry")
     tf = node.subscribe("/tf", TRANSFORMS)
@@ -83,14 +94,13 @@ def test_latched_topics_reach_who_comes_later(node: RosPeer) -> None:
 
 
 def test_commands_move_the_vehicle_until_they_end(node: RosPeer, stack: RunningStack) -> None:
-    wait_until(lambda: reset(node), "a reset")
+    make_ready(node)
     commands, odom = node.commands(STAMPED), node.subscribe("/odom", "nav_msgs/msg/Odometry")
     wait_until(lambda: odom, "odometry")
     start = odom[-1].pose.pose.position
 
     def moved() -> bool:
-        commands.send(0.8)
-        commands.send(0.8, 0.3)  # at once: after a pause it would need zeros again
+        commands.send(0.8, 0.3)  # as ``ros2 topic pub``: never a zero
         now = odom[-1].pose.pose.position
         return math.dist((start.x, start.y), (now.x, now.y)) > 0.1
 
@@ -110,6 +120,31 @@ def test_an_emergency_stop_latches_until_a_reset(node: RosPeer) -> None:
     )
     wait_until(lambda: reset(node), "a reset")
     wait_until(lambda: not stopped[-1].data, "the latched topic")
+
+
+def test_motion_across_a_reset_is_refused_until_a_pause(node: RosPeer, stack: RunningStack) -> None:
+    diagnostics, commands = make_ready(node), node.commands(PLAIN)
+
+    def moves() -> bool:
+        commands.send(0.3, 0.2)
+        return stack.speed() > 0.05
+
+    wait_until(moves, "a motion")
+    stack.control.do(Bumper(pressed=True))
+    commands.send(0.3, 0.2)
+    stack.control.do(Bumper(pressed=False))
+
+    def is_reset() -> bool:
+        commands.send(0.5, 0.2)
+        return reset(node)
+
+    wait_until(is_reset, "a reset under a running publisher")
+    before = stack.control.truth().distance
+    commands.send(2.0, 0.2)
+    assert stack.control.truth().distance == before
+    assert "Stop publishing" in statuses(diagnostics)["t2: cmd_vel"].message
+    time.sleep(0.7)
+    wait_until(moves, "a motion after the pause")
 
 
 def test_a_contact_is_seen_at_once_and_its_reset_is_refused(
@@ -162,11 +197,10 @@ def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> 
 def test_a_killed_gateway_stops_the_vehicle_and_nothing_else(
     node: RosPeer, stack: RunningStack
 ) -> None:
-    wait_until(lambda: reset(node), "a reset")
+    make_ready(node)
     commands = node.commands(PLAIN)
 
     def moves() -> bool:
-        commands.send(0.8)
         commands.send(0.5, -0.2)
         return stack.speed() < -0.05
 
