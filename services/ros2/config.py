@@ -19,7 +19,9 @@ class Ros2(settings.Section, frozen=True, kw_only=True):
     cmd_vel: Literal["both", "stamped", "plain"] = "both"  # TwistStamped, Twist
     neutral: Literal["silence", "zero"] = "silence"  # what a publisher does before motion, 0.5 s
     publish_tf: bool = True  # odom to base_link; false for users of another estimator
-    no_echo: Literal["max_range", "inf"] = "max_range"  # the range of a sonar without an echo
+    no_echo: Literal["max_range", "inf"] = (
+        "max_range"  # without an echo; a fault is +Inf then, otherwise NaN
+    )
     sonar_fov: Annotated[float, Meta(gt=0.0, le=3.2)] = 0.5  # rad, the whole opening
 
     def __post_init__(self) -> None:

@@ -98,13 +98,15 @@ def sonar_range(
 ) -> Value:
     """Return a sensor_msgs/Range of one sonar.
 
-    Nearer than can be measured is ``min_range``; a fault is NaN (REP 117).
+    Nearer than can be measured is ``min_range``. Nav2's collision monitor stops for a range over
+    ``max_range``, and passes NaN as free space; REP 117 has NaN for a fault, and +Inf for no echo.
     """
     measured = message.ranges[index]
     if measured is None:
-        far = vehicle.sonar_max if settings.no_echo == "max_range" else math.inf
+        is_for_nav2 = settings.no_echo == "max_range"
+        far, fault = (vehicle.sonar_max, math.inf) if is_for_nav2 else (math.inf, math.nan)
         by_status = {"no_echo": far, "too_near": vehicle.sonar_min}
-        measured = by_status.get(message.status[index], math.nan)
+        measured = by_status.get(message.status[index], fault)
     stamped = header(message.t_ns, settings.frame_prefix + sonar_frame(mount))
     limits = vehicle.sonar_min, vehicle.sonar_max
     return stamped, ULTRASOUND, settings.sonar_fov, *limits, measured, 0.0

@@ -96,8 +96,21 @@ def test_a_range_without_a_number(status: str, no_echo: str, expected: float) ->
     assert measured(5, None, status, no_echo=no_echo)[5] == expected
 
 
-def test_a_sonar_with_a_fault_is_not_a_number() -> None:
-    assert math.isnan(measured(0, None, "fault")[5])
+def test_by_rep_117_a_sonar_with_a_fault_is_not_a_number() -> None:
+    assert math.isnan(measured(0, None, "fault", no_echo="inf")[5])
+
+
+@pytest.mark.parametrize(
+    ("distance", "status", "stops"),
+    [(5.0, "ok", False), (0.05, "ok", False), (None, "no_echo", False), (None, "too_near", False),
+     (None, "fault", True), (None, "unknown", True)],
+)  # fmt: skip
+def test_the_collision_monitor_of_nav2_stops_for_a_faulty_sonar(
+    distance: float | None, status: str, stops: bool
+) -> None:
+    """By its rule: a source is invalid, and stops, when its range is outside of its limits."""
+    *_, low, high, distance, _ = measured(0, distance, status)
+    assert (distance < low or distance > high) == stops
 
 
 @pytest.mark.parametrize(("verdict", "level"), [("run", 0), ("slow", 1), ("stop", 1), ("brake", 2)])
