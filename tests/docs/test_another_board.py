@@ -14,7 +14,7 @@ from tests.docs.integrator import ROOT
 PAGE = (ROOT / "docs" / "another_board.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.timed
+@pytest.mark.campaign
 @pytest.mark.timeout(300)
 def test_another_board_drives_the_lap(tmp_path: Path) -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True)
