@@ -16,7 +16,9 @@ class Ros2(settings.Section, frozen=True, kw_only=True):
     domain: Annotated[int, Meta(ge=0, le=232)] = 0  # ROS_DOMAIN_ID
     namespace: str = "/"  # of the node and its topics, such as /t2_001
     frame_prefix: Frame = ""  # before odom, base_link and the sonars, such as t2_001/
-    cmd_vel: Literal["both", "stamped", "plain"] = "both"  # TwistStamped, Twist
+    cmd_vel: Literal["stamped", "twist", "both"] = (
+        "stamped"  # its type; both confuse ros2 topic echo
+    )
     neutral: Literal["silence", "zero"] = "silence"  # what a publisher does before motion, 0.5 s
     publish_tf: bool = True  # odom to base_link; false for users of another estimator
     no_echo: Literal["max_range", "inf"] = (

@@ -70,6 +70,15 @@ FIELDS: dict[str, Fields] = {
     "diagnostic_msgs/msg/DiagnosticArray": (
         ("header", "std_msgs/msg/Header"), ("status", "diagnostic_msgs/msg/DiagnosticStatus[]"),
     ),
+    "rcl_interfaces/msg/Log": (
+        ("stamp", "builtin_interfaces/msg/Time"),
+        ("level", "uint8"),
+        ("name", "string"),
+        ("msg", "string"),
+        ("file", "string"),
+        ("function", "string"),
+        ("line", "uint32"),
+    ),
     "std_srvs/srv/Trigger_Request": (),
     "std_srvs/srv/Trigger_Response": (("success", "bool"), ("message", "string")),
 }  # fmt: skip
@@ -79,6 +88,7 @@ DIGESTS = """
 9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a geometry_msgs/msg/Twist
 5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64 geometry_msgs/msg/TwistStamped
 3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0 nav_msgs/msg/Odometry
+e28ce254ca8abc06abf92773b74602cdbf116ed34fbaf294fb9f81da9f318eac rcl_interfaces/msg/Log
 b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a sensor_msgs/msg/Range
 feb91e995ff9ebd09c0cb3d2aed18b11077585839fb5db80193b62d74528f6c9 std_msgs/msg/Bool
 df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18 std_msgs/msg/String

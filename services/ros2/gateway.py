@@ -1,5 +1,6 @@
 """The gateway: connects the robot's bus with one node of ROS 2."""
 
+import time
 from functools import partial
 
 from common import clock
@@ -14,7 +15,10 @@ from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
 
 SOURCE, NODE = "ros2", "t2"
-TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "plain": "geometry_msgs/msg/Twist"}
+TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "twist": "geometry_msgs/msg/Twist"}
+OTHER_TYPE = Refusal(
+    "other_type", "A node publishes cmd_vel with another type than that of ros2.cmd_vel."
+)
 
 
 class Gateway:
@@ -32,8 +36,11 @@ class Gateway:
         self._drive = DriveSource(node.bus, SOURCE)
         self._streams = Streams(node, self._publisher, self._diagnostics)
         Calls(node, self._ros, self._absolute, self._streams.state)
+        self._log = self._publisher("/rosout", "rcl_interfaces/msg/Log")
+        self._types: list[str] = []  # of the commands that are taken
         for name, interface in TWISTS.items():
             if settings.cmd_vel in ("both", name):
+                self._types.append(names.wire_type(interface))
                 take = partial(self._take, name == "stamped")
                 self._ros.subscribe(self._absolute("cmd_vel"), interface, take, self._unreadable)
         self._ros.watch(self._on_token)
@@ -75,19 +82,23 @@ class Gateway:
     def _note(self, level: int, text: str, values: dict[str, str]) -> None:
         status = translate.status(level, "cmd_vel", text, values)
         self._diagnostics.note(status, clock.now_ns())
+        text = f"cmd_vel of {values['publisher']}: {text}"
+        self._log.put(translate.log(time.time_ns(), level, text))
 
     def _sender(self, publisher: bytes) -> str:
         return self._publishers.get(publisher, "unknown")
 
     def _on_token(self, token: str, appeared: bool) -> None:
         """Keep the nodes that publish commands."""
-        node, topic = names.publisher(token) or ("", "")
+        node, topic, interface = names.publisher(token) or ("", "", "")
         if topic != self._absolute("cmd_vel"):
             return
         publisher = gid(token)
         if appeared:
             if len(self._publishers) < MAX_PUBLISHERS:
                 self._publishers[publisher] = node
+            if interface not in self._types:
+                self._refuse(OTHER_TYPE, publisher)
             return
         self._publishers.pop(publisher, None)
         self._reported.pop(publisher, None)

@@ -36,13 +36,16 @@ class Node(NamedTuple):
         return f"{where}/{EMPTY}/{mangled(self.namespace)}/{self.name}"
 
 
-def publisher(token: str) -> tuple[str, str] | None:
-    """Return node and topic of a publisher's token, as absolute names; None for other tokens."""
+def publisher(token: str) -> tuple[str, str, str] | None:
+    """Return node, topic and wire type of a publisher's token, None for other tokens.
+
+    Node and topic are absolute names.
+    """
     chunks = token.split("/")
     if len(chunks) < CHUNKS or chunks[5] != "MP":
         return None
     namespace, node, topic = (chunk.replace(EMPTY, "/") for chunk in chunks[7:10])
-    return absolute(namespace, node), topic
+    return absolute(namespace, node), topic, chunks[10]
 
 
 def is_valid(name: str) -> bool:

@@ -18,6 +18,7 @@ ULTRASOUND = 0
 SONAR_HEIGHT, BODY_HEIGHT, CLEARANCE = 0.35, 0.35, 0.15  # m, for display: the settings have none
 PLANAR = 1e-6  # variance of what a vehicle on a floor does not do: z, roll, pitch, sideways
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
+SEVERITIES: Mapping[int, int] = {OK: 20, WARN: 30}  # INFO, WARN of a log
 STALE_NS = 3 * NS_PER_S
 ONCE = "t2: cmd_vel"  # noted on a change, not periodically
 WORST: Mapping[str, int] = {"run": OK, "slow": WARN, "stop": WARN, "brake": ERROR}
@@ -116,6 +117,11 @@ def status(level: int, name: str, text: str, values: Mapping[str, object]) -> Va
     """Return a diagnostic_msgs/DiagnosticStatus of this robot."""
     pairs = tuple((printable(key), printable(str(value))) for key, value in values.items())
     return level, f"t2: {printable(name)}", printable(text), "t2", pairs
+
+
+def log(t_ns: int, level: int, text: str) -> Value:
+    """Return a rcl_interfaces/Log of the gateway's node."""
+    return divmod(t_ns, NS_PER_S), SEVERITIES[level], "t2", printable(text), "", "", 0
 
 
 def safety_status(state: m.SafetyState) -> Value:

@@ -13,6 +13,7 @@ from tests.ros2 import oracle
 LATCHED = ":1:,1:,:,:,,"
 TRIGGER = "bool success\nstring message"
 PERIOD_S = 0.05
+PAUSE_S, DRIVE_S = 0.7, 1.2
 
 
 class RosPeer:
@@ -67,6 +68,11 @@ class CommandPublisher:
     def __init__(self, publisher: Any, interface: str) -> None:
         self._publisher = publisher
         self._stamped = interface.endswith("Stamped")
+
+    def restart(self, linear: float, angular: float = 0.0) -> None:
+        """Pause, then drive as ``ros2 topic pub``: without a zero before."""
+        time.sleep(PAUSE_S)
+        self.send(DRIVE_S, linear, angular)
 
     def send(self, seconds: float, linear: float = 0.0, angular: float = 0.0) -> None:
         """Send the command again and again for this time."""

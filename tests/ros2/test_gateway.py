@@ -1,7 +1,6 @@
 """The gateway on the real stack, with a node of zenoh-ros2-sdk on the other side."""
 
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -100,7 +99,7 @@ def test_commands_move_the_vehicle_until_they_end(node: RosPeer, stack: RunningS
     start = odom[-1].pose.pose.position
 
     def moved() -> bool:
-        commands.send(0.8, 0.3)  # as ``ros2 topic pub``: never a zero
+        commands.restart(0.3)
         now = odom[-1].pose.pose.position
         return math.dist((start.x, start.y), (now.x, now.y)) > 0.1
 
@@ -123,10 +122,10 @@ def test_an_emergency_stop_latches_until_a_reset(node: RosPeer) -> None:
 
 
 def test_motion_across_a_reset_is_refused_until_a_pause(node: RosPeer, stack: RunningStack) -> None:
-    diagnostics, commands = make_ready(node), node.commands(PLAIN)
+    diagnostics, commands = make_ready(node), node.commands(STAMPED)
 
     def moves() -> bool:
-        commands.send(0.3, 0.2)
+        commands.restart(0.2)
         return stack.speed() > 0.05
 
     wait_until(moves, "a motion")
@@ -143,7 +142,6 @@ def test_motion_across_a_reset_is_refused_until_a_pause(node: RosPeer, stack: Ru
     commands.send(2.0, 0.2)
     assert stack.control.truth().distance == before
     assert "Stop publishing" in statuses(diagnostics)["t2: cmd_vel"].message
-    time.sleep(0.7)
     wait_until(moves, "a motion after the pause")
 
 
@@ -182,8 +180,9 @@ def test_the_diagnostics_list_only_services_that_exist(node: RosPeer, stack: Run
     assert services <= {f"t2: service {name}" for name in keys.SERVICES}
 
 
-def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> None:
+def test_refusals_are_in_the_diagnostics_and_in_the_log(node: RosPeer, stack: RunningStack) -> None:
     diagnostics = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+    log = node.subscribe("/rosout", "rcl_interfaces/msg/Log")
     commands = node.commands(STAMPED)
 
     def refused() -> bool:
@@ -192,16 +191,20 @@ def test_refusals_are_in_the_diagnostics(node: RosPeer, stack: RunningStack) -> 
 
     wait_until(refused, "the refusal")
     assert stack.speed() == 0
+    wait_until(lambda: any("not finite" in each.msg for each in log), "the log of the refusal")
+    assert {(each.level, each.name) for each in log} == {(30, "t2")}
+    node.commands(PLAIN)
+    wait_until(lambda: "another type" in log[-1].msg, "the log of a publisher of the other type")
 
 
 def test_a_killed_gateway_stops_the_vehicle_and_nothing_else(
     node: RosPeer, stack: RunningStack
 ) -> None:
     make_ready(node)
-    commands = node.commands(PLAIN)
+    commands = node.commands(STAMPED)
 
     def moves() -> bool:
-        commands.send(0.5, -0.2)
+        commands.restart(-0.2)
         return stack.speed() < -0.05
 
     wait_until(moves, "a motion")

@@ -42,11 +42,13 @@ def test_a_namespace_is_one_chunk() -> None:
 
 
 def test_the_token_of_a_publisher_is_read() -> None:
-    assert names.publisher(CAPTURED) == ("/_ros2cli_10327", "/cmd_vel")
+    assert names.publisher(CAPTURED) == (
+        "/_ros2cli_10327", "/cmd_vel", names.wire_type(STAMPED),
+    )  # fmt: skip
     assert names.publisher(f"{CAPTURED}/backends:cpu") == names.publisher(CAPTURED)  # Lyrical
     inner = names.Node(7, "ab", "/site/t2", "nav")
     token = inner.endpoint_token(3, "MP", "/site/t2/cmd_vel", STAMPED, names.QOS)
-    assert names.publisher(token) == ("/site/t2/nav", "/site/t2/cmd_vel")
+    assert names.publisher(token) == ("/site/t2/nav", "/site/t2/cmd_vel", names.wire_type(STAMPED))
 
 
 @pytest.mark.parametrize("token", [CLI.token, "a/b", CAPTURED[:40], CAPTURED.replace("MP", "MS")])

@@ -157,6 +157,12 @@ def test_the_status_of_a_service() -> None:
     assert dict(made[4]) == {"version": "1.2", "uptime": "60 s", "resets": "3"}
 
 
+@pytest.mark.parametrize(("level", "severity"), [(translate.OK, 20), (translate.WARN, 30)])
+def test_a_log_is_one_of_the_gateways_node(level: int, severity: int) -> None:
+    made = translate.log(T_NS, level, "Refused.\x1b")
+    assert made == (STAMP, severity, "t2", "Refused.\\u001b", "", "", 0)
+
+
 def test_a_status_is_printable() -> None:
     made = translate.status(0, "a\x1b", "b\x1b", {"c\x1b": "d\x1b"})
     assert made == (0, "t2: a\\u001b", "b\\u001b", "t2", (("c\\u001b", "d\\u001b"),))

@@ -31,6 +31,7 @@ TOPICS = {
     "/bumper": "std_msgs::msg::dds_::Bool_",
     "/hardware/e_stop": "std_msgs::msg::dds_::Bool_",
     "/diagnostics": "diagnostic_msgs::msg::dds_::DiagnosticArray_",
+    "/rosout": "rcl_interfaces::msg::dds_::Log_",
 }
 SUBSCRIPTIONS = [
     ["/cmd_vel", "geometry_msgs::msg::dds_::TwistStamped_"],
@@ -89,7 +90,7 @@ def robot_with_gateway(folder: Path, program: Path) -> Iterator[Robot]:
     """Run the stack in an empty world; only a request is missing when the context begins."""
 
     def beside(config: Everything) -> dict[str, list[str]]:
-        where = set_options(f"bus.connect={config.bus.endpoints[0]}")
+        where = set_options(f"bus.connect={config.bus.endpoints[0]}", "ros2.cmd_vel=both")
         return {"ros2": child_process.command("services.ros2", *where)}
 
     with running_stack(folder, beside=beside) as stack, session(stack.endpoint) as bus:
