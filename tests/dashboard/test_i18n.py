@@ -8,6 +8,7 @@ import pytest
 
 from common.messages import Direction, FaultName, LinkState, Verdict
 from common.root_cause import TEXTS as ROOT_TEXTS
+from services.bridge.core.lease import WAITING
 from services.dashboard import server
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.i18n import EVENTS, PHRASES, TEXTS
@@ -52,6 +53,10 @@ def test_every_used_key_has_a_text() -> None:
 )
 def test_every_name_of_the_messages_has_its_text(prefix: str, names: list[str]) -> None:
     assert {f"{prefix}.{getattr(name, 'value', name)}" for name in names} <= set(TEXTS)
+
+
+def test_what_the_bridge_waits_for_has_its_text() -> None:
+    assert set(WAITING.values()) <= set(PHRASES)
 
 
 def test_the_causes_have_the_texts_of_safety_and_each_direction_its_texts() -> None:
