@@ -29,7 +29,7 @@ def buses(monkeypatch: pytest.MonkeyPatch) -> dict[str, Mock]:
     opened: dict[str, Mock] = {}
 
     def bus(_endpoints: object, robot: str, *_: object) -> Mock:
-        opened[robot] = Mock(robot=robot, connected=True)
+        opened[robot] = Mock(robot=robot, connected=True, where=DashboardConfig().bus)
         return opened[robot]
 
     monkeypatch.setattr(module, "Bus", bus)
