@@ -27,11 +27,10 @@ TEXTS: dict[Part, str] = {
     "relay": "The relay is silent: check its power and cable.",
     "board": "The board is silent: check its power and cable.",
 }
-# Causes of safety that a missing bridge, relay or board has as well. One that latches, or that
-# brakes a moving vehicle, is not among them.
-FOLLOWING = (
-    "starting", "link", "switches", "bumper", "silent", "unarmed", "bumper_lossy", "sonar",
-)  # fmt: skip
+# Causes of safety that follow from streams that are not sent, and from a missing bridge, relay or
+# board. One that latches, or that brakes a moving vehicle, is not among them.
+FROM_STREAMS = ("starting", "bumper", "silent", "bumper_lossy", "sonar")
+FROM_LINK = (*FROM_STREAMS, "link", "switches", "unarmed")
 
 
 class RootCause(Struct, frozen=True):
@@ -47,7 +46,7 @@ def root_cause(connected: bool, state: SafetyState | None, link: Link | None) ->
         return RootCause("router")
     if state is None:
         return RootCause("safety")
-    folded = tuple(cause.name for cause in state.causes if cause.name in FOLLOWING)
+    folded = tuple(cause.name for cause in state.causes if cause.name in FROM_LINK)
     if link is None:
         return RootCause("bridge", folded) if folded else RootCause()
     if link.state == "up":

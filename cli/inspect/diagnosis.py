@@ -11,6 +11,7 @@ from typing import Literal
 
 from common import keys
 from common.messages import Health, Link, Relay, SafetyState
+from common.root_cause import FROM_LINK, FROM_STREAMS
 
 Level = Literal["ok", "note", "wrong", "unknown"]
 
@@ -74,9 +75,6 @@ CAUSES = {
 }
 # Causes of normal operation, with or without a driver.
 NORMAL = ("release", "neutral", "obstacle", "blocked", "limit", "limit_stop")
-# Causes that follow from streams that are not sent, and from a bridge or a board that is not there.
-FROM_STREAMS = ("starting", "bumper", "silent", "bumper_lossy", "sonar")
-FROM_LINK = (*FROM_STREAMS, "link", "switches", "unarmed")
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 import pytest
 
 from common.messages import Cause, Link, Relay, SafetyState
-from common.root_cause import FOLLOWING, Part, RootCause, root_cause
+from common.root_cause import FROM_LINK, Part, RootCause, root_cause
 from services.safety.core.causes import BY_NAME, Clears
 from tests.factories import link, safety_state
 
@@ -38,6 +38,6 @@ def test_the_first_missing_part_and_what_follows(
 
 
 def test_no_latch_and_no_brake_is_folded() -> None:
-    for name in FOLLOWING:
+    for name in FROM_LINK:
         assert BY_NAME[name].clears is not Clears.RESET
         assert BY_NAME[name].action != "brake"
