@@ -10,6 +10,7 @@ from cli.inspect import diagnosis as d
 from cli.inspect.diagnosis import Finding, Observation, diagnose
 from common import keys
 from common import messages as m
+from common.root_cause import FROM_LINK
 from services.safety.core.causes import RULES
 from tests import factories
 from tests.factories import health
@@ -127,7 +128,7 @@ def without(*services: str) -> dict[str, Any]:
     return {"instances": dict.fromkeys(names, 1), "healths": {n: health(n) for n in names}}
 
 
-STOPPED = {"rates": {"tel/bridge/link": 10.0}, "state": state("no_request", *d.FROM_LINK)}
+STOPPED = {"rates": {"tel/bridge/link": 10.0}, "state": state("no_request", *FROM_LINK)}
 
 
 @pytest.mark.parametrize(
@@ -207,4 +208,4 @@ def test_streams_that_are_slow_missing_or_downsampled() -> None:
 
 def test_remedies_name_existing_causes() -> None:
     names = {rule.name for rule in RULES}
-    assert names >= d.CAUSES.keys() | {*d.NORMAL, *d.FROM_LINK}
+    assert names >= d.CAUSES.keys() | {*d.NORMAL, *FROM_LINK}
