@@ -1,7 +1,8 @@
 """A ROS 2 node on plain Zenoh, written from the description of rmw_zenoh's wire.
 
-``python plain_peer.py tcp/HOST:PORT`` runs ``exercise`` and prints its results as JSON. It imports
-nothing of T2, so that it runs with any version of Zenoh. SI units.
+``python plain_peer.py tcp/HOST:PORT PAUSE`` runs ``exercise`` and prints its results as JSON; the
+planner is silent for so many seconds. It imports nothing of T2, so that it runs with any version of
+Zenoh. SI units.
 """
 
 import itertools
@@ -11,7 +12,9 @@ import struct
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import closing
+from functools import partial
 from importlib.metadata import version
 from typing import Any, NamedTuple
 
@@ -21,12 +24,17 @@ import zenoh.ext
 
 PATIENCE_S = 15.0
 PERIOD_S = 0.05
-NEUTRAL_S = 1.0  # a publisher is taken when its delay has been steady
-MOTION_S = 1.5
+MOTION_S = 2.0
+HALT_S = 1.5  # the vehicle stands then
+KEY_DELAY_S, KEY_REPEAT_S = 0.5, 0.033  # of a terminal, for a key that is held
 
 TWIST = (
     "geometry_msgs::msg::dds_::TwistStamped_/"
     "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64"
+)
+ODOMETRY = (
+    "nav_msgs::msg::dds_::Odometry_/"
+    "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"
 )
 TEXT = (
     "std_msgs::msg::dds_::String_/"
@@ -39,6 +47,7 @@ TRIGGER = (
 QOS = "::,10:,:,:,,"
 CDR = b"\0\1\0\0"
 FRAME = b"base_link\0"
+SPEED_FROM_END = (36 + 6) * 8  # of an odometry: six velocities and their covariance end it
 
 
 class Twist(NamedTuple):
@@ -94,6 +103,9 @@ class PlainPeer:
         self.session = zenoh.open(config)
         node = f"@ros2_lv/0/{self.session.info.zid()}/0/0/NN/%/%/plain_peer"
         self._node = self.session.liveliness().declare_token(node)
+        self._odometry = self.session.declare_subscriber(f"0/odom/{ODOMETRY}", self._on_odometry)
+        self._travel = 0.0  # m, since the start
+        self._stamp_s: float | None = None
 
     def close(self) -> None:
         """Close the session."""
@@ -112,6 +124,22 @@ class PlainPeer:
             return text(arrived.get(timeout=PATIENCE_S), 4)
         finally:
             subscriber.undeclare()
+
+    def travel(self, act: Callable[[], None]) -> float:
+        """Return how far the robot has driven, until it stands, by its odometry (m)."""
+        before = self._travel
+        act()
+        time.sleep(HALT_S)
+        return round(self._travel - before, 3)
+
+    def _on_odometry(self, sample: zenoh.Sample) -> None:
+        """Add up nav_msgs/Odometry: the speed along x, by the stamps."""
+        payload = sample.payload.to_bytes()[len(CDR) :]
+        seconds, nanoseconds = struct.unpack_from("<iI", payload)
+        (speed,) = struct.unpack_from("<d", payload, len(payload) - SPEED_FROM_END)
+        stamp_s, before_s = seconds + nanoseconds * 1e-9, self._stamp_s
+        self._travel += abs(speed) * (stamp_s - before_s if before_s else 0.0)
+        self._stamp_s = stamp_s
 
     def call(self, service: str) -> tuple[bool, str]:
         """Call a service of std_srvs/srv/Trigger; return success and message."""
@@ -132,11 +160,11 @@ class PlainPeer:
 
 
 class Driver:
-    """Publishes the current command at 20 Hz in a thread."""
+    """A new node that publishes the current command at 20 Hz in a thread; None: it is silent."""
 
     def __init__(self, peer: PlainPeer) -> None:
-        self.twist = Twist()
-        self._publisher = Endpoint(peer.session, *COMMANDS)
+        self.twist: Twist | None = None
+        self.publisher = Endpoint(peer.session, *COMMANDS)
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -145,11 +173,26 @@ class Driver:
         """Stop publishing."""
         self._ends.set()
         self._thread.join()
-        self._publisher.close()
+        self.publisher.close()
+
+    def publish(self, twist: Twist, seconds: float = MOTION_S) -> None:
+        """Publish this for a time, then nothing."""
+        self.twist = twist
+        time.sleep(seconds)
+        self.twist = None
+
+    def hold_key(self) -> None:
+        """Publish as a keyboard: once for each press, and for each repeat by the terminal."""
+        self.publisher.send(FORWARD)
+        time.sleep(KEY_DELAY_S)
+        for _ in range(round(MOTION_S / KEY_REPEAT_S)):
+            self.publisher.send(FORWARD)
+            time.sleep(KEY_REPEAT_S)
 
     def _run(self) -> None:
         while not self._ends.wait(PERIOD_S):
-            self._publisher.send(self.twist)
+            if (twist := self.twist) is not None:
+                self.publisher.send(twist)
 
 
 def text(payload: bytes, at: int) -> str:
@@ -158,19 +201,29 @@ def text(payload: bytes, at: int) -> str:
     return payload[at + 4 : at + 3 + size].decode()
 
 
-def exercise(peer: PlainPeer) -> dict[str, Any]:
-    """Read, drive, stop, try to drive, reset; return what was observed."""
+def exercise(peer: PlainPeer, pause_s: float) -> dict[str, Any]:
+    """Drive as each tool, stop and reset under a running node; return what was observed."""
     found: dict[str, Any] = {"zenoh": version("eclipse-zenoh"), "description": peer.description()}
-    driver = Driver(peer)
-    for result, service in (("stop", "e_stop_trigger"), ("reset", "e_stop_reset")):
-        for twist, seconds in ((Twist(), NEUTRAL_S), (FORWARD, MOTION_S), (Twist(), NEUTRAL_S)):
-            driver.twist = twist
-            time.sleep(seconds)
-        found[result] = peer.call(f"/hardware/{service}")
-    driver.close()
+    for tool in ("topic_pub", "keyboard", "planner"):
+        with closing(Driver(peer)) as node:
+            drive = node.hold_key if tool == "keyboard" else partial(node.publish, FORWARD)
+            found[tool] = peer.travel(drive)
+            if tool == "planner":
+                time.sleep(pause_s)
+                found["after_pause"] = peer.travel(drive)
+    with closing(Driver(peer)) as node:
+        node.twist = FORWARD
+        time.sleep(MOTION_S)
+        found["stop"] = peer.call("/hardware/e_stop_trigger")
+        time.sleep(HALT_S)
+        found["reset"] = peer.call("/hardware/e_stop_reset")
+        found["across_reset"] = peer.travel(lambda: time.sleep(MOTION_S))
+        node.twist = None
+        time.sleep(HALT_S)
+        found["after_reset"] = peer.travel(lambda: node.publish(FORWARD))
     return found
 
 
 if __name__ == "__main__":
     with closing(PlainPeer(sys.argv[1])) as this:
-        print(json.dumps(exercise(this)))
+        print(json.dumps(exercise(this, float(sys.argv[2]))))
