@@ -31,7 +31,7 @@ from typing import NamedTuple
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.messages import MAX_NUMBER
+from common.messages import MAX_NUMBER, SafetyState
 from services.ros2.cdr import Attachment
 
 HELD_BACK_NS = NS_PER_S // 5
@@ -91,6 +91,11 @@ OTHER_AXES = Refusal(
 )
 
 
+def bars_motion(state: SafetyState | None) -> bool:
+    """Return whether safety wants a neutral request before the next motion, by its newest state."""
+    return state is not None and (bool(state.latched) or state.verdict == "inhibited")
+
+
 class Request(NamedTuple):
     """A command to pass on to safety."""
 
@@ -148,15 +153,15 @@ class Commands:
     """Decides about each command; keeps what is known of its publishers."""
 
     _owned_ns: int  # when the owner drove last
+    _since_ns: int  # of ``listen``
 
     def __init__(self, *, by_zero: bool = False) -> None:
         self.owner: bytes | None = None  # GID of the publisher that drives
         self._by_zero = by_zero  # whether only zeros are neutral
-        self._since_ns = 0
         self._known: dict[bytes, Publisher] = {}
 
     def listen(self, now_ns: int) -> None:
-        """Begin to receive: what an unknown publisher did before is unknown."""
+        """Begin to receive, before the first command: what its publisher did before is unknown."""
         self._since_ns = now_ns
 
     def judge(

@@ -22,7 +22,9 @@ from services.ros2.command import (
     Refusal,
     Request,
     Twist,
+    bars_motion,
 )
+from tests import factories
 
 S = 10**9
 MS = 10**6
@@ -121,6 +123,15 @@ def test_zeros_are_passed_on_while_motion_is_barred_and_are_a_pause() -> None:
     assert sender.send(2.55, motion=twist()) == "begins"
 
 
+@pytest.mark.parametrize(
+    ("verdict", "latched", "bars"),
+    [("run", (), False), ("stop", (), False), ("inhibited", (), True), ("stop", ("estop",), True)],
+)
+def test_what_bars_motion(verdict: Any, latched: tuple[str, ...], bars: bool) -> None:
+    assert bars_motion(factories.safety_state(verdict=verdict, latched=latched)) is bars
+    assert not bars_motion(None)
+
+
 def test_a_publisher_that_was_running_when_the_gateway_started_must_pause() -> None:
     commands = Commands()
     commands.listen(0)
@@ -212,8 +223,9 @@ def test_the_next_publisher_may_begin_at_once_when_the_owner_is_gone() -> None:
     commands.gone(JOY)  # it does not drive
     assert joy.send(0.95) == "second_publisher"
     commands.gone(NAV)
-    assert joy.send(1.5) == "begins"
-    assert joy.send(2.0) == TAKEN
+    assert commands.owner is None
+    assert joy.send(1.45) == "begins"
+    assert joy.send(1.95) == TAKEN
 
 
 def test_a_command_that_is_repeated_or_late_is_refused() -> None:
@@ -246,7 +258,7 @@ def test_a_refused_command_does_not_make_an_owner() -> None:
 
 
 def test_many_publishers_are_not_remembered() -> None:
-    commands = Commands()
+    commands = started()
     for number in range(3 * MAX_PUBLISHERS):
         Sender(commands, number.to_bytes(16, "big")).send(number / 100)
     assert len(commands._known) == MAX_PUBLISHERS
@@ -265,6 +277,16 @@ def test_where_only_zeros_are_neutral_a_publisher_settles_and_sends_zero() -> No
     assert sender.send(1.6) == TAKEN
     assert sender.send(2.6, motion=twist()) == "settling"
     assert sender.send(3.1) == "not_zero"
+
+
+@pytest.mark.parametrize("source_ns", [0, 10 * S])
+def test_a_zero_that_begins_is_not_held_back_itself(source_ns: int) -> None:
+    commands = started(by_zero=True)
+    for sequence, (at_ns, motion) in enumerate([(0, twist()), (S // 2, twist()), (S, twist(0.3))]):
+        about = Attachment(sequence, source_ns + at_ns, NAV)
+        decided = commands.judge(about, motion, at_ns, at_ns, barred=False)
+        commands.gone(NAV)
+    assert decided == TAKEN
 
 
 START_NS = 10**12  # our clock; the senders' clocks are 0 then
@@ -338,8 +360,8 @@ def test_a_faster_delivery_of_the_one_that_drives_is_no_beginning(commands: Comm
 
 
 def test_the_limit_of_the_owners_silence(commands: Commands) -> None:
-    assert at(commands, 1, S + OWNER_NS - 1, gid=JOY) == "second_publisher"
-    assert at(commands, 2, S + 2 * OWNER_NS, gid=JOY) == "begins"
+    assert at(commands, 1, S + OWNER_NS - 1, speed=0.0, gid=JOY) == "second_publisher"
+    assert at(commands, 2, S + OWNER_NS, gid=JOY) == "begins"
 
 
 def test_the_limit_of_a_silence_after_which_a_publisher_begins_anew(commands: Commands) -> None:
@@ -363,7 +385,7 @@ def test_motion_is_never_older_than_allowed(
     sent: list[tuple[bytes, int, float, float, float]],
 ) -> None:
     """No command moves that took 0.2 s longer than the fastest one of its publisher."""
-    commands, now_s = Commands(), 0.0
+    commands, now_s = started(), 0.0
     fastest: dict[bytes, float] = {}
     sequences = {NAV: 0, JOY: 0}
     for gid, step, wait_s, delay_s, speed in sent:

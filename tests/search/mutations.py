@@ -22,6 +22,7 @@ from common.wire.reports import BumperBrakeReport, BumperReport
 from services.bridge.config import Bridge
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
+from services.ros2 import command
 from services.safety.config import LimitSource, Safety
 from services.safety.core import causes, conditions, operator_requests, policy, sources
 from services.safety.core.causes import Held, Observation
@@ -480,6 +481,11 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "a suspended program drives on": (
         (sources, "LAPSE_S", 1e9), (*LET_GO, *GO), "was not neutral",
+    ),
+    "a ROS node drives on without a pause": (
+        (command, "PAUSE_NS", -NS_PER_S),
+        (lambda s: s.request(None, 1500), lambda s: s.ros("topic_pub", 0.5, 1500),
+         lambda s: s.stop(1500), *RESET), "without a pause of the ROS node",
     ),
     "an override does not hold": (
         (Arbiter, "overruled", unchanged),

@@ -14,6 +14,7 @@ from sim.faults import Datagram
 from sim.model import Model
 from sim.sonar import Ranges
 from verification.search.bus import MS, ROBOT, Disturbance
+from verification.search.ros import SOURCE, RosSource
 from verification.search.stack import Stack
 
 ALL_SONARS = range(8)
@@ -69,6 +70,13 @@ class ScriptedStack(Stack):
         """Ask for zero until inputs have settled, then for motion: the way it is meant."""
         self.request(0.0, 650, source=source)
         self.request(linear, ms, angular=angular, source=source)
+
+    def ros(self, pattern: str | None, linear: float = 0.5, ms: int = 0) -> None:
+        """Start a ROS node that publishes motion as one of the tools; None: end it."""
+        node = self.sources[SOURCE]
+        assert isinstance(node, RosSource)
+        node.start(pattern, linear)
+        self.run(ms)
 
     def press(self, pressed: bool, ms: int = 0) -> None:
         """Press the bumper, or free it."""

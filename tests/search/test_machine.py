@@ -29,6 +29,7 @@ from sim import requests as q
 from tests.search.scripted_stack import ALL_SONARS, FAULT_MM, NO_ECHO_MM, ScriptedStack
 from verification.search.bus import CLEAR, ECHO_MS, HOLD_MS, Disturbance
 from verification.search.condition_books import IGNORED, NEEDED
+from verification.search.ros import PATTERNS
 from verification.search.stack import PENDANT
 
 PATIENCE = 3  # rules
@@ -212,6 +213,9 @@ class StackMachine(RuleBasedStateMachine):
     request = rule(linear=st.none() | SPEEDS, angular=TURNS, source=SOURCES, ms=SHORT | LONG)(
         verb(ScriptedStack.request)
     )
+    ros = rule(pattern=st.none() | st.sampled_from([*PATTERNS]), linear=FAST, ms=LONG)(
+        verb(ScriptedStack.ros, 700)
+    )
     stop = rule(ms=SHORT)(verb(ScriptedStack.stop))
     creep = rule(direction=DIRECTIONS, times=st.integers(1, 8))(verb(ScriptedStack.creep))
 
@@ -227,7 +231,7 @@ class StackMachine(RuleBasedStateMachine):
         if lets_go:
             for source in STICKS:
                 self.stack.request(None, source=source)
-            self.stack.run(500)
+            self.stack.run(500)  # a ROS node goes on
         self.stack.reset()
 
     @rule(kind=KINDS, ms=LONG, dies=st.sampled_from(["nobody", "safety", "bridge"]))
@@ -377,6 +381,7 @@ class StackMachine(RuleBasedStateMachine):
         """When all sources fall silent, the vehicle is stopped and stays stopped."""
         for source in STICKS:
             self.stack.request(None, source=source)
+        self.stack.ros(None)
         self.stack.kill("safety", 10_000)
         self.stack.run(1200)
         self.no_frame_breaks_an_invariant()

@@ -9,6 +9,7 @@ from common.wire.reports import BumperReport
 from tests.search.mutations import MUTATIONS, driver_blinks
 from tests.search.scripted_stack import ScriptedStack, driving
 from verification.search.bridge_book import BridgeBook
+from verification.search.ros import PATTERNS
 
 
 def check_it_drives(stack: ScriptedStack) -> None:
@@ -67,6 +68,24 @@ def test_the_oracle_objects_to_a_missing_protection(
         stack.run(2000)
         found = stack.oracle.violations
         assert any(objection in one for one in found) if is_missing else found == [], found[:5]
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_ros_nodes_drive_and_after_a_reset_not_before_a_pause(pattern: str) -> None:
+    stack = driving()
+    stack.request(None, 1500)
+    runs = stack.oracle.runs
+    stack.ros(pattern, 0.5, 1500)
+    assert stack.oracle.runs > runs + 10
+    stack.stop(100)
+    stack.ros("topic_pub", 0.5, 1500)
+    assert stack.reset().done
+    runs = stack.oracle.runs
+    stack.run(3000)
+    assert stack.oracle.runs == runs
+    stack.ros(pattern, 0.5, 4500)
+    assert stack.oracle.runs > runs
+    assert stack.oracle.violations == []
 
 
 PORT_0, BOTH = [(0, False)] * 3, [(0, False), (1, False)] * 3

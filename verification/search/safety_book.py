@@ -20,8 +20,8 @@ from verification.search.condition_books import (
 )
 from verification.search.operator_book import OperatorBook, direction_of
 
-LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "nav": 0.2}
-PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "nav": 10}
+LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "ros2": 0.3, "nav": 0.2}
+PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "ros2": 11, "nav": 10}
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
 GOOD_SAMPLES, SETTLE_S = 3, 0.5
 LAPSE_S = 1.0  # after its lease a source is as new
@@ -83,7 +83,7 @@ class SafetyBook:
     def _on_drive(self, source: str, drive: m.Drive, sent_ns: int | None, now_ns: int) -> None:
         channel = self.requests[source]
         lapsed = now_ns - channel.at_ns > (channel.lease_s + LAPSE_S) * NS_PER_S
-        before = channel.message
+        before, was_fresh = channel.message, channel.is_fresh(now_ns)
         if not channel.take(drive, sent_ns, now_ns):
             return
         if lapsed:
@@ -93,6 +93,8 @@ class SafetyBook:
         if channel.is_neutral:
             self.zeros[source] = now_ns
             self.let_go.add(source)
+        if not was_fresh:
+            self.still_ns.pop(source, None)  # it may take over from one that drives
         if channel.is_still:
             self.still_ns.setdefault(source, now_ns)
         else:

@@ -26,6 +26,7 @@ from sim.world import Plan
 from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
 from verification.search.condition_books import IGNORED, LEASE_S, NEEDED
 from verification.search.oracle import STEP_NS, Oracle
+from verification.search.ros import SOURCE, RosSource
 
 START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
@@ -136,6 +137,7 @@ class Stack:
         self.sources = {
             "teleop": Source("teleop", keys.DRIVE, self.process("teleop")),
             "nav": Source("nav", keys.DRIVE, self.process("nav")),
+            SOURCE: RosSource(self.process(SOURCE), self.oracle.violations),
             NEEDED: Source(NEEDED, keys.LIMIT, self.process(NEEDED), m.Limit(echo=0)),
             IGNORED: Source(IGNORED, keys.LIMIT, self.process(IGNORED)),
             PENDANT: Source(
