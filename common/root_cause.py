@@ -27,10 +27,10 @@ TEXTS: dict[Part, str] = {
     "relay": "The relay is silent: check its power and cable.",
     "board": "The board is silent: check its power and cable.",
 }
-# Causes of safety that follow from streams that are not sent, and from a missing bridge, relay or
-# board. One that latches, or that brakes a moving vehicle, is not among them.
-FROM_STREAMS = ("starting", "bumper", "silent", "bumper_lossy", "sonar")
-FROM_LINK = (*FROM_STREAMS, "link", "switches", "unarmed")
+# Causes of safety that it has without a bridge, and others that follow from a missing bridge, relay
+# or board. One that latches, or that brakes a moving vehicle, is not among them.
+WITHOUT_BRIDGE = ("starting", "bumper", "silent", "link")
+FROM_LINK = (*WITHOUT_BRIDGE, "bumper_lossy", "sonar", "switches", "unarmed")
 
 
 class RootCause(Struct, frozen=True):
@@ -48,7 +48,8 @@ def root_cause(connected: bool, state: SafetyState | None, link: Link | None) ->
         return RootCause("safety")
     folded = tuple(cause.name for cause in state.causes if cause.name in FROM_LINK)
     if link is None:
-        return RootCause("bridge", folded) if folded else RootCause()
+        is_missing = not set(WITHOUT_BRIDGE).isdisjoint(folded)  # not only late on this network
+        return RootCause("bridge", folded) if is_missing else RootCause()
     if link.state == "up":
         return RootCause()
     is_relay = link.relay is not None and link.relay.state != "up"

@@ -7,16 +7,22 @@ gives one remedy, an instruction to the operator.
 
 from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from common import keys
 from common.messages import Health, Link, Relay, SafetyState
-from common.root_cause import FROM_LINK, FROM_STREAMS
+from common.root_cause import FROM_LINK
 
 Level = Literal["ok", "note", "wrong", "unknown"]
 
 NEEDED = ("safety", "bridge", "odom")  # in the order of a request
 STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOMETRY)
+# Safety's causes that follow from a stream that is not sent.
+ANY_STREAM = ("starting", "silent")
+FROM_STREAM = {
+    keys.BUMPER.path: (*ANY_STREAM, "bumper", "bumper_lossy"),
+    keys.ULTRASONIC.path: (*ANY_STREAM, "sonar"),
+}
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
@@ -115,6 +121,11 @@ class Observation:
         rates = publisher.rates if publisher else {}
         return next((hz for key, hz in rates.items() if key.endswith(f"/{path}")), 0.0)
 
+    def is_unsent(self, topic: keys.Topic[Any]) -> bool:
+        """Return whether a stream does not arrive, because its publisher sends too little."""
+        enough_hz = ENOUGH * topic.rate_hz
+        return not self.rates.get(topic.path) and self.sent_hz(topic.path) < enough_hz
+
 
 def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
     """Return all findings from the services to the wheels, and safety's state last."""
@@ -129,13 +140,12 @@ def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
         return
     for check in (services, versions, rights, clock):
         yield from check(seen)
-    behind = list(board(seen))
-    yield from behind
-    wrong = {each.where for each in behind if each.level == "wrong"}
-    if wrong & {"relay", "link"} or seen.is_absent("bridge"):
+    yield from board(seen)
+    if seen.is_absent("bridge") or any(link.state != "up" for link in seen.links[-1:]):
         yield from safety(seen, FROM_LINK)
     else:
-        yield from safety(seen, FROM_STREAMS if "streams" in wrong else ())
+        unsent = [topic.path for topic in STREAMS if seen.is_unsent(topic)]
+        yield from safety(seen, {it for path in unsent for it in FROM_STREAM.get(path, ANY_STREAM)})
 
 
 # --- from the laptop to the services --------------------------------------------------------------
@@ -296,7 +306,7 @@ def streams(seen: Observation) -> Iterator[Finding]:
             continue
         rate, sent_hz = seen.rates.get(topic.path, 0.0), seen.sent_hz(topic.path)
         if max(rate, sent_hz) < ENOUGH * topic.rate_hz:
-            level: Level = "note" if rate else "wrong"
+            level: Level = "wrong" if seen.is_unsent(topic) else "note"
             text = f"{topic.path} has {rate:.0f} of {topic.rate_hz:g} Hz"
             yield Finding("streams", level, text, SILENT)
         elif not rate:

@@ -30,7 +30,7 @@ from common.text import printable
 TIMEOUT_S = 3.0  # without a router
 KEEPALIVE_S = 0.1
 SWITCH = "USE THE VEHICLE'S OWN SWITCH"
-BARRED = "A driver of this robot releases it (R in `t2 drive`): this certificate may not reset."
+BARRED = "A driver of this robot releases it (R in `t2 drive`): this program may not reset."
 MOVES = ("bridge", "safety")  # a robot without these services cannot move
 
 

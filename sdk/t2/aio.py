@@ -1,6 +1,7 @@
 """Twins for asyncio: the same names, with ``await``, ``async for`` and ``async with``."""
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
 from functools import partial, wraps
@@ -11,6 +12,7 @@ from t2.connection import connect
 from t2.drive import Drive
 from t2.messages import (
     Bumper,
+    Direction,
     Event,
     Link,
     Message,
@@ -33,7 +35,7 @@ POLL_S = 0.01  # shorter than the period of each stream
 
 @asynccontextmanager
 async def aconnect(
-    robot: str = "001", *, endpoint: str = "", config: str | Path | None = None
+    robot: str = "", *, endpoint: str = "", config: str | Path | None = None
 ) -> AsyncIterator["AsyncRobot"]:
     """Connect as ``connect`` does, for ``async with``. Raises ``LinkError``.
 
@@ -91,6 +93,13 @@ def at_once(method: Method[P, R]) -> Callable[[object], Method[P, R]]:
         return call
 
     return decorate
+
+
+async def until_done(task: "asyncio.Task[Any]") -> None:
+    """Wait for the end of a task, however often this one is cancelled."""
+    while not task.done():
+        with suppress(Exception, asyncio.CancelledError):
+            await asyncio.shield(task)
 
 
 class AsyncStream(Generic[M]):
@@ -214,9 +223,7 @@ class AsyncDrive:
             return await asyncio.shield(task)
         except asyncio.CancelledError:
             self.twin.cancel()
-            while not task.done():  # however often this task is cancelled
-                with suppress(Exception, asyncio.CancelledError):
-                    await asyncio.shield(task)
+            await until_done(task)
             self.twin.uncancel()  # the motion had ended by itself
             raise
 
@@ -262,8 +269,17 @@ class AsyncRobot:
     @awaited(Robot.reset)
     def reset(self) -> None: ...  # noqa: D102
 
-    @awaited(Robot.release)
-    def release(self) -> None: ...  # noqa: D102
+    async def release(self, direction: Direction, source: str, timeout: float = 5.0) -> None:
+        """Move off a pressed bumper as ``Robot.release`` does; a cancelled task ends it."""
+        ended = threading.Event()
+        call = partial(self.twin.release, direction, source, timeout, ended)
+        task = asyncio.create_task(asyncio.to_thread(call))
+        try:
+            await asyncio.shield(task)
+        except asyncio.CancelledError:
+            ended.set()
+            await until_done(task)
+            raise
 
     @awaited(Robot.set_pose)
     def set_pose(self) -> None: ...  # noqa: D102

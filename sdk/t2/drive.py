@@ -11,7 +11,7 @@ import zenoh
 from t2.client import Contest, request
 from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, Stopped, T2Error
 from t2.messages import Odometry, SafetyState
-from t2.motion import STILL, Arc, Motion, OnStop, Path, Straight, Target, Turn, finite
+from t2.motion import NEAR_TURN, STILL, Arc, Motion, OnStop, Path, Straight, Target, Turn, finite
 from t2.publisher import FRESH_S, PERIOD_S, DrivePublisher
 from t2.stream import check_process
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the first one
 READY_S = 2.0  # from the first neutral request until we are in control
 PATIENCE_S = 3.0  # without progress
+WAIT_S = 60.0  # for the end of a stop; a vehicle that stood for longer must not surprise anybody
 SPEED, TURN_SPEED = 0.3, 0.5  # m/s, rad/s, of motions
 STANDING = 0.02  # m/s and rad/s
 CLOSED = "this drive is closed, or not entered yet: use `with robot.drive(...) as drive`"
@@ -41,7 +42,8 @@ class Drive:
     A motion ends with the pose and its covariance, and waits for standstill. It raises ``Blocked``
     after ``patience`` s without progress. When safety stops the vehicle with a cause that wants a
     neutral request, ``on_stop="raise"`` raises ``Stopped``; ``"wait"`` sends the neutral request
-    and goes on after the stop. A latched cause always raises.
+    and goes on after the stop, for 60 s at most. A latched cause, another source, and the silence
+    of safety or odometry always raise.
 
     >>> with robot.drive("nav") as drive:
     ...     pose = drive.forward(0.1)  # m
@@ -63,6 +65,7 @@ class Drive:
         self._target = STILL
         self._sent = 0  # requests
         self._contest = Contest(source)
+        self._obeyed_s = math.inf  # monotonic time of the last request without a stop
         self._error: T2Error | None = None  # for good, see the class
         self._reported = False  # whether it was raised
         self._cancelled = False
@@ -245,19 +248,21 @@ class Drive:
 
     def _go(self, motion: Motion, patience: float, on_stop: OnStop) -> Odometry:
         """Follow a motion until little is left; raise ``Blocked`` without progress."""
-        patience, least, progress_s = finite(patience), math.inf, time.monotonic()
+        patience, progress_s = finite(patience), time.monotonic()
+        least = least_turning = math.inf
 
         def arrived(pose: Odometry) -> bool:
-            nonlocal least, progress_s
+            nonlocal least, least_turning, progress_s
             left = motion.left(pose)
             if left <= motion.near:
                 return True
             linear, angular = motion.velocity(pose, left)
-            is_turning = linear == 0 and abs(pose.angular) > STANDING  # on the spot, within a path
             state = self._robot.safety.latest()
             is_waiting = on_stop == "wait" and is_stopped(state)
-            if left < least - motion.near or is_turning or is_waiting:
-                least, progress_s = min(left, least), time.monotonic()
+            if left < least - motion.near or is_waiting:
+                least, least_turning, progress_s = min(left, least), math.inf, time.monotonic()
+            elif 0 < motion.turning < least_turning - NEAR_TURN:
+                least_turning, progress_s = motion.turning, time.monotonic()
             elif time.monotonic() - progress_s > patience:
                 raise Blocked(f"the vehicle does not get on: {state.text}", state.causes)
             self.velocity(linear, angular, on_stop=on_stop)
@@ -363,8 +368,11 @@ class Drive:
             return None
         if state.latched:
             return Latched.of(state)
-        is_raised = target.moves and target.on_stop == "raise" and not self._contest.other
-        if not (is_raised and is_stopped(state)):
+        now_s = time.monotonic()
+        if not (target.moves and is_stopped(state)) or self._contest.other:
+            self._obeyed_s = now_s
+            return None
+        if target.on_stop == "wait" and now_s - self._obeyed_s < WAIT_S:
             return None
         return Stopped(f"{state.text} Open another drive to go on.", state.causes)
 

@@ -38,6 +38,7 @@ class Motion(Protocol):
     """A motion by odometry; ``near`` is the distance from the end, in m or rad, that is enough."""
 
     near: float
+    turning: float  # rad that are left of a turn on the spot within the motion; 0 without one
 
     def left(self, pose: Odometry) -> float:
         """Return how much is left; called for each pose."""
@@ -50,6 +51,7 @@ class Straight:
     """A distance in m along the heading at the start; negative is backward."""
 
     near = NEAR
+    turning = 0.0
 
     def __init__(self, start: Odometry, distance: float, speed: float) -> None:
         self._start, self._speed = start, positive(speed)
@@ -73,6 +75,7 @@ class Turn:
     """An angle in rad on the spot, positive to the left; may be more than a whole turn."""
 
     near = NEAR_TURN
+    turning = 0.0
 
     def __init__(self, start: Odometry, angle: float, speed: float) -> None:
         self._angle, self._sign = abs(finite(angle)), math.copysign(1.0, angle)
@@ -120,7 +123,7 @@ class Path:
         self._speed, self._turning = positive(speed), positive(turning)
         corners = [(start.x, start.y), *((finite(x), finite(y)) for x, y in points)]
         self._lines = [(a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b]
-        self._is_turning = False
+        self.turning = 0.0
 
     def left(self, pose: Odometry) -> float:
         """Return the distance that is left along the lines, m; call it for each pose."""
@@ -136,20 +139,26 @@ class Path:
         return ((bx - pose.x) * (bx - ax) + (by - pose.y) * (by - ay)) / length
 
     def _aim(self, pose: Odometry) -> tuple[float, float]:
-        """Return the point ``AHEAD`` along the lines, or the last one."""
+        """Return the point ``AHEAD`` along the lines, or the next sharp corner, or the end."""
         ahead = AHEAD + self._lines[0][2] - self._left_of_line(pose)
+        before = None
         for (ax, ay), (bx, by), length in self._lines:
+            direction = math.atan2(by - ay, bx - ax)
+            if before is not None and abs(math.remainder(direction - before, math.tau)) > FACING:
+                return ax, ay  # a point behind it would lie behind the vehicle
             if ahead < length:
                 return ax + (bx - ax) * ahead / length, ay + (by - ay) * ahead / length
             ahead -= length
+            before = direction
         return self._lines[-1][1]
 
     def velocity(self, pose: Odometry, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
         x, y = self._aim(pose)
         off = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)
-        self._is_turning = abs(off) > (TURNED if self._is_turning else FACING)
-        if self._is_turning:
+        is_turning = abs(off) > (TURNED if self.turning else FACING)
+        self.turning = abs(off) if is_turning else 0.0
+        if is_turning:
             return 0.0, math.copysign(slowing(abs(off), self._turning, TURNING, SLOWEST_TURN), off)
         linear = slowing(left, self._speed * math.cos(off), ACCELERATION, SLOWEST)
         curvature = 2 * math.sin(off) / max(math.dist((x, y), (pose.x, pose.y)), AHEAD)

@@ -24,8 +24,8 @@ class Entry(NamedTuple):
 class Recording:
     """The messages of a file, in the order of their arrival. Raises ``T2Error``.
 
-    ``is_cut`` tells after an iteration that the file ends within a message: its writer was killed,
-    or still writes.
+    ``is_cut`` tells after an iteration that the file ends within a message, because its writer was
+    killed or still writes, or is damaged there.
 
     >>> for entry in t2.Recording("recordings/001-20260315-081530.mcap"):  # doctest: +SKIP
     ...     if isinstance(entry.message, t2.messages.Odometry):
@@ -49,7 +49,14 @@ class Recording:
                     yield entry
         except OSError as error:
             raise T2Error(f"{self.path}: cannot be read: {error.strerror}") from error
-        except (McapError, struct.error, ValueError, EOFError, KeyError) as error:
+        except (
+            McapError,
+            struct.error,
+            msgspec.MsgspecError,
+            ValueError,
+            EOFError,
+            KeyError,
+        ) as error:
             if not has_begun:
                 raise T2Error(f"{self.path}: is not a recording of T2: {error}") from error
             self.is_cut = True

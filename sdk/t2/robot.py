@@ -1,5 +1,6 @@
 """One robot: its streams, its calls, and what may be sent to it."""
 
+import threading
 import time
 from typing import Any, TypeVar
 
@@ -182,12 +183,19 @@ class Robot:
             return done
         raise NotConfirmed("safety answered the reset, and its state does not show the effect")
 
-    def release(self, direction: m.Direction, source: str, timeout: float = 5.0) -> None:
+    def release(
+        self,
+        direction: m.Direction,
+        source: str,
+        timeout: float = 5.0,
+        ended: threading.Event | None = None,
+    ) -> None:
         """Move off a pressed bumper, "forward" or "backward"; return once the bumper is free.
 
         As an operator who holds a release as this source, which needs ``operator`` in
         ``safety.sources``: at most 0.1 m/s and 0.15 m, and ``contact`` stays latched until
-        ``reset``. Know which direction is free: the bumper has none. Raises ``Refused`` with the
+        ``reset``. Know which direction is free: the bumper has none. Another thread may end it
+        with ``ended``. Raises ``Refused`` with the
         reason, ``NotAllowed``, ``NotConfirmed`` after ``timeout`` s, and ``NoData``.
         """
         publisher = DrivePublisher(self._session, self._key("drive", source=source), self.safety)
@@ -195,6 +203,8 @@ class Robot:
         try:
             begin_s = time.monotonic()
             while (passed_s := time.monotonic() - begin_s) < timeout:
+                if ended is not None and ended.is_set():
+                    break
                 state = self.safety.latest()
                 if not self.bumper.latest().pressed:
                     return
@@ -211,7 +221,7 @@ class Robot:
         finally:
             publisher.stop()
             publisher.close()
-        raise NotConfirmed(f"the bumper is still pressed after {timeout:g} s of release")
+        raise NotConfirmed(f"the bumper is still pressed after {passed_s:.1f} s of release")
 
     # --- calls --------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -21,7 +22,11 @@ START_S, END_S, POLL_S = 60.0, 10.0, 0.05
 ID = "001"
 HOST = "127.0.0.1"
 ANSWER_S, LARGEST = 5.0, 65_535  # of the simulator's control socket: time, bytes
-READY = {"no_request", "neutral"}  # the causes of a robot that waits for a source
+# The causes of a robot that waits for a source, or for the third parties in its settings.
+READY = {"no_request", "neutral", "limit_silent"}
+KEEPALIVES = re.compile(
+    r"Waiting for the first sample of: (emergency stop keepalive of [^,]+,? ?)+"
+)
 
 
 SonarName = Literal[
@@ -116,14 +121,19 @@ def sim(
     own = (
         f"board.port={board}",
         f"board.listen_ports=[{first}, {second}]",
+        f"robot.id={ID}",
+        f"board.address={HOST}",
+        f"board.listen_address={HOST}",
         f"bus.listen={endpoint}",
+        "bus.connect=",
+        "bus.uplink=",
         f"sim.control_port={control}",
     )
     words = [_found(command), "up", "--world", world]
     words += [word for each in configs for word in ("--config", str(Path(each).resolve()))]
     words += [word for each in (*own, *sets) for word in ("--set", each)]
     # A folder of its own: a repository may have packages that are named like ours.
-    env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    env = {name: it for name, it in os.environ.items() if name not in ("PYTHONPATH", "T2_CONFIG")}
     with tempfile.TemporaryDirectory(prefix="t2-sim-") as folder:
         log = Path(folder) / "log"
         with (
@@ -151,7 +161,7 @@ def _connected(endpoint: str, process: "subprocess.Popen[bytes]", log: Path) -> 
             robot = robot or SimulatedRobot(open_session(endpoint, None)[0], ID, endpoint)
             state = robot.safety.latest(timeout=POLL_S)
             robot.odometry.latest(timeout=POLL_S)
-            if {cause.name for cause in state.causes} <= READY:
+            if all(it.name in READY or KEEPALIVES.fullmatch(it.text) for it in state.causes):
                 return robot
             reason = state.text
         except (LinkError, NoData) as error:

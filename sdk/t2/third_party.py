@@ -79,6 +79,7 @@ class Repetition:
             if is_shown(passed_s):
                 return
             time.sleep(POLL_S)
+        self._end_s = -math.inf
         raise NotAllowed(
             f"safety does not show the {self.what} of {self._source!r}: the router admits those "
             "of a certificate of role device with this source, of one program; see `t2 keys list`"

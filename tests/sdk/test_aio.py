@@ -6,6 +6,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 import t2
+from sim.requests import Bumper
 from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
 
@@ -65,6 +66,27 @@ def test_a_cancelled_start_ends_the_drive(run: Run, robot: t2.Robot) -> None:
 
     run(use)
     wait_until(lambda: robot.safety.latest().source is None, "no source in control")
+
+
+def test_a_cancelled_release_ends(run: Run, robot: t2.Robot, stack: RunningStack) -> None:
+    async def use(twin: t2.AsyncRobot) -> None:
+        release = asyncio.create_task(twin.release("backward", "teleop", timeout=60.0))
+        while twin.safety.newest is None or twin.safety.newest.source != "teleop":
+            await asyncio.sleep(0.05)
+        release.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await release
+        while (await twin.safety.latest(timeout=5.0)).source is not None:
+            await asyncio.sleep(0.05)
+        await asyncio.sleep(0.5)
+        assert (await twin.safety.latest(timeout=5.0)).source is None
+
+    stack.control.do(Bumper(pressed=True))
+    try:
+        wait_until(lambda: "contact" in robot.safety.latest().latched, "the contact")
+        run(use)
+    finally:
+        stack.control.do(Bumper(pressed=False))
 
 
 def test_a_latch_raises_in_the_task(run: Run) -> None:

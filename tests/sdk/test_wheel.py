@@ -17,7 +17,9 @@ STALLS = {
     for service in ("BRIDGE", "SAFETY")
     for name, value in (("STALL", "0.3"), ("UNSAFE_OVERRIDES", "stall"))
 }
-ENVIRONMENT = {**os.environ, **STALLS, "PATH": os.defpath}  # without our own `t2`
+# Settings of a real robot, which are none of a simulated one.
+REAL = {"T2_CONFIG": "robot.toml", "T2__ROBOT__ID": "007", "T2__BUS__CONNECT": "tcp/127.0.0.1:9"}
+ENVIRONMENT = {**os.environ, **STALLS, **REAL, "PATH": os.defpath}  # without our own `t2`
 ENVIRONMENT.pop("PYTHONPATH", None)
 PYTHON = ".venv/bin/python"
 FOREIGN = ("common", "services", "sim", "tests")

@@ -111,7 +111,8 @@ export function show(isDriver, fast) {
   write("view-only", barred && page.t(barred));
   $("estop").classList.toggle("unable", barred === "view_only_stop");
   panel.dataset.hold = hold;
-  write("hold", refused ? page.t(refused.key) : !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
+  const isLost = isDriver && (driver.overruled || hold === "expired");
+  write("hold", refused && !isLost ? page.t(refused.key) : !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
   disable($("leave"), !isDriver);
   disable($("take"), isDriver);
   disable($("reset"), !isDriver || !!noReset);

@@ -206,6 +206,23 @@ def test_streams_that_are_slow_missing_or_downsampled() -> None:
     assert (level, text) == ("wrong", "tel/bridge/bumper has 0 of 50 Hz")
 
 
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ({"rates": RATES | {"tel/bridge/mileage": 0.0}}, {"bumper", "sonar", "switches"}),
+        ({"rates": RATES | {"tel/bridge/bumper": 0.0}}, {"sonar", "switches"}),
+        ({"rates": RATES | {"tel/bridge/ultrasonic": 0.0}}, {"bumper", "switches"}),
+        ({"links": [link(), link(send_errors=1)]}, {"bumper", "sonar", "switches"}),
+        ({"links": [link(state="lost")]}, set()),
+    ],
+)
+def test_only_what_follows_is_folded(given: dict[str, Any], kept: set[str]) -> None:
+    found = problems(seen(state=state("bumper", "sonar", "switches"), **given))
+    texts = {rule.text: rule.name for rule in RULES}
+    shown = {text.rpartition(" (")[0] for _, text, _ in found}
+    assert {name for text, name in texts.items() if text in shown} == kept
+
+
 def test_remedies_name_existing_causes() -> None:
     names = {rule.name for rule in RULES}
     assert names >= d.CAUSES.keys() | {*d.NORMAL, *FROM_LINK}
