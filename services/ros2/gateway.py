@@ -81,7 +81,7 @@ class Gateway:
     def _note(self, level: int, text: str, values: dict[str, str]) -> None:
         status = translate.status(level, "cmd_vel", text, values)
         self._diagnostics.note(status, clock.now_ns())
-        text = f"cmd_vel of {values['publisher']}: {text}"
+        text = f"cmd_vel of {values['publisher']} ({values.get('reason', 'taken')}): {text}"
         self._log.put(translate.log(time.time_ns(), level, text))
 
     def _sender(self, publisher: bytes) -> str:

@@ -191,7 +191,7 @@ def test_refusals_are_in_the_diagnostics_and_in_the_log(node: RosPeer, stack: Ru
 
     wait_until(refused, "the refusal")
     assert stack.speed() == 0
-    wait_until(lambda: any("not finite" in each.msg for each in log), "the log of the refusal")
+    wait_until(lambda: any("(not_finite): " in each.msg for each in log), "the log of the refusal")
     assert {(each.level, each.name) for each in log} == {(30, "t2")}
     node.commands(PLAIN)
     wait_until(lambda: "another type" in log[-1].msg, "the log of a publisher of the other type")

@@ -70,6 +70,15 @@ def test_the_oracle_objects_to_a_missing_protection(
         assert any(objection in one for one in found) if is_missing else found == [], found[:5]
 
 
+def test_a_source_that_was_neutral_long_ago_may_slow_down_another_one() -> None:
+    stack = driving()
+    stack.request(0.0, 700)
+    stack.request(None, 2000)
+    stack.drive(0.5, 1500, source="nav")
+    stack.request(0.0, 700)
+    assert stack.oracle.violations == []
+
+
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_ros_nodes_drive_and_after_a_reset_not_before_a_pause(pattern: str) -> None:
     stack = driving()
