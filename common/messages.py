@@ -35,6 +35,8 @@ Number = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 MAX_TEXT = 4000
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Name = Annotated[str, Meta(max_length=200)]
+CauseName = Name  # the client library knows the names, for type checkers
+EventName = Name
 Few: Meta = Meta(max_length=128)
 Counts = Annotated[dict[Name, int], Few]
 
@@ -155,7 +157,7 @@ class Odometry(Message, frozen=True, kw_only=True):
 class Cause(Struct, frozen=True, kw_only=True):
     """One reason why the vehicle may not move as asked."""
 
-    name: Name
+    name: CauseName
     action: Action
     age: Number  # s since it became active
     text: Text  # text for the operator
@@ -208,7 +210,7 @@ class SafetyState(Message, frozen=True, kw_only=True):
     """Safety's decision and its causes."""
 
     verdict: Verdict
-    latched: Annotated[tuple[Name, ...], Few]  # names of the causes that need a reset
+    latched: Annotated[tuple[CauseName, ...], Few]  # names of the causes that need a reset
     causes: Annotated[tuple[Cause, ...], Few]  # all active ones, the worst first
     source: Name | None  # the driving source
     limits: Limits
@@ -269,7 +271,7 @@ class Motion(Message, frozen=True, kw_only=True):
 class Event(Message, frozen=True, kw_only=True):
     """A transition: contact, stop, release, fault, board restarted, link lost."""
 
-    name: Name
+    name: EventName
     level: Level
     text: Text
     about: Annotated[dict[Name, Text | int | Number | bool | None], Few] = {}

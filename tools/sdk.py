@@ -55,31 +55,18 @@ def _body(module: ModuleType) -> str:
 
 
 def _named(body: str) -> str:
-    """Return the messages with the names of causes and events, for type checkers."""
+    """Return the messages with the names of causes and events, for type checkers only.
+
+    A message with a name of a later version is decoded all the same.
+    """
     page = (ROOT / "docs" / "operations.md").read_text("utf-8")
     events = {name for cell in EVENTS.findall(page) for name in re.findall(r"\w+", cell)}
-    names = {"CauseName": [rule.name for rule in RULES], "EventName": sorted(events)}
-    typed = "".join(
-        f"    {kind} = Literal[\n{_wrapped(each)}\n    ]  # fmt: skip\n"
-        for kind, each in names.items()
-    )
-    plain = "".join(f"    {kind} = Name\n" for kind in names)
-    body = body.replace(
-        "Few: Meta = Meta(",
-        "# Type checkers know the names. A message with a newer name is decoded all the same.\n"
-        f"if TYPE_CHECKING:\n{typed}else:\n{plain}\nFew: Meta = Meta(",
-        1,
-    )
-    body = body.replace("latched: Annotated[tuple[Name", "latched: Annotated[tuple[CauseName")
-    for kind, name in (("Cause", "CauseName"), ("Event", "EventName")):
-        head, found, rest = body.partition(f"\nclass {kind}(")
-        body = head + found + rest.replace("    name: Name\n", f"    name: {name}\n", 1)
+    for kind, names in (("Cause", [rule.name for rule in RULES]), ("Event", sorted(events))):
+        plain = f"{kind}Name = Name"
+        quoted = textwrap.indent(textwrap.fill(" ".join(f'"{it}",' for it in names), 91), " " * 8)
+        typed = f"    {kind}Name = Literal[\n{quoted}\n    ]  # fmt: skip\n"
+        body = body.replace(plain, f"if TYPE_CHECKING:\n{typed}else:\n    {plain}")
     return body
-
-
-def _wrapped(names: list[str]) -> str:
-    text = " ".join(f'"{name}",' for name in names)
-    return textwrap.fill(text, 99, initial_indent=" " * 8, subsequent_indent=" " * 8)
 
 
 def _keys() -> str:

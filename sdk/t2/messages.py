@@ -34,7 +34,6 @@ Number = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 MAX_TEXT = 4000
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Name = Annotated[str, Meta(max_length=200)]
-# Type checkers know the names. A message with a newer name is decoded all the same.
 if TYPE_CHECKING:
     CauseName = Literal[
         "contact", "estop", "estop_reader", "estop_keepalive", "predecessor", "runaway",
@@ -43,6 +42,9 @@ if TYPE_CHECKING:
         "limit_silent", "two_publishers", "neutral", "blocked", "no_request", "release",
         "bumper_lossy", "limit", "obstacle", "sonar",
     ]  # fmt: skip
+else:
+    CauseName = Name  # the client library knows the names, for type checkers
+if TYPE_CHECKING:
     EventName = Literal[
         "barred", "black_box", "black_box_lost", "board_restarted", "cmd_vel_refused", "contact",
         "disk_full", "disk_room", "drive_link_lost", "drive_link_up", "driver_fault", "estop",
@@ -56,9 +58,7 @@ if TYPE_CHECKING:
         "velocity_back",
     ]  # fmt: skip
 else:
-    CauseName = Name
     EventName = Name
-
 Few: Meta = Meta(max_length=128)
 Counts = Annotated[dict[Name, int], Few]
 

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 
 import t2
+import t2.drive
+import t2.third_party
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.source import DriveSource
@@ -322,7 +324,21 @@ def test_a_motion_waits_for_the_end_of_a_protective_stop(robot: t2.Robot) -> Non
     robot.limit("detector", seconds=0.1).end()
 
 
-def test_a_keepalive_is_confirmed_and_its_end_latches(tmp_path: Path) -> None:
+def test_the_wait_for_the_end_of_a_stop_has_an_end(
+    robot: t2.Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(t2.drive, "WAIT_S", 0.5)
+    with robot.drive("nav") as drive:
+        drive.velocity(0.1, on_stop="wait")
+        limit = robot.limit("detector", linear=0.0, seconds=60)
+        with pytest.raises(t2.Stopped):
+            wait_until(drive.check, "the end of the wait")
+        limit.end()
+
+
+def test_a_keepalive_is_confirmed_and_its_end_latches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with (
         running_stack(tmp_path, sets=['safety.estop_keepalive=["pendant"]']) as stack,
         t2.connect("001", endpoint=stack.endpoint) as robot,
@@ -335,7 +351,9 @@ def test_a_keepalive_is_confirmed_and_its_end_latches(tmp_path: Path) -> None:
         assert shown.alive
         assert robot.keepalive("pendant", seconds=60) is pendant
         wait_until(lambda: not blocked(robot), "a vehicle that may drive")
-        pendant.renew(seconds=0.2)  # and then the program hangs
+        monkeypatch.setattr(t2.third_party, "SHOWN_S", 0.0)
+        with pytest.raises(t2.NotAllowed, match="does not show the keepalive of 'pendant'"):
+            pendant.renew(seconds=60)  # what raises is not repeated
         wait_until(lambda: robot.safety.latest().latched == ("estop_keepalive",), "the latch")
 
 
