@@ -51,7 +51,7 @@ class Straight:
     """A distance in m along the heading at the start; negative is backward."""
 
     near = NEAR
-    turning = 0.0
+    turning: float = 0.0
 
     def __init__(self, start: Odometry, distance: float, speed: float) -> None:
         self._start, self._speed = start, positive(speed)
@@ -75,7 +75,7 @@ class Turn:
     """An angle in rad on the spot, positive to the left; may be more than a whole turn."""
 
     near = NEAR_TURN
-    turning = 0.0
+    turning: float = 0.0
 
     def __init__(self, start: Odometry, angle: float, speed: float) -> None:
         self._angle, self._sign = abs(finite(angle)), math.copysign(1.0, angle)
@@ -123,7 +123,7 @@ class Path:
         self._speed, self._turning = positive(speed), positive(turning)
         corners = [(start.x, start.y), *((finite(x), finite(y)) for x, y in points)]
         self._lines = [(a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b]
-        self.turning = 0.0
+        self.turning: float = 0.0
 
     def left(self, pose: Odometry) -> float:
         """Return the distance that is left along the lines, m; call it for each pose."""
