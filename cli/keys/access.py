@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from cli.keys.members import OPERATORS_SOURCES, Member, Profile
 from common import keys
-from services.ros2 import names
+from services.ros2 import names, parameters
 from services.ros2.config import Ros2
 
 Verb = Literal["read", "know", "recall", "keep", "write", "ask", "serve", "live"]
@@ -184,11 +184,14 @@ def ros(settings: Ros2) -> Rights:
     def key(name: str, interface: str) -> str:
         return names.data_key(domain, names.absolute(settings.namespace, name), interface)
 
+    calls = dict.fromkeys(ROS_CALLS, "std_srvs/srv/Trigger")
+    for name, (interface, _) in parameters.SERVICES.items():
+        calls[f"{names.NODE}/{name}"] = interface
     return {
         "read": everything,
         "know": everything,
         "recall": (topics, kept),
-        "ask": (kept, *(key(name, "std_srvs/srv/Trigger") for name in ROS_CALLS)),
+        "ask": (kept, *(key(name, interface) for name, interface in calls.items())),
         "write": tuple(key("cmd_vel", f"geometry_msgs/msg/{kind}") for kind in ROS_TWISTS),
         "live": tuple(f"{names.LIVELINESS}/{domain}{'/*' * chunks}" for chunks in ROS_TOKENS),
     }

@@ -1,4 +1,4 @@
-"""Services of ROS 2 as calls of the bus: emergency stop and reset.
+"""Services of ROS 2 as calls of the bus: emergency stop and reset; the node's parameters.
 
 A reset that the network held back must not clear a stop that its sender cannot have seen. The
 attachment has the sender's clock, and a client that calls once has no fastest delivery to compare
@@ -8,12 +8,14 @@ with, as ``command`` does. So the clocks of robot and client must agree as far a
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 
 from common import clock, keys
 from common import messages as m
 from common.client import reset_request
 from common.freshness import NS_PER_S
 from common.service import Node
+from services.ros2 import names, parameters
 from services.ros2.cdr import Attachment, Value
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Answer, Endpoints
@@ -39,6 +41,9 @@ class Calls:
         self._stops: list[tuple[Answer, int]] = []  # answers that wait, and since when
         ros.serve(absolute("hardware/e_stop_trigger"), TRIGGER, self._stop)
         ros.serve(absolute("hardware/e_stop_reset"), TRIGGER, self._reset)
+        for name, (interface, respond) in parameters.SERVICES.items():
+            take = partial(self._parameters, respond)
+            ros.serve(absolute(f"{names.NODE}/{name}"), interface, take)
         node.loop.every(REPEAT_S, self._confirm)
 
     def _stop(self, _: Attachment, __: Value, answer: Answer) -> None:
@@ -81,6 +86,13 @@ class Calls:
             lambda done: answer((True, done.text)),
             lambda reason: answer((False, reason)),
         )
+
+    def _parameters(
+        self, respond: parameters.Respond, _: Attachment, request: Value, answer: Answer
+    ) -> None:
+        state = self._state(clock.now_ns() - FRESH_NS)
+        known = parameters.parameters(self._node.config, state.limits if state else None)
+        answer(respond(known, *(request or ())))
 
 
 def reset_refusal(state: m.SafetyState, sent_ns: int, now_ns: int) -> str:

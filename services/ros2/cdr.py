@@ -16,9 +16,9 @@ from services.ros2.definitions import FIELDS
 HEADER = b"\x00\x01\x00\x00"  # plain CDR, little-endian
 PRIMITIVES = {
     "bool": "?", "byte": "B", "uint8": "B", "int32": "i", "uint32": "I",
-    "float32": "f", "float64": "d",
+    "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
-ARRAY = re.compile(r"(.+)\[(\d*)\]")
+ARRAY = re.compile(r"(.+)\[(\d*)(?:<=\d+)?\]")
 MAX_ITEMS = 10_000  # of one sequence that is read; ours are short
 ATTACHMENT = struct.Struct("<qqB16s")
 GID_SIZE = 16

@@ -24,7 +24,7 @@ from services.ros2.cdr import Attachment, CdrError, Value
 
 Take = Callable[[Attachment, Value, int], None]  # sender, message, receive time (monotonic, ns)
 Answer = Callable[[Value], None]
-Serve = Callable[[Attachment, Value, Answer], None]  # the client, its request
+Serve = Callable[[Attachment, Value, Answer], None]  # the client, its request; None: unreadable
 Seen = Callable[[str, bool], None]  # a token, and whether it appeared
 Declare = Callable[[zenoh.Session, str, str], Any]  # with the key and the token of an endpoint
 
@@ -162,14 +162,13 @@ class Endpoints:
                 query.reply(key, encoded, attachment=reply.encode())
             query.drop()
 
+        request = None
         try:
             payload = query.payload.to_bytes() if query.payload else cdr.HEADER
             request = cdr.decode(f"{interface}_Request", payload)
-        except CdrError as error:
+        except CdrError:
             self.counters["undecodable"] += 1
-            answer((False, str(error)))
-        else:
-            handle(about, request, answer)
+        handle(about, request, answer)
 
     def watch(self, seen: Seen) -> None:
         """Call ``seen`` for each token of the domain that appears or disappears."""

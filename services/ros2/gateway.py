@@ -14,7 +14,7 @@ from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
 
-SOURCE, NODE = "ros2", "t2"
+SOURCE = "ros2"
 TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "twist": "geometry_msgs/msg/Twist"}
 OTHER_TYPE = Refusal(
     "other_type", "A node publishes cmd_vel with another type than that of ros2.cmd_vel."
@@ -31,7 +31,7 @@ class Gateway:
         self._diagnostics = translate.Diagnostics()
         self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
         self._reported: dict[bytes, str] = {}  # the last decision about each, as reported
-        ros = names.Node(settings.domain, "", settings.namespace, NODE)
+        ros = names.Node(settings.domain, "", settings.namespace, names.NODE)
         self._ros = Endpoints(node.config.bus, ros, node.loop.post, node.counters)
         self._drive = DriveSource(node.bus, SOURCE)
         self._streams = Streams(node, self._publisher, self._diagnostics)

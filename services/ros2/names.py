@@ -6,6 +6,7 @@ from typing import NamedTuple
 from services.ros2.definitions import HASHES
 
 LIVELINESS = "@ros2_lv"
+NODE = "t2"  # the gateway
 EMPTY = "%"  # an empty enclave or namespace
 CHUNKS = 13  # of an endpoint's token; newer peers may append one with backends
 PART = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")

@@ -10,11 +10,17 @@ from services.ros2.cdr import Value
 from services.ros2.definitions import FIELDS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-for part, text in {
-    "Trigger_Request": "uint8 structure_needs_at_least_one_member",
-    "Trigger_Response": "bool success\nstring message",
-}.items():
-    STORE.register(get_types_from_msg(text, f"std_srvs/srv/{part}"))
+
+
+def as_message(name: str) -> str:
+    """Return the name by which rosbags knows a type: it has no services."""
+    return name.replace("/srv/", "/msg/")
+
+
+for service, fields in FIELDS.items():
+    if "/srv/" in service:
+        text = "\n".join(f"{kind} {field}" for field, kind in fields)
+        STORE.register(get_types_from_msg(text or "uint8 no_member", as_message(service)))
 DISTRIBUTIONS = (Stores.ROS2_IRON, Stores.ROS2_JAZZY, Stores.ROS2_KILTED, Stores.ROS2_LYRICAL)
 STORES = [get_typestore(distribution) for distribution in DISTRIBUTIONS]
 
@@ -26,6 +32,8 @@ PRIMITIVES: dict[str, st.SearchStrategy[Any]] = {
     "uint8": st.integers(0, 255),
     "int32": st.integers(-(2**31), 2**31 - 1),
     "uint32": st.integers(0, 2**32 - 1),
+    "int64": st.integers(-(2**63), 2**63 - 1),
+    "uint64": st.integers(0, 2**64 - 1),
     "string": st.text(TEXT, max_size=30),
     **FINITE,
 }
@@ -35,8 +43,8 @@ def values(name: str) -> st.SearchStrategy[Value]:
     """Return a strategy for messages of a type, in the form of ``cdr``."""
     item, bracket, rest = name.partition("[")
     if bracket:
-        size = int(rest[:-1] or 0)
-        low, high = (size, size) if size else (0, 4)
+        size = int(rest[:-1].removeprefix("<=1") or 0)
+        low, high = (size, size) if size else (0, 1 if "<=" in rest else 4)
         return st.lists(values(item), min_size=low, max_size=high).map(tuple)
     if item in PRIMITIVES:
         return PRIMITIVES[item]
@@ -50,7 +58,7 @@ def as_rosbags(name: str, value: Value) -> Any:
         return _array(item, value)
     if item in PRIMITIVES:
         return value
-    made = STORE.types[item]
+    made = STORE.types[as_message(item)]
     parts = zip(FIELDS[item], value, strict=True)
     return made(**{field: as_rosbags(kind, part) for (field, kind), part in parts})
 
@@ -58,12 +66,11 @@ def as_rosbags(name: str, value: Value) -> Any:
 def _array(item: str, value: Value) -> Any:
     import numpy
 
-    dtypes = {"float64": numpy.float64}
-    if item in dtypes:
-        return numpy.array(value, dtype=dtypes[item])
+    if item in PRIMITIVES and item != "string":
+        return numpy.array(value, dtype=item)
     return [as_rosbags(item, part) for part in value]
 
 
 def message_types() -> Iterator[str]:
     """Yield the types whose fields rosbags knows, too."""
-    yield from (name for name in FIELDS if name in STORE.types and FIELDS[name])
+    yield from (name for name in FIELDS if as_message(name) in STORE.types and FIELDS[name])

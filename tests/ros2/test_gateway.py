@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -18,6 +19,7 @@ from tests.ros2.peer import LATCHED, RosPeer, peer
 from verification.harness.bus import at, set_options
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
+from verification.ros2.plain_peer import PlainPeer
 
 pytestmark = pytest.mark.timed
 
@@ -90,6 +92,11 @@ def test_latched_topics_reach_who_comes_later(node: RosPeer) -> None:
     assert link.get("name") == "base_link"
     frames = {transform.child_frame_id for transform in static[-1].transforms}
     assert len([frame for frame in frames if frame.startswith("sonar_")]) == 8
+
+
+def test_parameters_can_be_listed(stack: RunningStack) -> None:
+    with closing(PlainPeer(stack.endpoint)) as plain:
+        assert {"ros2.cmd_vel", "vehicle.length", "limits.forward"} <= set(plain.parameters("/t2"))
 
 
 def test_commands_move_the_vehicle_until_they_end(node: RosPeer, stack: RunningStack) -> None:

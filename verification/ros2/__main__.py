@@ -67,6 +67,7 @@ def exercised(robot: Robot, python: Path, pause_s: float = 2.0) -> str:
     assert done.returncode == 0, done.stderr[-800:]
     found = json.loads(done.stdout.splitlines()[-1])
     assert '<robot name="t2">' in found["description"], found["description"][:80]
+    assert "ros2.cmd_vel" in found["parameters"], found["parameters"]
     assert found["stop"][0], found
     assert found["reset"][0], found
     assert found["across_reset"] == 0, found

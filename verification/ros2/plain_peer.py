@@ -44,6 +44,10 @@ TRIGGER = (
     "std_srvs::srv::dds_::Trigger_/"
     "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
 )
+LIST = (
+    "rcl_interfaces::srv::dds_::ListParameters_/"
+    "RIHS01_3e6062bfbb27bfb8730d4cef2558221f51a11646d78e7bb30a1e83afac3aad9d"
+)
 QOS = "::,10:,:,:,,"
 CDR = b"\0\1\0\0"
 FRAME = b"base_link\0"
@@ -141,21 +145,34 @@ class PlainPeer:
         self._travel += abs(speed) * (stamp_s - before_s if before_s else 0.0)
         self._stamp_s = stamp_s
 
-    def call(self, service: str) -> tuple[bool, str]:
+    def trigger(self, service: str) -> tuple[bool, str]:
         """Call a service of std_srvs/srv/Trigger; return success and message."""
-        client = Endpoint(self.session, "SC", service, TRIGGER)
+        response = self._call(service, TRIGGER)
+        return bool(response[4]), text(response, 8)
+
+    def parameters(self, node: str) -> list[str]:
+        """Return the names of a node's parameters, as ``ros2 param list`` asks for them."""
+        response = self._call(f"{node}/list_parameters", LIST, struct.pack("<I4xQ", 0, 0))
+        (count,), at, found = struct.unpack_from("<I", response, 4), 8, []
+        for _ in range(count):
+            found.append(text(response, at))
+            at += 4 + len(found[-1]) + 1
+            at += -at % 4
+        return found
+
+    def _call(self, service: str, about_it: str, request: bytes = b"") -> bytes:
+        client = Endpoint(self.session, "SC", service, about_it)
         about = client.attachment()
         replies = self.session.get(
-            client.key, payload=CDR, attachment=about, target=zenoh.QueryTarget.ALL_COMPLETE,
-            timeout=PATIENCE_S,
+            client.key, payload=CDR + request, attachment=about, timeout=PATIENCE_S,
+            target=zenoh.QueryTarget.ALL_COMPLETE,
         )  # fmt: skip
         for reply in replies:
             if reply.ok is not None and reply.ok.attachment is not None:
                 raw = reply.ok.attachment.to_bytes()
                 if raw[:8] != about[:8] or raw[17:] != about[17:]:
                     raise ValueError(f"a reply to another request: {raw.hex()}")
-                payload = reply.ok.payload.to_bytes()
-                return bool(payload[4]), text(payload, 8)
+                return reply.ok.payload.to_bytes()
         raise TimeoutError(f"{service} does not reply")
 
 
@@ -204,6 +221,7 @@ def text(payload: bytes, at: int) -> str:
 def exercise(peer: PlainPeer, pause_s: float) -> dict[str, Any]:
     """Drive as each tool, stop and reset under a running node; return what was observed."""
     found: dict[str, Any] = {"zenoh": version("eclipse-zenoh"), "description": peer.description()}
+    found["parameters"] = peer.parameters("/t2")
     for tool in ("topic_pub", "keyboard", "planner"):
         with closing(Driver(peer)) as node:
             drive = node.hold_key if tool == "keyboard" else partial(node.publish, FORWARD)
@@ -214,9 +232,9 @@ def exercise(peer: PlainPeer, pause_s: float) -> dict[str, Any]:
     with closing(Driver(peer)) as node:
         node.twist = FORWARD
         time.sleep(MOTION_S)
-        found["stop"] = peer.call("/hardware/e_stop_trigger")
+        found["stop"] = peer.trigger("/hardware/e_stop_trigger")
         time.sleep(HALT_S)
-        found["reset"] = peer.call("/hardware/e_stop_reset")
+        found["reset"] = peer.trigger("/hardware/e_stop_reset")
         found["across_reset"] = peer.travel(lambda: time.sleep(MOTION_S))
         node.twist = None
         time.sleep(HALT_S)

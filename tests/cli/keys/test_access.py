@@ -122,6 +122,8 @@ def test_the_rights_of_a_ros_computer_follow_domain_and_namespace() -> None:
     twist, trigger = "geometry_msgs/msg/Twist", "std_srvs/srv/Trigger"
     assert may(given, "write", names.data_key(7, "/site/t2/cmd_vel", twist))
     assert may(given, "ask", names.data_key(7, "/site/t2/hardware/e_stop_reset", trigger))
+    listed = "rcl_interfaces/srv/ListParameters"
+    assert may(given, "ask", names.data_key(7, "/site/t2/t2/list_parameters", listed))
     assert may(given, "read", "@ros2_lv/7/a/0/0/NN/%/%/n")
     for key in ("7/cmd_vel", "0/site/t2/cmd_vel"):
         assert not may(given, "write", f"{key}/{names.wire_type(twist)}/{HASHES[twist]}")

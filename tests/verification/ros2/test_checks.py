@@ -17,6 +17,7 @@ def test_the_plain_peer_agrees_with_the_gateway() -> None:
     assert names.data_key(0, "/a", stamped) == f"0/a/{plain_peer.TWIST}"
     assert names.data_key(0, "/a", "std_msgs/msg/String") == f"0/a/{plain_peer.TEXT}"
     assert names.data_key(0, "/a", "std_srvs/srv/Trigger") == f"0/a/{plain_peer.TRIGGER}"
+    assert names.data_key(0, "/a", "rcl_interfaces/srv/ListParameters") == f"0/a/{plain_peer.LIST}"
     header, twist = cdr.decode(stamped, Twist(linear=0.4, angular=-0.2).encode())
     assert (header, twist) == (((0, 0), "base_link"), ((0.4, 0.0, 0.0), (0.0, 0.0, -0.2)))
     assert text(cdr.encode("std_msgs/msg/String", ("<robot/>",)), 4) == "<robot/>"
