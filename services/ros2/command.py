@@ -20,16 +20,20 @@ pause of ``PAUSE_NS`` is neutral, by its clock and ours: what a network held bac
 | any        | motion while safety bars it, or another one drives | must pause |                   |
 | any        | a command after ``LAPSE_NS`` without one           | must pause |                   |
 
-The state changes before the command is judged: after a silence the same command begins anew. The
-neutral request is sent when the pause ends, not when the publisher has settled, so that what bars
-motion in between bars it by safety's own rule. With ``by_zero`` a pause is not neutral: a publisher
-settles first, and its next zero counts. A command is passed on once, as it is.
+The state changes before the command is judged: after a silence the same command begins anew. What
+is lost may have commanded motion, so it is no pause. Of a new publisher the first ``UNHEARD`` may
+be lost, as ROS does not wait for a match. Before a later one it may have driven for long, while its
+link was down: no pause is known. The neutral request is sent when the pause ends, not when the
+publisher has settled, so that what bars motion in between bars it by safety's own rule. With
+``by_zero`` a pause is not neutral: a publisher settles first, and its next zero counts. A command
+is passed on once, as it is.
 """
 
 from typing import NamedTuple
 
 from msgspec import Struct
 
+from common.client import Contest
 from common.freshness import NS_PER_S
 from common.messages import MAX_NUMBER, SafetyState
 from services.ros2.cdr import Attachment
@@ -41,6 +45,8 @@ LAPSE_NS = NS_PER_S  # safety wants a neutral request after a source's lease and
 FASTER_NS = NS_PER_S // 50  # a delivery this much faster starts the settling anew
 DRIFT = 5e-4  # s of the minimum per s: what clocks that are slewed drift apart at most
 OWNER_NS = NS_PER_S // 2  # silence after which another publisher may drive
+SOURCE = "ros2"  # of the drive requests
+UNHEARD = 20  # 1 s
 MAX_PUBLISHERS = 64  # remembered; the one that was silent longest is dropped first
 
 Axes = tuple[float, float, float]
@@ -91,9 +97,15 @@ OTHER_AXES = Refusal(
 )
 
 
+# Causes that stop, and after which safety wants no neutral request.
+TRANSIENT = frozenset({"blocked", "no_request"})
+
+
 def bars_motion(state: SafetyState | None) -> bool:
     """Return whether safety wants a neutral request before the next motion, by its newest state."""
-    return state is not None and (bool(state.latched) or state.verdict == "inhibited")
+    return state is not None and any(
+        cause.action in ("stop", "brake") and cause.name not in TRANSIENT for cause in state.causes
+    )
 
 
 class Request(NamedTuple):
@@ -159,22 +171,30 @@ class Commands:
         self.owner: bytes | None = None  # GID of the publisher that drives
         self._by_zero = by_zero  # whether only zeros are neutral
         self._known: dict[bytes, Publisher] = {}
+        self._contest = Contest(SOURCE)
 
     def listen(self, now_ns: int) -> None:
         """Begin to receive, before the first command: what its publisher did before is unknown."""
         self._since_ns = now_ns
 
     def judge(
-        self, about: Attachment, twist: Twist, received_ns: int, now_ns: int, *, barred: bool
+        self,
+        about: Attachment,
+        twist: Twist,
+        received_ns: int,
+        now_ns: int,
+        state: SafetyState | None,
     ) -> Request | Refusal:
         """Return the request of a command, or the refusal; times are of our monotonic clock.
 
-        ``barred`` means that safety wants a neutral request before the next motion.
+        ``state`` is safety's newest one.
         """
         known = self._publisher(about, received_ns)
         if about.sequence <= known.sequence:
             return OUT_OF_ORDER
         has_paused = known.note(about, twist, received_ns)
+        if twist.moves and (bars_motion(state) or self._is_overruled(known, about.gid, state)):
+            has_paused, known.begun_ns = False, None
         if refusal := _of_content(twist):
             return refusal
         if now_ns - about.source_ns - known.least_ns > HELD_BACK_NS:
@@ -182,7 +202,7 @@ class Commands:
         if self._another_drives(about.gid, received_ns):
             known.begun_ns = None
             return SECOND_PUBLISHER
-        if (barred and twist.moves) or (self.owner != about.gid and known.began_late):
+        if self.owner != about.gid and known.began_late:
             known.begun_ns = None
         if refusal := self._of_beginning(known, about, twist, has_paused=has_paused):
             return refusal
@@ -205,12 +225,19 @@ class Commands:
                 received_ns=now_ns,
                 moved_ns=self._since_ns,
                 moved_source_ns=self._since_ns - delivery_ns,
-                sequence=about.sequence - 1,
+                sequence=about.sequence - 1 if about.sequence <= UNHEARD else 0,
             )
         self._known[about.gid] = known  # the last one of the dictionary
         if len(self._known) > MAX_PUBLISHERS:
             del self._known[next(iter(self._known))]
         return known
+
+    def _is_overruled(self, known: Publisher, gid: bytes, state: SafetyState | None) -> bool:
+        """Return whether another source drives although this publisher commands motion."""
+        if self.owner != gid or known.begun_ns is None or known.is_settling:
+            return False
+        self._contest.tick(state, requests=True)
+        return self._contest.is_lost
 
     def _another_drives(self, gid: bytes, now_ns: int) -> bool:
         return self.owner not in (None, gid) and now_ns - self._owned_ns < OWNER_NS

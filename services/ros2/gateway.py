@@ -9,12 +9,11 @@ from common.source import DriveSource
 from services.ros2 import names, translate
 from services.ros2.calls import FRESH_NS, Calls
 from services.ros2.cdr import Attachment, Value
-from services.ros2.command import MAX_PUBLISHERS, Commands, Refusal, Twist, bars_motion
+from services.ros2.command import MAX_PUBLISHERS, SOURCE, Commands, Refusal, Twist
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
 
-SOURCE = "ros2"
 TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "twist": "geometry_msgs/msg/Twist"}
 OTHER_TYPE = Refusal(
     "other_type", "A node publishes cmd_vel with another type than that of ros2.cmd_vel."
@@ -50,8 +49,8 @@ class Gateway:
     def _take(self, stamped: bool, about: Attachment, message: Value, received_ns: int) -> None:
         """Pass on a command, or refuse it."""
         twist, now_ns = Twist(*(message[1] if stamped else message)), clock.now_ns()
-        barred = bars_motion(self._streams.state(now_ns - FRESH_NS))
-        decided = self._commands.judge(about, twist, received_ns, now_ns, barred=barred)
+        state = self._streams.state(now_ns - FRESH_NS)
+        decided = self._commands.judge(about, twist, received_ns, now_ns, state)
         if isinstance(decided, Refusal):
             if decided.is_neutral:
                 self._drive.request(0.0, 0.0)

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.messages import MAX_NUMBER
+from common.client import OVERRULED_TICKS
+from common.messages import MAX_NUMBER, Cause, SafetyState
 from services.ros2.cdr import Attachment
 from services.ros2.command import (
     BEGINS,
@@ -18,12 +19,14 @@ from services.ros2.command import (
     OWNER_NS,
     PAUSE_NS,
     SETTLE_NS,
+    UNHEARD,
     Commands,
     Refusal,
     Request,
     Twist,
     bars_motion,
 )
+from services.safety.core.causes import BY_NAME, RULES, Clears
 from tests import factories
 
 S = 10**9
@@ -44,14 +47,15 @@ class Sender:
 
     def send(
         self, sent_s: float, delay_s: float = 0.01, motion: Twist | None = None, *,
-        barred: bool = False,
+        barred: bool = False, seen: SafetyState | None = None,
     ) -> object:  # fmt: skip
         """Judge a command; return it, or what is refused."""
         self.sequence += 1
         about = Attachment(self.sequence, CLOCK + round(sent_s * S), self.gid)
         received_ns = round((sent_s + delay_s) * S)
         motion = motion or twist(0.3)
-        return shown(self.commands.judge(about, motion, received_ns, received_ns, barred=barred))
+        newest = BARRED if barred else seen
+        return shown(self.commands.judge(about, motion, received_ns, received_ns, newest))
 
     def drive(self, from_s: float = 0.0) -> "Sender":
         """Publish motion for 1 s, as a node that starts."""
@@ -123,22 +127,77 @@ def test_zeros_are_passed_on_while_motion_is_barred_and_are_a_pause() -> None:
     assert sender.send(2.55, motion=twist()) == "begins"
 
 
-@pytest.mark.parametrize(
-    ("verdict", "latched", "bars"),
-    [("run", (), False), ("stop", (), False), ("inhibited", (), True), ("stop", ("estop",), True)],
-)
-def test_what_bars_motion(verdict: Any, latched: tuple[str, ...], bars: bool) -> None:
-    assert bars_motion(factories.safety_state(verdict=verdict, latched=latched)) is bars
+@pytest.mark.parametrize("motion", [twist(math.nan), twist(0.3, sideways=0.1)])
+def test_a_refused_command_across_a_reset_is_motion(motion: Twist) -> None:
+    sender = Sender(started()).drive()
+    sender.stream(1.0, 1.0, motion=motion, barred=True)
+    assert sender.stream(2.0, 1.0) == {"not_paused"}
+
+
+def test_what_a_network_holds_back_across_a_reset_is_motion() -> None:
+    sender = Sender(started()).drive()
+    assert sender.send(1.0, 0.3, barred=True) == "held_back"
+    assert sender.stream(1.35, 1.0) == {"not_paused"}
+
+
+def state(*causes: str, source: str | None = "ros2") -> SafetyState:
+    """Return a state with these causes, in which this source is in control."""
+    rows = [BY_NAME[name] for name in causes]
+    held = tuple(Cause(name=row.name, action=row.action, age=1.0, text=row.text) for row in rows)
+    return factories.safety_state(source=source, causes=held)
+
+
+BARRED = state("estop")
+
+
+def test_the_causes_that_bar_motion_are_those_of_safety() -> None:
+    """Each rule that ends with a neutral request, and the wait for it."""
     assert not bars_motion(None)
+    for rule in RULES:
+        expected = rule.clears is not Clears.AT_ONCE or rule.name == "neutral"
+        assert bars_motion(state(rule.name)) is expected, rule.name
 
 
-def test_a_publisher_that_was_running_when_the_gateway_started_must_pause() -> None:
-    commands = Commands()
-    commands.listen(0)
-    sender = Sender(commands)
-    sender.sequence = 1000
+@pytest.mark.parametrize("other", ["teleop", "nav"])
+def test_who_was_overruled_must_pause(other: str) -> None:
+    """For a moment the state may show the source that was in control before."""
+    sender = Sender(started()).drive()
+    seen = [sender.send(1.0 + number / 20, seen=state(source=other)) for number in range(20)]
+    assert seen == [TAKEN] * (OVERRULED_TICKS - 1) + ["not_paused"] * (21 - OVERRULED_TICKS)
+    assert sender.stream(2.0, 1.0, seen=state()) == {"not_paused"}
+    sender.drive(3.5)
+
+
+def test_who_publishes_zeros_or_another_node_is_not_overruled() -> None:
+    commands = started()
+    sender = Sender(commands).drive()
+    assert sender.stream(1.0, 1.0, motion=twist(), seen=state(source="teleop")) == {NEUTRAL}
+    assert sender.stream(2.0, 1.0, seen=state(source=None)) == {TAKEN}
+    assert sender.stream(3.0, 1.0, seen=state("blocked")) == {TAKEN}
+
+
+@pytest.mark.parametrize("period_s", [0.52, 1.0])
+def test_motion_at_a_low_rate_while_it_is_barred_is_no_pause(period_s: float) -> None:
+    sender = Sender(started())
+    times = [number * period_s for number in range(10)]
+    assert {sender.send(each, barred=True) for each in times} == {"not_paused"}
+    assert sender.send(10 * period_s) == "begins"
+
+
+def test_a_publisher_that_was_running_before_it_is_heard_must_pause() -> None:
+    sender = Sender(started())
+    sender.sequence = UNHEARD
     assert sender.stream(0.1, 2.0) == {"not_paused"}
     sender.drive(2.6)
+
+
+def test_the_first_commands_of_a_publisher_may_be_lost() -> None:
+    sender = Sender(started())
+    sender.sequence = UNHEARD - 1
+    sender.drive()
+    early = Commands()
+    early.listen(0)
+    assert Sender(early).stream(0.1, 2.0) == {"not_paused"}
 
 
 def test_what_is_lost_is_no_pause() -> None:
@@ -284,7 +343,7 @@ def test_a_zero_that_begins_is_not_held_back_itself(source_ns: int) -> None:
     commands = started(by_zero=True)
     for sequence, (at_ns, motion) in enumerate([(0, twist()), (S // 2, twist()), (S, twist(0.3))]):
         about = Attachment(sequence, source_ns + at_ns, NAV)
-        decided = commands.judge(about, motion, at_ns, at_ns, barred=False)
+        decided = commands.judge(about, motion, at_ns, at_ns, None)
         commands.gone(NAV)
     assert decided == TAKEN
 
@@ -299,7 +358,7 @@ def at(
 ) -> object:  # fmt: skip
     """Judge a command that was sent ``late_ns`` before it arrives; return it, or why not."""
     about, now_ns = Attachment(sequence, at_ns - late_ns, gid), START_NS + at_ns
-    return shown(commands.judge(about, twist(speed), now_ns, now_ns + waited_ns, barred=False))
+    return shown(commands.judge(about, twist(speed), now_ns, now_ns + waited_ns, None))
 
 
 @pytest.fixture
@@ -373,6 +432,40 @@ def test_the_limit_of_a_silence_after_which_a_publisher_begins_anew(commands: Co
     st.lists(
         st.tuples(
             st.sampled_from([NAV, JOY]),
+            st.sampled_from([0, 0, 0, 1, 30]),  # commands that are lost
+            st.sampled_from([0.05, 0.05, 0.1, 0.5, 0.6, 1.1]),  # s until it is sent
+            st.sampled_from([0.3, 0.3, 0.3, 0.0, math.nan]),
+            st.sampled_from([False, False, False, True]),
+        ),
+        max_size=80,
+    )
+)
+def test_no_motion_before_a_pause_after_motion_that_was_barred(
+    sent: list[tuple[bytes, int, float, float, bool]],
+) -> None:
+    """What is lost, refused or unheard is motion, too."""
+    commands, now_s = started(), 0.0
+    senders = {gid: Sender(commands, gid) for gid in (NAV, JOY)}
+    moved_s = dict.fromkeys(senders, -60.0)
+    paused = dict.fromkeys(senders, False)
+    for gid, lost, wait_s, speed, barred in sent:
+        now_s += wait_s
+        sender = senders[gid]
+        sender.sequence += lost
+        if lost > UNHEARD or (lost and moved_s[gid] > 0):
+            moved_s[gid] = now_s
+        decided = sender.send(now_s, motion=twist(speed), barred=barred)
+        if speed:
+            paused[gid] = not barred and (paused[gid] or now_s - moved_s[gid] > 0.49)
+            moved_s[gid] = now_s
+        if decided == TAKEN:
+            assert paused[gid]
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([NAV, JOY]),
             st.integers(0, 5),  # what the sequence grows by
             st.floats(0.0, 0.5),  # s until the next command
             st.floats(0.0, 5.0),  # s of delay
@@ -393,7 +486,7 @@ def test_motion_is_never_older_than_allowed(
         sequences[gid] += step
         about = Attachment(sequences[gid], CLOCK + round((now_s - delay_s) * S), gid)
         now_ns = round(now_s * S)
-        decided = commands.judge(about, twist(speed), now_ns, now_ns, barred=False)
+        decided = commands.judge(about, twist(speed), now_ns, now_ns, None)
         if step or gid not in fastest:
             fastest[gid] = min(fastest.get(gid, math.inf), delay_s)
         if isinstance(decided, Request):

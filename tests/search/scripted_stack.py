@@ -8,13 +8,14 @@ from common import keys
 from common import messages as m
 from common.motion import Twist
 from common.wire.reports import VelocityReport
+from services.ros2.command import SOURCE
 from sim import requests as q
 from sim.board import Board
 from sim.faults import Datagram
 from sim.model import Model
 from sim.sonar import Ranges
 from verification.search.bus import MS, ROBOT, Disturbance
-from verification.search.ros import SOURCE, RosSource
+from verification.search.ros import RosSource
 from verification.search.stack import Stack
 
 ALL_SONARS = range(8)
@@ -71,11 +72,13 @@ class ScriptedStack(Stack):
         self.request(0.0, 650, source=source)
         self.request(linear, ms, angular=angular, source=source)
 
-    def ros(self, pattern: str | None, linear: float = 0.5, ms: int = 0) -> None:
+    def ros(
+        self, pattern: str | None, linear: float = 0.5, ms: int = 0, *, unheard: int = 0
+    ) -> None:
         """Start a ROS node that publishes motion as one of the tools; None: end it."""
         node = self.sources[SOURCE]
         assert isinstance(node, RosSource)
-        node.start(pattern, linear)
+        node.start(pattern, linear, unheard)
         self.run(ms)
 
     def press(self, pressed: bool, ms: int = 0) -> None:

@@ -213,9 +213,10 @@ class StackMachine(RuleBasedStateMachine):
     request = rule(linear=st.none() | SPEEDS, angular=TURNS, source=SOURCES, ms=SHORT | LONG)(
         verb(ScriptedStack.request)
     )
-    ros = rule(pattern=st.none() | st.sampled_from([*PATTERNS]), linear=FAST, ms=LONG)(
-        verb(ScriptedStack.ros, 700)
-    )
+    ros = rule(
+        pattern=st.none() | st.sampled_from([*PATTERNS]), linear=FAST, ms=LONG,
+        unheard=st.sampled_from([0, 45]),
+    )(verb(ScriptedStack.ros, 700))  # fmt: skip
     stop = rule(ms=SHORT)(verb(ScriptedStack.stop))
     creep = rule(direction=DIRECTIONS, times=st.integers(1, 8))(verb(ScriptedStack.creep))
 

@@ -97,6 +97,15 @@ def test_ros_nodes_drive_and_after_a_reset_not_before_a_pause(pattern: str) -> N
     assert stack.oracle.violations == []
 
 
+def test_a_ros_node_whose_link_comes_up_does_not_drive_before_a_pause() -> None:
+    stack = driving()
+    stack.request(None, 1500)
+    runs = stack.oracle.runs
+    stack.ros("topic_pub", 0.5, 6000, unheard=45)
+    assert stack.oracle.runs == runs
+    assert stack.oracle.violations == []
+
+
 PORT_0, BOTH = [(0, False)] * 3, [(0, False), (1, False)] * 3
 
 

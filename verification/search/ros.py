@@ -6,10 +6,9 @@ from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from services.ros2.cdr import Attachment
-from services.ros2.command import BEGINS, Commands, Request, Twist, bars_motion
+from services.ros2.command import BEGINS, SOURCE, Commands, Request, Twist
 from verification.search.bus import Process, Source
 
-SOURCE = "ros2"
 TICKS = 60  # of 50 ms, until a pattern repeats
 PATTERNS = {
     "topic_pub": range(TICKS),
@@ -29,16 +28,19 @@ class RosSource(Source):
         self._commands.listen(0)
         self._pattern: Any = ()
         self._twist = Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._nodes = self._sent = self._ticks = 0
+        self._nodes = self._sent = self._ticks = self._unheard = 0
         self._moved_ns = 0  # when the node last published
         self._state: m.SafetyState | None = None
         process.subscribe(keys.SAFETY, self._on_state)
 
-    def start(self, pattern: str | None, linear: float) -> None:
-        """Replace the node by a new one of this pattern; None: by no node."""
+    def start(self, pattern: str | None, linear: float, unheard: int = 0) -> None:
+        """Replace the node by a new one of this pattern; None: by no node.
+
+        ``unheard`` is the number of ticks after which its link to the gateway is up.
+        """
         self._pattern = PATTERNS[pattern] if pattern else ()
         self._twist = Twist((linear, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._nodes += 1
+        self._nodes, self._unheard = self._nodes + 1, unheard
         self._sent = self._ticks = self._moved_ns = 0
 
     def publish(self) -> None:
@@ -48,10 +50,10 @@ class RosSource(Source):
             return
         now_ns, moved_ns = self.process.net.now_ns, self._moved_ns
         self._sent, self._moved_ns = self._sent + 1, now_ns
+        if self._ticks <= self._unheard:
+            return
         about = Attachment(self._sent, now_ns, self._nodes.to_bytes(16, "big"))
-        decided = self._commands.judge(
-            about, self._twist, now_ns, now_ns, barred=bars_motion(self._state)
-        )
+        decided = self._commands.judge(about, self._twist, now_ns, now_ns, self._state)
         if decided is BEGINS:
             if now_ns - moved_ns < PAUSE_NS:
                 self._violations.append("a neutral request without a pause of the ROS node")

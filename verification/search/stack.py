@@ -16,6 +16,7 @@ from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
+from services.ros2.command import SOURCE
 from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
 from sim import trace as t
@@ -26,7 +27,7 @@ from sim.world import Plan
 from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
 from verification.search.condition_books import IGNORED, LEASE_S, NEEDED
 from verification.search.oracle import STEP_NS, Oracle
-from verification.search.ros import SOURCE, RosSource
+from verification.search.ros import RosSource
 
 START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
