@@ -28,7 +28,10 @@ LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
 SPREAD_S = 0.2  # delay variation; half of safety's limit for the delay of a request
 
-START = "on the robot: `t2 up`, or start what is missing; if its process exists, it hangs: kill it"
+START = (
+    "on the robot: `t2 up`; beside a running stack `t2 up --only NAME`, with systemd `systemctl "
+    "start t2-NAME`; if its process exists, it hangs: kill it"
+)
 STRANGER = (
     "copy members.json to the router's computer and restart the router; if `t2 keys list` shows "
     "that it is revoked, use another certificate"
@@ -104,6 +107,7 @@ class Observation:
     others: list[str] = field(default_factory=list)  # other robots at the same router
     may_drive: bool | None = None
     may_call: bool | None = None
+    may_stop: bool | None = None  # as it seems
     delays_s: list[float] = field(default_factory=list)  # by both wall clocks
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path
     undecodable: dict[str, str] = field(default_factory=dict)  # reason by path
@@ -205,7 +209,9 @@ def rights(seen: Observation) -> Iterator[Finding]:
         yield Finding("rights", "wrong", text, todo)
     elif barred:
         text = f"this laptop may read; safety does not receive its {' and '.join(barred)}"
-        todo = "the emergency stop may be allowed; `t2 keys list` shows its certificate's role"
+        if seen.may_stop is False:
+            text += ", nor, as it seems, its emergency stop: use the vehicle's own switch"
+        todo = "`t2 keys list`, where the certificate authority is, shows its certificate's role"
         yield Finding("rights", "note", text, todo)
     elif None in allowed.values():
         yield Finding("rights", "unknown", "driving and calls require safety")
@@ -336,6 +342,8 @@ def safety(seen: Observation, following: Container[str] = ()) -> Iterator[Findin
         if cause.name == "no_request":
             level = "ok"
         todo = CAUSES.get(cause.name, RESET if latched else "")
+        if cause.name == "contact" and state.release and not state.release.left:
+            todo = "push the vehicle off by hand; then reset"
         text = f"{cause.text} ({cause.action}{', latched' * latched})"
         yield Finding("safety", level, text, todo)
     if not state.causes:

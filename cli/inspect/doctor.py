@@ -17,6 +17,7 @@ from pathlib import Path
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
 from cli.inspect.diagnosis import NEEDED, Finding, Observation, diagnose
+from cli.inspect.estop import is_barred
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
 from common import keys
 from common.bus.probe import Probe, probe
@@ -34,7 +35,10 @@ CONNECT_S = 2.0
 ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
 STREAMS = ("tcp", "tls", "ws")
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
-KEYS = "`t2 keys list` shows the validity of certificates; renew it and copy its folder here again"
+KEYS = (
+    "`t2 keys list`, where the robot's certificate authority is, shows the validity of "
+    "certificates; issue or renew it there, and copy its folder here again"
+)
 REFUSED = (
     "on the robot: is `t2 up` running? By default the router listens on its own host only; "
     "docs/security.md explains how to open it for laptops"
@@ -158,6 +162,7 @@ def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Obse
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
         seen.may_call = opened.has_server(keys.RESET.on(robot))
+        seen.may_stop = seen.may_drive or not is_barred(opened, robot)
     return seen
 
 

@@ -13,7 +13,7 @@ import select
 import shlex
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import TextIO
 
@@ -25,6 +25,7 @@ from common.bus.probe import Probe
 from common.cli_args import source_words
 from common.errors import LinkError, RobotError
 from common.messages import EstopKeepalive, KeepaliveState, SafetyState
+from common.root_cause import WITHOUT_BRIDGE
 from common.text import printable
 
 TIMEOUT_S = 3.0  # without a router
@@ -77,40 +78,52 @@ def stop(client: SafetyClient, user: str, settings: Sequence[str] = ()) -> int:
     missing = sorted(expected - confirmed)
     if missing == [robot]:
         with suppress(LinkError):
-            present = sorted({name for name, _ in services(probe, "*")})
-            if present and robot not in present:
-                seen = ", ".join(present)
-                output.warn(f"t2 estop: no such robot {robot} at this router (seen: {seen})")
+            if is_elsewhere(probe, robot):
                 return 1
-            if is_barred(probe, robot):
-                output.warn(
-                    f"t2 estop: not allowed: this certificate has no right to stop robot {robot} "
-                    "(as it seems: the router drops its commands)"
-                )
-    may_reset = bool(confirmed) and probe.has_server(keys.RESET.on(robot))
-    report(confirmed, missing, settings, may_reset=may_reset)
-    return 0 if confirmed and not missing else 1
-
-
-def report(
-    confirmed: set[str], missing: Sequence[str], settings: Sequence[str], *, may_reset: bool
-) -> None:
-    """Print each stopped robot with who may release it; warn of each that does not confirm."""
-    for each in sorted(confirmed):
+    unreached = {each for each in confirmed if is_unreached(client.states[each])}
+    for each in sorted(confirmed - unreached):
         release = shlex.join(["t2", "call", "safety/reset", "--robot", each, *settings])
-        how = f"`{release}` releases it." if may_reset else BARRED
-        print(f"Robot {each} is stopped. {how}")
+        may_reset = probe.has_server(keys.RESET.on(each))
+        print(f"Robot {each} is stopped. {f'`{release}` releases it.' if may_reset else BARRED}")
     sys.stdout.flush()
-    for each in missing:
-        doctor = shlex.join(["t2", "doctor", "--robot", each, *settings])
-        output.warn(
-            f"t2 estop: sent, but safety of robot {each} does not confirm. "
-            f"{SWITCH}, then `{doctor}`."
-        )
+    trouble = dict.fromkeys(unreached, "has latched the stop, but does not hear the vehicle")
+    warn(trouble | dict.fromkeys(missing, "does not confirm"), settings)
     if not confirmed and not missing:
         output.warn(
             f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. `t2 robots` lists ids"
         )
+    return 0 if confirmed and not missing and not unreached else 1
+
+
+def is_elsewhere(probe: Probe, robot: str) -> bool:
+    """Return whether the robot is not at this router; warn of it, or of a missing right."""
+    present = sorted({name for name, _ in services(probe, "*")})
+    if present and robot not in present:
+        seen = ", ".join(present)
+        output.warn(
+            f"t2 estop: robot {robot} is not at this router (seen: {seen}). If it moves, {SWITCH}."
+        )
+        return True
+    if is_barred(probe, robot):
+        output.warn(
+            f"t2 estop: not allowed: this certificate has no right to stop robot {robot} "
+            "(as it seems: the router drops its commands)"
+        )
+    return False
+
+
+def warn(trouble: Mapping[str, str], settings: Sequence[str]) -> None:
+    """Warn of each robot that may not have stopped."""
+    for each, what in sorted(trouble.items()):
+        doctor = shlex.join(["t2", "doctor", "--robot", each, *settings])
+        output.warn(
+            f"t2 estop: sent, but safety of robot {each} {what}. {SWITCH}, then `{doctor}`."
+        )
+
+
+def is_unreached(state: SafetyState) -> bool:
+    """Return whether safety does not hear the board: the stop may not arrive there."""
+    return any(cause.name in WITHOUT_BRIDGE for cause in state.causes)
 
 
 def is_barred(probe: Probe, robot: str) -> bool:

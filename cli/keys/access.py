@@ -80,16 +80,17 @@ def access_control(
         rules["onboard"] = list(_rules("onboard", ONBOARD))
     for member in members:
         name = member.common_name
-        subjects.append({"id": name, "cert_common_names": [name]})
-        rules[name] = list(_rules(name, rights(member, router)))
+        if own := list(_rules(name, rights(member, router))):  # Zenoh rejects an empty policy
+            subjects.append({"id": name, "cert_common_names": [name]})
+            rules[name] = own
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": [rule for own in rules.values() for rule in own],
+        "rules": [rule for each in rules.values() for rule in each],
         "subjects": subjects,
         "policies": [
-            {"rules": [rule["id"] for rule in own], "subjects": [name]}
-            for name, own in rules.items()
+            {"rules": [rule["id"] for rule in each], "subjects": [name]}
+            for name, each in rules.items()
         ],
     }
 

@@ -56,6 +56,12 @@ def test_a_healthy_robot() -> None:
     assert problems(seen(state=state())) == []
 
 
+def test_a_release_that_is_used_up_is_not_advised() -> None:
+    pressed, used_up = state("contact", latched=("contact",)), factories.release(left=0.0)
+    found = problems(seen(state=msgspec.structs.replace(pressed, release=used_up)))
+    assert [todo for *_, todo in found] == ["push the vehicle off by hand; then reset"]
+
+
 def test_a_wrong_robot_gets_the_names_of_the_others() -> None:
     *_, found = diagnose(seen(instances={}, others=["001", "berlin-2"]), "002")
     assert found.level == "wrong"
@@ -83,6 +89,7 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
         (d.versions, {"undecodable": {"tel/x": "not a Bumper"}},
          [("ok", "everywhere"), ("wrong", "tel/x: not a Bumper")]),
         (d.rights, {"may_drive": False}, [("note", "does not receive its driving")]),
+        (d.rights, {"may_call": False, "may_stop": False}, [("note", "vehicle's own switch")]),
         (d.rights, {"may_drive": None, "may_call": None}, [("unknown", "require safety")]),
         (d.rights, {"instances": {}}, [("unknown", "no service found")]),
         (d.rights, {"rates": {}}, [("wrong", "no message arrives")]),

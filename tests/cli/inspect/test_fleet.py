@@ -3,6 +3,7 @@
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
@@ -13,7 +14,7 @@ from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import operator_name
 from common.cli_args import EXIT_LINK
-from common.messages import Event
+from common.messages import Cause, Event
 from tests.cli.inspect.tool import FakeSafety, Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import at, router_process
@@ -25,9 +26,12 @@ USER = operator_name(at("tcp/127.0.0.1:1"))  # without a certificate: login name
 
 
 def robot(
-    buses: BusFixture, obeys: bool = True, declare: Callable[[Bus], object] = lambda _: None
+    buses: BusFixture,
+    obeys: bool = True,
+    declare: Callable[[Bus], object] = lambda _: None,
+    **state: Any,
 ) -> FakeSafety:
-    return FakeSafety(buses, declare, obeys=obeys, source="web", text="Drives.")
+    return FakeSafety(buses, declare, obeys=obeys, source="web", text="Drives.", **state)
 
 
 @pytest.fixture
@@ -87,6 +91,14 @@ def test_unconfirmed_robots_are_named(
     for name in ("berlin-002", "berlin-003"):
         assert f"robot {name} does not confirm. USE THE VEHICLE'S OWN SWITCH" in result.err
     assert "berlin-004" not in result.err
+
+
+def test_a_latched_stop_that_the_board_may_not_hear_is_no_stop(join: Join, t2: Tool) -> None:
+    lost = Cause(name="link", action="stop", age=1.0, text="The link to the board is down.")
+    robot(join("berlin-001"), causes=(lost,))
+    result = t2("estop", "--robot", "berlin-001")
+    assert (result.code, result.out) == (1, "")
+    assert "does not hear the vehicle. USE THE VEHICLE'S OWN SWITCH, then `t2 doctor" in result.err
 
 
 def test_a_driver_of_some_robots_stops_them_by_name(

@@ -129,6 +129,13 @@ def test_the_rights_of_a_ros_computer_follow_domain_and_namespace() -> None:
         assert not may(given, "write", f"{key}/{names.wire_type(twist)}/{HASHES[twist]}")
 
 
+def test_a_member_without_rights_at_a_router_has_no_policy() -> None:
+    """Zenoh refuses the whole configuration for one that is empty."""
+    made: dict[str, Any] = access_control([member("ros", "lab", (OTHER,))], ["lo"], ROUTER)
+    assert [subject["id"] for subject in made["subjects"]] == ["onboard"]
+    assert all(policy["rules"] for policy in made["policies"])
+
+
 def test_without_a_trusted_protocol_there_is_no_on_board_subject() -> None:
     made: dict[str, Any] = access_control([member("viewer")], [], ROUTER)
     assert [subject["id"] for subject in made["subjects"]] == ["viewer.anna.1"]
