@@ -86,7 +86,7 @@ def stop(client: SafetyClient, user: str, settings: Sequence[str] = ()) -> int:
         may_reset = probe.has_server(keys.RESET.on(each))
         print(f"Robot {each} is stopped. {f'`{release}` releases it.' if may_reset else BARRED}")
     sys.stdout.flush()
-    trouble = dict.fromkeys(unreached, "has latched the stop, but does not hear the vehicle")
+    trouble = dict.fromkeys(unreached, "has latched it, but does not hear the vehicle")
     warn(trouble | dict.fromkeys(missing, "does not confirm"), settings)
     if not confirmed and not missing:
         output.warn(
@@ -116,9 +116,7 @@ def warn(trouble: Mapping[str, str], settings: Sequence[str]) -> None:
     """Warn of each robot that may not have stopped."""
     for each, what in sorted(trouble.items()):
         doctor = shlex.join(["t2", "doctor", "--robot", each, *settings])
-        output.warn(
-            f"t2 estop: sent, but safety of robot {each} {what}. {SWITCH}, then `{doctor}`."
-        )
+        output.warn(f"t2 estop: sent; safety of robot {each} {what}. {SWITCH}, then `{doctor}`.")
 
 
 def is_unreached(state: SafetyState) -> bool:

@@ -12,7 +12,7 @@ from functools import partial
 
 from common import clock, keys
 from common import messages as m
-from common.client import reset_request
+from common.client import ResetCheck, reset_request
 from common.freshness import NS_PER_S
 from common.service import Node
 from services.ros2 import names, parameters
@@ -39,6 +39,7 @@ class Calls:
     ) -> None:
         self._node, self._state = node, state
         self._stops: list[tuple[Answer, int]] = []  # answers that wait, and since when
+        self._resets: list[tuple[Answer, ResetCheck, str]] = []  # with the text of success
         ros.serve(absolute("hardware/e_stop_trigger"), TRIGGER, self._stop)
         ros.serve(absolute("hardware/e_stop_reset"), TRIGGER, self._reset)
         for name, (interface, respond) in parameters.SERVICES.items():
@@ -55,9 +56,16 @@ class Calls:
         self._stops.append((answer, clock.now_ns()))
 
     def _confirm(self, now_ns: int) -> None:
-        """Repeat an emergency stop until it is confirmed, or too old."""
-        if not self._stops:
-            return
+        """Answer what safety's state confirms; repeat an emergency stop until then."""
+        newest, resets = self._state(now_ns - FRESH_NS), self._resets
+        self._resets = []
+        for reset in resets:
+            answer, check, text = reset
+            outcome = check.outcome(newest, now_ns)
+            if outcome is None:
+                self._resets.append(reset)
+            else:
+                answer((outcome, text if outcome else "Safety's state does not confirm it."))
         waiting = []
         for answer, since_ns in self._stops:
             state = self._state(since_ns)  # an older one may show an earlier stop
@@ -80,11 +88,14 @@ class Calls:
         if reason := reset_refusal(state, about.source_ns, time.time_ns()):
             answer((False, reason))
             return
+        check = ResetCheck(state)
+
+        def answered(done: m.ResetDone) -> None:
+            check.answer(done)
+            self._resets.append((answer, check, done.text))
+
         self._node.bus.call(
-            keys.RESET,
-            reset_request(state),
-            lambda done: answer((True, done.text)),
-            lambda reason: answer((False, reason)),
+            keys.RESET, reset_request(state), answered, lambda reason: answer((False, reason))
         )
 
     def _parameters(

@@ -29,6 +29,7 @@ Seen = Callable[[str, bool], None]  # a token, and whether it appeared
 Declare = Callable[[zenoh.Session, str, str], Any]  # with the key and the token of an endpoint
 
 DEPTH = 32  # commands that wait for the loop
+MAX_BYTES = 4096  # of a command; a TwistStamped has some 80
 LATCHED: dict[str, Any] = {
     "cache": zenoh.ext.CacheConfig(max_samples=1),
     "publisher_detection": True,
@@ -127,7 +128,10 @@ class Endpoints:
         waiting = OverwritingQueue(DEPTH, read, self._post, self.counters)
 
         def queue(sample: zenoh.Sample) -> None:
-            waiting.put((sample, clock.now_ns()))
+            if len(sample.payload) > MAX_BYTES:
+                self.counters["undecodable"] += 1
+            else:
+                waiting.put((sample, clock.now_ns()))
 
         self._declare(
             "MS", topic, interface, lambda session, key, _: session.declare_subscriber(key, queue)

@@ -4,6 +4,7 @@ import time
 from functools import partial
 
 from common import clock
+from common.freshness import NS_PER_S
 from common.service import Node
 from common.source import DriveSource
 from services.ros2 import names, translate
@@ -14,6 +15,7 @@ from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
 
+REPORT_NS = NS_PER_S
 TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "twist": "geometry_msgs/msg/Twist"}
 OTHER_TYPE = Refusal(
     "other_type", "A node publishes cmd_vel with another type than that of ros2.cmd_vel."
@@ -29,7 +31,7 @@ class Gateway:
         self._commands = Commands(by_zero=settings.neutral == "zero")
         self._diagnostics = translate.Diagnostics()
         self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
-        self._reported: dict[bytes, str] = {}  # the last decision about each, as reported
+        self._reported: dict[bytes, dict[str, int]] = {}  # when which decision, the last one last
         ros = names.Node(settings.domain, "", settings.namespace, names.NODE)
         self._ros = Endpoints(node.config.bus, ros, node.loop.post, node.counters)
         self._drive = DriveSource(node.bus, SOURCE)
@@ -72,10 +74,15 @@ class Gateway:
             self._node.event("cmd_vel_refused", "warning", refusal.text, **values)
 
     def _is_new(self, publisher: bytes, decision: str) -> bool:
+        """Return whether to report a decision: each one of a publisher once a second at most."""
         known = publisher if publisher in self._publishers else b""  # anybody can invent a GID
-        is_new = self._reported.get(known) != decision
-        self._reported[known] = decision
-        return is_new
+        reported, now_ns = self._reported.setdefault(known, {}), clock.now_ns()
+        is_repeated = now_ns - reported.get(decision, -REPORT_NS) < REPORT_NS
+        if is_repeated or decision == next(reversed(reported), None):
+            return False
+        reported.pop(decision, None)
+        reported[decision] = now_ns
+        return True
 
     def _note(self, level: int, text: str, values: dict[str, str]) -> None:
         status = translate.status(level, "cmd_vel", text, values)

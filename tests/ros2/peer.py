@@ -36,10 +36,10 @@ class RosPeer:
         )  # fmt: skip
         return came
 
-    def commands(self, interface: str) -> "CommandPublisher":
-        """Return a publisher of cmd_vel."""
+    def commands(self, interface: str, topic: str = "/cmd_vel") -> "CommandPublisher":
+        """Return a publisher of commands."""
         made = ROS2Publisher(
-            topic="/cmd_vel", msg_type=interface, msg_definition=definition(interface),
+            topic=topic, msg_type=interface, msg_definition=definition(interface),
             type_hash=oracle.STORE.hash_rihs01(interface), router_port=self._port,
         )  # fmt: skip
         self._open.append(made)

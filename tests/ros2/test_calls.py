@@ -1,10 +1,17 @@
-"""Resets that the network held back."""
+"""Resets that the network held back, and those that safety's state does not confirm."""
+
+import time
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from common.client import CONFIRM_S
 from common.freshness import NS_PER_S
-from common.messages import Cause, SafetyState
-from services.ros2.calls import TOLERANCE_S, reset_refusal
+from common.messages import Cause, ResetDone, SafetyState
+from services.ros2.calls import TOLERANCE_S, Calls, reset_refusal
+from services.ros2.cdr import Attachment
+from services.ros2.config import Ros2Config
 from tests.factories import safety_state
 
 NOW_NS = 1_700_000_000 * NS_PER_S
@@ -60,3 +67,52 @@ def test_a_clock_that_is_ahead_hides_the_age_of_a_call(ahead_s: float, refused: 
 
 def test_without_a_latch_safety_answers() -> None:
     assert not refusal(state(no_request=1.0), 3600.0)
+
+
+class Bench:
+    """The services, on a bus on which anybody may answer a reset."""
+
+    def __init__(self) -> None:
+        self.newest = state(estop=3.0)
+        self.served: dict[str, Any] = {}
+        self.ticks: list[Any] = []
+        self.answers: list[Any] = []
+        self.now_ns = 0
+        node: Any = SimpleNamespace(
+            bus=SimpleNamespace(call=self._call, estop=lambda: None),
+            config=Ros2Config(),
+            loop=SimpleNamespace(every=lambda _, tick: self.ticks.append(tick)),
+        )
+        ros: Any = SimpleNamespace(serve=lambda name, _, handle: self.served.update({name: handle}))
+        Calls(node, ros, lambda name: name, lambda _: self.newest)
+
+    def reset(self) -> None:
+        """Call the service, as soon as the stop was seen."""
+        about = Attachment(1, time.time_ns(), bytes(16))
+        self.served["hardware/e_stop_reset"](about, (), self.answers.append)
+
+    def tick(self, seconds: float) -> None:
+        """Let time pass."""
+        self.now_ns += round(seconds * NS_PER_S)
+        self.ticks[0](self.now_ns)
+
+    def _call(self, _: Any, request: Any, answered: Any, __: Any) -> None:
+        answered(ResetDone(text="Reset.", cleared=request.causes))
+
+
+def test_a_reset_succeeds_when_safetys_state_shows_it() -> None:
+    bench = Bench()
+    bench.reset()
+    bench.tick(0.05)
+    assert bench.answers == []
+    bench.newest = state()
+    bench.tick(0.05)
+    assert bench.answers == [(True, "Reset.")]
+
+
+def test_a_reset_that_only_a_stranger_answers_fails() -> None:
+    bench = Bench()
+    bench.reset()
+    bench.tick(0.05)
+    bench.tick(CONFIRM_S + 0.05)
+    assert bench.answers == [(False, "Safety's state does not confirm it.")]

@@ -1,6 +1,7 @@
 """The gateway on the real stack, with a node of zenoh-ros2-sdk on the other side."""
 
 import math
+import subprocess
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -202,6 +203,26 @@ def test_refusals_are_in_the_diagnostics_and_in_the_log(node: RosPeer, stack: Ru
     assert {(each.level, each.name) for each in log} == {(30, "t2")}
     node.commands(PLAIN)
     wait_until(lambda: "another type" in log[-1].msg, "the log of a publisher of the other type")
+
+
+def test_a_gateway_with_other_settings(node: RosPeer, stack: RunningStack) -> None:
+    log = node.subscribe("/rosout", "rcl_interfaces/msg/Log")
+    sets = "ros2.namespace=/strict", "ros2.cmd_vel=twist", "ros2.neutral=zero"
+    options = set_options(f"bus.connect={stack.endpoint}", *sets)
+    command = list(child_process.command("services.ros2", *options))
+    with subprocess.Popen(command) as gateway:
+        try:
+            plain = node.commands(PLAIN, "/strict/cmd_vel")
+            node.commands(STAMPED, "/strict/cmd_vel")
+
+            def refused(text: str) -> bool:
+                plain.send(0.2, 0.1)
+                return any(text in each.msg for each in log)
+
+            wait_until(lambda: refused("another type"), "the log of a stamped publisher")
+            wait_until(lambda: refused("(not_zero): "), "the log of motion without a zero")
+        finally:
+            gateway.terminate()
 
 
 def test_a_killed_gateway_stops_the_vehicle_and_nothing_else(
