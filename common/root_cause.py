@@ -27,6 +27,8 @@ TEXTS: dict[Part, str] = {
     "relay": "The relay is silent: check its power and cable.",
     "board": "The board is silent: check its power and cable.",
 }
+# Without one of these no command reaches the wheels, and a board may keep its last one.
+MAY_MOVE = "The vehicle may still move: use its own switch."
 # Causes of safety that it has without a bridge, and others that follow from a missing bridge, relay
 # or board. One that latches, or that brakes a moving vehicle, is not among them.
 WITHOUT_BRIDGE = ("starting", "bumper", "silent", "link")

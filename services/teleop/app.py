@@ -27,6 +27,8 @@ from services.teleop.core.round_trip import PROBE_S, place
 
 QUERY = "\x1b7\x1b[{row};{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
 MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
+TALL = 30  # rows of a terminal with room for more causes
+REST = 20  # rows of the other panels, and borders
 REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay the keys
 
 
@@ -90,10 +92,6 @@ class TeleopApp(App[None]):
         self.set_interval(REFRESH_S, self.draw)
         self.set_interval(PROBE_S, self.probe)
 
-    def on_resize(self, event: events.Resize) -> None:
-        """Enlarge the safety panel in a tall terminal."""
-        self.screen.set_class(event.size.height >= 30, "tall")
-
     def draw(self) -> None:
         """Redraw all panels; exit once the controller's loop has ended."""
         if self._ended():
@@ -103,9 +101,11 @@ class TeleopApp(App[None]):
         self._post(lambda: self._controller.screen_drawn(now_ns))
         self._view = view = self._controller.view
         self._header.show(panels.header(view))
-        self.set_class(bool(panels.release(view)), "contact")
-        self.set_class(bool(view.alarm), "alarm")
-        self._safety.show(panels.safety(view, self._safety.content_size.height))
+        least = 5 if self.size.height >= TALL else 2
+        text = panels.safety(view, least, self._safety.content_size.width)
+        rows = min(text.plain.count("\n") + 1, self.size.height - REST)
+        self._safety.styles.height = max(least, rows) + 2  # with its borders
+        self._safety.show(text)
         self._around.show(panels.around(view))
         self._motion.show(panels.motion(view))
         size = self._events.content_size

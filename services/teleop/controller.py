@@ -17,6 +17,7 @@ from common.cli_args import with_options
 from common.client import Contest, EstopRepetition, EstopStep, ResetCheck, reset_request
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Drive, Event, ResetDone, SafetyState
+from common.root_cause import MAY_MOVE, TEXTS, root_cause
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
@@ -282,21 +283,20 @@ class Controller:
         state: SafetyState | None = self._newest("safety", now_ns)
         return state
 
-    def _alarm(self) -> str:
+    def _alarm(self, state: SafetyState | None, now_ns: int) -> str:
         """Return what the operator must know before anything else; empty for nothing."""
         if self._estop.is_pending and not self._bus.connected:
             return "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch"
         if self._unconfirmed:
-            return self.unconfirmed
+            return f"{self.unconfirmed}; E repeats it"
+        if root_cause(self._bus.connected, state, self._newest("link", now_ns)).part in TEXTS:
+            return MAY_MOVE
         if not self._may_stop:
-            return (
-                "VIEW ONLY: this terminal can neither drive nor stop. Use the vehicle's own switch"
-            )
+            return "VIEW ONLY, and no emergency stop: use the vehicle's own switch"
         if self._source.denied:
             return "VIEW ONLY: this certificate may not drive, and perhaps not stop"
-        if self._overruled_by:
-            return f"OVERRULED by {self._overruled_by}: release the controls"
-        return ""
+        by = self._overruled_by
+        return f"OVERRULED by {by}: release the controls" if by else ""
 
     def _make_view(self, now_ns: int) -> View:
         controls = self._controls
@@ -308,7 +308,7 @@ class Controller:
             doctor=self._doctor,
             may_drive=self._may_stop and not self._source.denied,
             may_stop=self._may_stop,
-            alarm=self._alarm(),
+            alarm=self._alarm(self._state(now_ns), now_ns),
             gear=controls.gear,
             top=controls.top(),
             requested=self._requested,

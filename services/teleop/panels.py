@@ -127,31 +127,42 @@ def _wrapped(line: Line, width: int) -> list[Text]:
 # --- safety ---------------------------------------------------------------------------------
 
 
-def safety(view: View, rows: int) -> Text:
-    """Return alarm, verdict, release and causes, latched ones first; by name if rows are short."""
-    state, lines = view.safety, [Text(view.alarm, style=BAD)] if view.alarm else []
+def safety(view: View, rows: int, width: int = 200) -> Text:
+    """Return alarm, verdict, release and causes, latched ones first; by name if rows are short.
+
+    Alarm and verdict are wrapped. These, the release and one row of causes may be more than rows.
+    """
+    width = max(MIN_TEXT, width)
+    state, lines = view.safety, [Text(row, style=BAD) for row in wrap(view.alarm, width)]
     if state is None:
         badge, text = (
             (" NO SAFETY ", f"no state of safety arrives through {view.router}")
             if view.connected
             else (" NO ROUTER ", f"no answer at {view.router}")
         )
-        lines.append(Text.assemble((badge, BADGES["inhibited"]), f"  {text}"))
+        lines += _verdict(badge, BADGES["inhibited"], text, width)
         return rows_of(*lines, Text(f"To stop, use the vehicle's own switch. Next: {view.doctor}"))
     badge, root = f" {state.verdict.upper()} ", _root(view)
-    text = TEXTS.get(root.part, state.text)
-    lines.append(Text.assemble((badge, BADGES[state.verdict]), f"  {text}"))
+    text = state.text.replace(f"{view.source} is in control.", "You are in control.")
+    if root.part in TEXTS:
+        text = f"{TEXTS[root.part]} Next: {view.doctor}"
+    lines += _verdict(badge, BADGES[state.verdict], text, width)
     lines += release(view)
-    lines += _causes(state, root, rows - len(lines))
-    if root.part in TEXTS and len(lines) < rows:
-        lines.append(Text(f"Next: {view.doctor}", style=DIM))
-    return rows_of(*lines)
+    return rows_of(*lines, *_causes(state, root, max(1, rows - len(lines))))
+
+
+def _verdict(badge: str, style: str, text: str, width: int) -> list[Text]:
+    indent = " " * (len(badge) + 1)
+    first, *rest = wrap(text, width, initial_indent=indent, break_on_hyphens=False) or [indent]
+    return [Text.assemble((badge, style), first[len(badge) :]), *map(Text, rest)]
 
 
 def release(view: View) -> list[Text]:
-    """Return how to move off a pressed bumper, in two rows; nothing if none is pressed."""
+    """Return how to move off a pressed bumper, in two rows; nothing while safety refuses that."""
     known = view.safety.release if view.safety else None
     if known is None or (view.bumper is not None and not view.bumper.pressed):
+        return []
+    if _root(view).part or known.left <= 0 or len(known.forbidden) == len(DIRECTIONS):
         return []
     held = view.requested.release if view.requested else "none"
     keys = Text("   ").join(_key(known, direction, held) for direction in DIRECTIONS)
@@ -189,7 +200,7 @@ def _causes(state: SafetyState, root: RootCause, rows: int) -> list[Text]:
 def _cause(cause: Cause, text: str, state: SafetyState) -> Text:
     latched = cause.name in state.latched
     tag = ("LATCHED ", BAD) if latched else (f"{cause.action} ", WARN)
-    return Text.assemble(tag, text, (f" {_age(cause.age)}{', R resets' if latched else ''}", DIM))
+    return Text.assemble(tag, text, (f" {_age(cause.age)}", DIM))
 
 
 def _age(seconds: float) -> str:

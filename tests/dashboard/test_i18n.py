@@ -7,6 +7,7 @@ from typing import get_args
 import pytest
 
 from common.messages import Direction, FaultName, LinkState, Verdict
+from common.root_cause import MAY_MOVE
 from common.root_cause import TEXTS as ROOT_TEXTS
 from services.bridge.core.lease import WAITING
 from services.dashboard import server
@@ -62,7 +63,7 @@ def test_what_the_bridge_waits_for_has_its_text() -> None:
 def test_the_causes_have_the_texts_of_safety_and_each_direction_its_texts() -> None:
     for rule in RULES:
         assert TEXTS[f"cause.{rule.name}"][0] == rule.text
-    for part, text in ROOT_TEXTS.items():
+    for part, text in [*ROOT_TEXTS.items(), ("may_move", MAY_MOVE)]:
         assert TEXTS[f"root.{part}"][0] == text
     directions = get_args(Direction)
     for prefix in ("release", "release_forbidden", "believed", "moved"):

@@ -11,6 +11,7 @@ from textual.pilot import Pilot
 from common import keys
 from common.freshness import NS_PER_S
 from common.messages import Cause, ResetRequest, Ultrasonic
+from services.teleop.app import Panel
 from tests.factories import contact_state, link, safety_state
 from tests.teleop.screen_fixture import LocalTerminalApp, Screen, play, until
 
@@ -128,6 +129,26 @@ def test_a_control_character_reaches_no_panel(screen: Screen) -> None:
 
     hostile = replace(contact_state(), text="Stopped.\x1b[2J\x9b31m", release=None)
     play(screen, act)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (100, 32)])
+def test_the_safety_panel_shows_all_its_rows_and_hides_no_other(
+    screen: Screen, size: tuple[int, int]
+) -> None:
+    still = "The bumper was hit. Bumper polls were lost: move off first, then reset it here."
+
+    async def act(pilot: Pilot[None]) -> None:
+        screen.node.fake.deliver(keys.SAFETY, contact_state(text=still), screen.now_ns)
+        screen.controller.tick(screen.now_ns)
+        screen.app.draw()
+        await pilot.pause()
+        safety, hints = (screen.app.query_one(f"#{name}", Panel) for name in ("safety", "hints"))
+        rows = screen.text_of("safety").split("\n")
+        assert len(rows) == (3 if size[0] == 80 else 2)
+        assert safety.content_size.height >= len(rows)
+        assert hints.region.bottom == size[1]
+
+    play(screen, act, *size)
 
 
 def test_received_values_are_shown(screen: Screen) -> None:

@@ -8,7 +8,9 @@ from common.bus.bus import no_answer, not_allowed
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
 from common.messages import Driver, Event, ResetDone, ResetRequest
-from tests.factories import safety_state
+from common.root_cause import MAY_MOVE
+from tests.factories import link, safety_state
+from tests.fake_bus import FakeBus
 from tests.teleop.inputs import answer, stick
 from tests.teleop.support import FakeGamepad, Operator
 
@@ -96,16 +98,28 @@ def test_an_estop_that_is_not_latched_is_reported(
     assert operator.node.fake.estops == ESTOP_TICKS + 1
     why = ", probably not allowed" if denied else ""
     alarm = f"EMERGENCY STOP NOT CONFIRMED{why}: use the vehicle's own switch"
-    assert operator.lines[-1] == operator.controller.view.alarm == alarm
+    assert operator.lines[-1] == alarm
+    assert operator.controller.view.alarm == f"{alarm}; E repeats it"
     operator.tell_safety(latched=("estop",))
     operator.ticks(1)
-    assert operator.controller.view.alarm != alarm
+    assert not operator.controller.view.alarm.startswith(alarm)
 
 
 def test_an_estop_without_a_router_is_reported_at_once(operator: Operator) -> None:
     operator.press("e")
     operator.ticks(1)
     assert operator.controller.view.alarm.startswith("EMERGENCY STOP NOT SENT YET")
+
+
+def test_without_board_the_vehicle_may_still_move(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FakeBus, "connected", True)
+    for state, alarm in (("lost", MAY_MOVE), ("up", "")):
+        operator.tell_safety()
+        operator.node.fake.deliver(keys.LINK, link(state=state), operator.now_ns)
+        operator.ticks(1)
+        assert operator.controller.view.alarm == alarm
 
 
 # --- rules ----------------------------------------------------------------------------------

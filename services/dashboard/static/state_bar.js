@@ -46,6 +46,7 @@ function detail({ fast, t, language, isDriver, doctor }, worst) {
   const others = safety.causes.filter((it) => (root || it !== worst) && safety.latched.includes(it.name));
   const more = language !== "en" && worst && !root ? translated(worst.text, language) : "";
   return [
+    root,
     more === (worst && causeText(worst, safety, t)) ? "" : more,
     others.length ? `${t("also_latched")} ${others.map((it) => causeText(it, safety, t)).join(" ")}` : "",
     safety.latched.length && !isDriver && fast.driver.may ? t("take_to_reset") : "",
@@ -80,8 +81,7 @@ function due(fast) {
 
 function sentence({ fast, t, language }, worst) {
   const { safety } = fast;
-  const root = rootText(fast, t);
-  if (root) return root;
+  if (rootText(fast, t)) return t("root.may_move");
   if (language === "en") return safety.text;
   if (!worst) return translated(safety.text, language); // the source in control
   return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t(due(fast)) : "");
