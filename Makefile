@@ -95,7 +95,7 @@ rust-example: $(STAMP)
 vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews docs/vehicles.md
 	$(BIN)/python -m verification.search --runs $(or $(N),1000) --out docs/vehicles.md
 
-ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz and older versions of Zenoh; needs cargo
+ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz (with cargo) and older versions of Zenoh
 	$(BIN)/python -m verification.ros2
 
 # The tests that needed a second run are named last, also when a check fails.

@@ -220,6 +220,7 @@ class SafetyState(Message, frozen=True, kw_only=True):
     release_refusal: Text = ""  # why the release that ``source`` requests does not move the vehicle
     limit_sources: Annotated[tuple[LimitState, ...], Few] = ()  # those in the settings
     estop_keepalives: Annotated[tuple[KeepaliveState, ...], Few] = ()  # likewise
+    doubted_sonars: Annotated[tuple[Name, ...], Few] = ()  # names of those that are not trusted
 
 
 # --- @cmd -----------------------------------------------------------------------------------

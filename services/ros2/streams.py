@@ -58,14 +58,17 @@ class Streams:
         self._pass_on(keys.ODOMETRY, ODOM_HZ, publish)
 
     def _sonars(self) -> None:
-        settings, vehicle = self._settings, self._node.config.vehicle
-        mounts = sonar_mounts(vehicle)
+        config = self._node.config
+        mounts = sonar_mounts(config.vehicle)
         topics = [f"{translate.sonar_frame(mount)}/range" for mount in mounts]
         sonars = [self._publisher(topic, "sensor_msgs/msg/Range") for topic in topics]
 
         def publish(message: m.Ultrasonic) -> None:
+            doubted = self._state.value.doubted_sonars if self._state else ()
             for index, (sonar, mount) in enumerate(zip(sonars, mounts, strict=True)):
-                sonar.put(translate.sonar_range(message, index, mount, vehicle, settings))
+                is_doubted = mount.name in doubted
+                made = translate.sonar_range(message, index, mount, config, doubted=is_doubted)
+                sonar.put(made)
 
         self._pass_on(keys.ULTRASONIC, SONAR_HZ, publish)
 

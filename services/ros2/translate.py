@@ -12,7 +12,7 @@ from common.freshness import NS_PER_S
 from common.settings import Mount, Vehicle, sonar_mounts
 from common.text import printable
 from services.ros2.cdr import Value
-from services.ros2.config import Ros2
+from services.ros2.config import Ros2Config
 
 ULTRASOUND = 0
 SONAR_HEIGHT, BODY_HEIGHT, CLEARANCE = 0.35, 0.35, 0.15  # m, for display: the settings have none
@@ -95,19 +95,20 @@ def sonar_frame(mount: Mount) -> str:
 
 
 def sonar_range(
-    message: m.Ultrasonic, index: int, mount: Mount, vehicle: Vehicle, settings: Ros2
+    message: m.Ultrasonic, index: int, mount: Mount, config: Ros2Config, *, doubted: bool
 ) -> Value:
-    """Return a sensor_msgs/Range of one sonar.
+    """Return a sensor_msgs/Range of one sonar; one that safety doubts is faulty.
 
     Nearer than can be measured is ``min_range``. Nav2's collision monitor stops for a range over
     ``max_range``, and passes NaN as free space; REP 117 has NaN for a fault, and +Inf for no echo.
     """
-    measured = message.ranges[index]
-    if measured is None:
+    settings, vehicle = config.ros2, config.vehicle
+    measured, reason = message.ranges[index], "fault" if doubted else message.status[index]
+    if measured is None or doubted:
         is_for_nav2 = settings.no_echo == "max_range"
         far, fault = (vehicle.sonar_max, math.inf) if is_for_nav2 else (math.inf, math.nan)
         by_status = {"no_echo": far, "too_near": vehicle.sonar_min}
-        measured = by_status.get(message.status[index], fault)
+        measured = by_status.get(reason, fault)
     stamped = header(message.t_ns, settings.frame_prefix + sonar_frame(mount))
     limits = vehicle.sonar_min, vehicle.sonar_max
     return stamped, ULTRASOUND, settings.sonar_fov, *limits, measured, 0.0

@@ -69,6 +69,7 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         release_refusal=state.release.refusal,
         estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
+        doubted_sonars=tuple(_doubted(state.sonar_array.sonars)),
     )
 
 
@@ -150,13 +151,18 @@ def _slowed_text(state: State, sonar: int) -> str:
     return f"Slowed by an obstacle at {one.distance:.2f} m ({name})."
 
 
-def _doubts(sonars: tuple[Sonar, ...]) -> str:
-    """Return the names of the untrusted sonars with the reason."""
+def _doubted(sonars: tuple[Sonar, ...]) -> dict[str, str]:
+    """Return the untrusted sonars by name, with the reason."""
     doubts = [one.fault or ("suspect" if one.suspect else "") for one in sonars]
-    if doubts[0] and len(set(doubts)) == 1:
-        return f"all {doubts[0]}"
-    pairs = zip(SONAR_NAMES, doubts, strict=True)
-    return ", ".join(f"{name.replace('_', ' ')} {doubt}" for name, doubt in pairs if doubt)
+    return {name: doubt for name, doubt in zip(SONAR_NAMES, doubts, strict=True) if doubt}
+
+
+def _doubts(sonars: tuple[Sonar, ...]) -> str:
+    """Return the untrusted sonars as text."""
+    found = _doubted(sonars)
+    if len(found) == len(sonars) and len(reasons := set(found.values())) == 1:
+        return f"all {reasons.pop()}"
+    return ", ".join(f"{name.replace('_', ' ')} {doubt}" for name, doubt in found.items())
 
 
 def signature(state: State) -> tuple[object, ...]:

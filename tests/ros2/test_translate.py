@@ -9,7 +9,7 @@ import pytest
 from common import messages as m
 from common.settings import Vehicle, sonar_mounts
 from services.ros2 import translate
-from services.ros2.config import Ros2
+from services.ros2.config import Ros2, Ros2Config
 from tests import factories
 
 T_NS = 1_700_000_000_250_000_000
@@ -66,13 +66,16 @@ def test_the_description_has_the_vehicles_size() -> None:
     assert box.get("size") == "1.2 0.8 0.35"
 
 
-def measured(index: int, distance: float | None, status: str, **settings: Any) -> Any:
+def measured(
+    index: int, distance: float | None, status: str, *, doubted: bool = False, **settings: Any
+) -> Any:
     ranges: list[float | None] = [1.0] * 8
     statuses = ["ok"] * 8
     ranges[index], statuses[index] = distance, status
     message = m.Ultrasonic(ranges=tuple(ranges), status=tuple(statuses), t_ns=T_NS)  # type: ignore[arg-type]
     mount = sonar_mounts(VEHICLE)[index]
-    return translate.sonar_range(message, index, mount, VEHICLE, Ros2(**settings))
+    config = Ros2Config(vehicle=VEHICLE, ros2=Ros2(**settings))
+    return translate.sonar_range(message, index, mount, config, doubted=doubted)
 
 
 def test_a_range_has_the_sonars_frame_and_limits() -> None:
@@ -98,6 +101,12 @@ def test_a_range_without_a_number(status: str, no_echo: str, expected: float) ->
 
 def test_by_rep_117_a_sonar_with_a_fault_is_not_a_number() -> None:
     assert math.isnan(measured(0, None, "fault", no_echo="inf")[5])
+
+
+@pytest.mark.parametrize(("distance", "status"), [(1.0, "ok"), (None, "no_echo")])
+def test_a_sonar_that_safety_doubts_is_faulty(distance: float | None, status: str) -> None:
+    assert measured(0, distance, status, doubted=True)[5] == math.inf
+    assert math.isnan(measured(0, distance, status, doubted=True, no_echo="inf")[5])
 
 
 @pytest.mark.parametrize(

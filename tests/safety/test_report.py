@@ -7,7 +7,7 @@ from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
 from common.codec import decode, encode
-from common.messages import MAX_REASON, MAX_TEXT, Limits, ResetRequest, SafetyState
+from common.messages import MAX_REASON, MAX_TEXT, SONAR_NAMES, Limits, ResetRequest, SafetyState
 from services.safety.config import LimitSource, Safety, Source
 from services.safety.core.inputs import Estop, Trigger
 from services.safety.core.operator_requests import BUMPER_FREE
@@ -114,6 +114,18 @@ def test_transitions_are_reported_once() -> None:
     fixture.tick(30)
     assert noted(fixture, ResetRequest(echo=fixture.echo, causes=fixture.latched())) == ["reset"]
     assert noted(fixture, ResetRequest(echo=fixture.echo, causes=(1,))) == ["reset_refused"]
+
+
+def test_untrusted_sonars_are_listed() -> None:
+    fixture = PolicyFixture().ready()
+    assert fixture.published().doubted_sonars == ()
+    fixture.sonar(front=None, rear=None)
+    fixture.tick(5)
+    assert fixture.published().doubted_sonars == ("front", "rear")
+    assert "Sonar not trusted: front faulty, rear faulty. " in sentence(fixture.state)
+    fixture.sonar(**dict.fromkeys(SONAR_NAMES))
+    fixture.tick(5)
+    assert "Sonar not trusted: all faulty. " in sentence(fixture.state)
 
 
 def test_a_change_of_source_is_reported() -> None:

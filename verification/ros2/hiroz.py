@@ -40,6 +40,12 @@ SUBSCRIPTIONS = [
 SERVICES = {
     "/hardware/e_stop_trigger": "std_srvs::srv::dds_::Trigger_",
     "/hardware/e_stop_reset": "std_srvs::srv::dds_::Trigger_",
+    "/t2/describe_parameters": "rcl_interfaces::srv::dds_::DescribeParameters_",
+    "/t2/get_parameter_types": "rcl_interfaces::srv::dds_::GetParameterTypes_",
+    "/t2/get_parameters": "rcl_interfaces::srv::dds_::GetParameters_",
+    "/t2/list_parameters": "rcl_interfaces::srv::dds_::ListParameters_",
+    "/t2/set_parameters": "rcl_interfaces::srv::dds_::SetParameters_",
+    "/t2/set_parameters_atomically": "rcl_interfaces::srv::dds_::SetParametersAtomically_",
 }
 RECEIVED = {
     "/odom": "nav_msgs/msg/Odometry",
