@@ -11,7 +11,20 @@ import zenoh
 from t2.client import Contest, request
 from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, Stopped, T2Error
 from t2.messages import Odometry, SafetyState
-from t2.motion import NEAR_TURN, STILL, Arc, Motion, OnStop, Path, Straight, Target, Turn, finite
+from t2.motion import (
+    NEAR_TURN,
+    STILL,
+    Arc,
+    Motion,
+    OnStop,
+    Path,
+    Straight,
+    Target,
+    Turn,
+    check_word,
+    finite,
+    not_negative,
+)
 from t2.publisher import FRESH_S, PERIOD_S, DrivePublisher
 from t2.stream import check_process
 
@@ -21,6 +34,7 @@ if TYPE_CHECKING:
 NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the first one
 READY_S = 2.0  # from the first neutral request until we are in control
 PATIENCE_S = 3.0  # without progress
+STEP_S = 0.3  # a motion's velocity is valid; odometry renews it every 0.04 s
 WAIT_S = 60.0  # for the end of a stop; a vehicle that stood for longer must not surprise anybody
 SPEED, TURN_SPEED = 0.3, 0.5  # m/s, rad/s, of motions
 STANDING = 0.02  # m/s and rad/s
@@ -40,7 +54,8 @@ class Drive:
     good, and each method raises it: open another one.
 
     A motion ends with the pose and its covariance, and waits for standstill. It raises ``Blocked``
-    after ``patience`` s without progress. When safety stops the vehicle with a cause that wants a
+    after ``patience`` s without progress. While its thread is held up or odometry is silent, the
+    request is zero after 0.3 s. When safety stops the vehicle with a cause that wants a
     neutral request, ``on_stop="raise"`` raises ``Stopped``; ``"wait"`` sends the neutral request
     and goes on after the stop, for 60 s at most. A latched cause, another source, and the silence
     of safety or odometry always raise.
@@ -69,6 +84,7 @@ class Drive:
         self._error: T2Error | None = None  # for good, see the class
         self._reported = False  # whether it was raised
         self._cancelled = False
+        self._motion = threading.Lock()  # held during a motion
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"t2 drive {source}", daemon=True)
 
@@ -163,7 +179,10 @@ class Drive:
 
         Open loop: a program that waits for something else keeps driving.
         """
-        end_s = math.inf if seconds is None else time.monotonic() + finite(seconds)
+        check_word(on_stop, OnStop)
+        end_s = math.inf
+        if seconds is not None:
+            end_s = time.monotonic() + not_negative(seconds, "seconds")
         target = Target(finite(linear), finite(angular), end_s, on_stop)
         self.check()
         self._end_cancelled()
@@ -248,7 +267,7 @@ class Drive:
 
     def _go(self, motion: Motion, patience: float, on_stop: OnStop) -> Odometry:
         """Follow a motion until little is left; raise ``Blocked`` without progress."""
-        patience, progress_s = finite(patience), time.monotonic()
+        patience, progress_s = not_negative(patience, "patience"), time.monotonic()
         least = least_turning = math.inf
 
         def arrived(pose: Odometry) -> bool:
@@ -265,15 +284,18 @@ class Drive:
                 least_turning, progress_s = motion.turning, time.monotonic()
             elif time.monotonic() - progress_s > patience:
                 raise Blocked(f"the vehicle does not get on: {state.text}", state.causes)
-            self.velocity(linear, angular, on_stop=on_stop)
+            self.velocity(linear, angular, seconds=STEP_S, on_stop=on_stop)
             return False
 
+        if not self._motion.acquire(blocking=False):
+            raise T2Error("a motion of this drive is under way; wait for its end, or cancel it")
         try:
             self._until(arrived)
+            self.stop()
+            return self._pose()
         finally:
             self._target = STILL
-        self.stop()
-        return self._pose()
+            self._motion.release()
 
     def _until(self, arrived: Callable[[Odometry], bool]) -> None:
         stream = self._robot.odometry
@@ -334,12 +356,14 @@ class Drive:
 
     def _tick(self) -> None:
         cancelled, target = self._cancelled, self._target
-        if cancelled or time.monotonic() >= target.end_s:
+        is_over = time.monotonic() >= target.end_s
+        # A motion that is held up requests zero, and a stop ends it all the same.
+        if cancelled or (is_over and not self._motion.locked()):
             target = STILL
         self._error = self._error or self._trouble(target)
         state = self._robot.safety.newest
         # In a stop that is waited for, each request is the neutral one that safety wants after it.
-        if self._error is not None or (state is not None and is_stopped(state)):
+        if is_over or self._error is not None or (state is not None and is_stopped(state)):
             target = STILL
         self._publisher.tick(request(target.linear, target.angular))
         self._sent += 1

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 from itertools import pairwise
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 from t2.messages import MAX_NUMBER, Odometry
 
@@ -172,7 +172,7 @@ def slowing(left: float, speed: float, deceleration: float, slowest: float) -> f
 
 def finite(number: float) -> float:
     """Return a number, of NumPy for example, as a float; raise ``ValueError`` or ``TypeError``."""
-    if not abs(number) <= MAX_NUMBER:
+    if not math.fabs(number) <= MAX_NUMBER:
         raise ValueError(f"only finite numbers up to {MAX_NUMBER:g} are possible, not {number}")
     return float(number)
 
@@ -183,3 +183,16 @@ def positive(number: float, what: str = "speed") -> float:
         hint = "; a negative distance drives backward" if what == "speed" else ""
         raise ValueError(f"{what} must be positive, not {number}{hint}")
     return finite(number)
+
+
+def not_negative(number: float, what: str) -> float:
+    """Return a number likewise; raise ``ValueError`` for a negative one, too."""
+    if number < 0:
+        raise ValueError(f"{what} must not be negative, as {number} is")
+    return finite(number)
+
+
+def check_word(word: str, known: Any) -> None:
+    """Raise ``ValueError`` for a word that this ``Literal`` does not have."""
+    if word not in get_args(known):
+        raise ValueError(f"{word!r} is not one of {', '.join(get_args(known))}")

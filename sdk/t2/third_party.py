@@ -10,7 +10,7 @@ import zenoh
 
 from t2.errors import NotAllowed, T2Error
 from t2.messages import EstopKeepalive, KeepaliveState, Limit, LimitState, SafetyState
-from t2.motion import finite
+from t2.motion import not_negative
 from t2.publisher import SourcePublisher
 from t2.stream import Stream
 
@@ -66,8 +66,7 @@ class Repetition:
             raise T2Error(
                 f"this {self.what} has ended; the robot returns another one"
             ) from self._error
-        if finite(seconds) < 0:
-            raise ValueError(f"seconds must not be negative, as {seconds} is")
+        not_negative(seconds, "seconds")
         is_shown(0.0)  # raises for an unknown source
         begin_s = time.monotonic()
         with self._lock:  # an old message must not follow a new one
@@ -120,9 +119,8 @@ class SpeedLimit(Repetition):
 
         Returns and raises as ``Robot.limit``.
         """
-        linear, angular = (None if cap is None else finite(cap) for cap in (linear, angular))
-        if min(linear or 0.0, angular or 0.0) < 0:
-            raise ValueError("caps must not be negative")
+        caps = (linear, angular)
+        linear, angular = (None if cap is None else not_negative(cap, "a cap") for cap in caps)
 
         def is_shown(passed_s: float) -> bool:
             shown = self._shown()

@@ -5,7 +5,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ from common.bus.bus import Bus
 from common.loop import Loop
 from common.source import DriveSource
 from sim.requests import Bumper, Sonar
+from t2.messages import Odometry
+from t2.motion import Straight
 from tests.sdk.library_robot import blocked
 from verification.harness.bus import bus_on, running
 from verification.harness.stack import RunningStack, running_stack
@@ -62,6 +64,9 @@ with t2.connect("001", endpoint=sys.argv[1]) as robot, robot.drive("nav") as dri
         forked(fails(use))
     drive.turn(0.1)
 """
+
+
+HoldUp = Callable[[Callable[[], object]], None]
 
 
 def await_motion(robot: t2.Robot, least: float = 0.1) -> None:
@@ -124,11 +129,66 @@ def test_what_is_no_finite_number_is_refused(robot: t2.Robot) -> None:
                 move(text)
         with pytest.raises(ValueError, match="speed must be positive"):
             drive.forward(1.0, speed=-0.3)
+        with pytest.raises(ValueError, match="seconds must not be negative"):
+            drive.velocity(0.1, seconds=-5)
+        word: Any = "skip"
+        with pytest.raises(ValueError, match="'skip' is not one of raise, wait"):
+            drive.forward(1.0, on_stop=word)
     with pytest.raises(ValueError, match="not be negative"):
         robot.limit("detector", linear=-1.0, seconds=1)
     call: Any = robot.limit
     with pytest.raises(TypeError, match="seconds"):
         call("detector", linear=0.3)
+
+
+@pytest.fixture
+def hold_up(robot: t2.Robot, monkeypatch: pytest.MonkeyPatch) -> HoldUp:
+    """Return a function that holds up the next motion while it drives, to call something."""
+
+    def hold_up(call: Callable[[], object]) -> None:
+        calls = [call]
+        velocity = Straight.velocity
+
+        def held(motion: Straight, pose: Odometry, left: float) -> tuple[float, float]:
+            if calls and pose.linear > 0.1:
+                calls.pop()()
+            return velocity(motion, pose, left)
+
+        monkeypatch.setattr(Straight, "velocity", held)
+
+    return hold_up
+
+
+def await_standstill(robot: t2.Robot) -> None:
+    wait_until(lambda: abs(robot.velocity.latest().linear) < 0.02, "standstill")
+
+
+def test_a_motion_that_is_held_up_requests_zero_and_goes_on(
+    robot: t2.Robot, hold_up: HoldUp
+) -> None:
+    def wait() -> None:
+        with pytest.raises(t2.T2Error, match="a motion of this drive is under way"):
+            drive.turn(0.1)
+        await_standstill(robot)
+
+    hold_up(wait)
+    start = robot.odometry.latest()
+    with robot.drive("nav") as drive:
+        end = drive.forward(0.6)
+    assert math.dist((start.x, start.y), (end.x, end.y)) == pytest.approx(0.6, abs=0.1)
+
+
+def test_a_stop_ends_a_motion_that_is_held_up(robot: t2.Robot, hold_up: HoldUp) -> None:
+    def stop_for_a_while() -> None:
+        await_standstill(robot)
+        limit = robot.limit("detector", linear=0.0, seconds=60)
+        wait_until(lambda: not drive.obeyed, "the stop")
+        limit.set(None, seconds=0.1)
+        wait_until(lambda: drive.obeyed or drive._error, "its end")
+
+    hold_up(stop_for_a_while)
+    with pytest.raises(t2.Stopped), robot.drive("nav") as drive:
+        drive.forward(0.6)
 
 
 def test_a_latch_ends_a_drive_for_good(robot: t2.Robot) -> None:
