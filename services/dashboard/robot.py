@@ -126,9 +126,11 @@ class Robot:
         self.driver_lock.lapse()
         self._requests.stop()
         self.bus.estop()
-        if not self._estop.is_pending:  # a page repeats its requests
+        state = self.telemetry.newest(keys.SAFETY, clock.now_ns())
+        # A page sends its request twice, and repeats it.
+        if not (self._estop.is_pending or (state is not None and "estop" in state.latched)):
             self.event("estop", "warning", f"emergency stop requested by {requested_by}")
-        self._estop.start(self.telemetry.newest(keys.SAFETY, clock.now_ns()))
+        self._estop.start(state)
 
     def keep_alive(self, viewer: str, answered: int, now_ns: int) -> None:
         """Keep the emergency stop alive for a page that answers this heartbeat."""

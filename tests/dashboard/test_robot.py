@@ -2,9 +2,9 @@
 
 import pytest
 
-from common import keys
+from common import clock, keys
 from common.bus.publisher import Publisher
-from common.client import DENIED_AFTER, ESTOP_TICKS, OVERRULED_TICKS
+from common.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
 from common.messages import Direction, Drive, Event, ResetDone, ResetRequest
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
@@ -98,6 +98,20 @@ def test_a_release_is_requested_after_a_neutral_request(fixture: RobotFixture) -
             fixture.ticks(1, "web")
             assert isinstance(requests.last, Drive)
             assert requests.last.release == expected
+
+
+def test_a_repeated_estop_is_one_event(fixture: RobotFixture) -> None:
+    events = next(p for p in fixture.bus.publishers if p.topic is keys.EVENTS)
+    fixture.robot.telemetry.update("tel/safety/state", safety_state(), clock.now_ns())
+    fixture.robot.estop("Anna")
+    assert isinstance(events.last, Event)
+    first = events.last.seq
+    stopped = safety_state(latched=("estop",))
+    fixture.robot.telemetry.update("tel/safety/state", stopped, clock.now_ns())
+    for _ in range(KEPT_TICKS):  # safety has latched it, and the page's second request arrives
+        fixture.robot.tick(clock.now_ns())
+    fixture.robot.estop("Anna")
+    assert events.last.seq == first
 
 
 def test_an_unconfirmed_estop_is_reported_and_a_viewer_has_no_driver(
