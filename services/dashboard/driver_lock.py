@@ -57,18 +57,20 @@ class DriverLock:
     """The driver lock of one robot on this dashboard."""
 
     driver: str | None = None  # a viewer
+    name: str = ""  # of its operator, as typed on the page
     state: HoldState = HoldState.FREE
     push: Push = field(default_factory=Push)
     gear: int = 1
     shown: Shown = None  # the state that the newest valid hold answers
 
-    def take(self, viewer: str, force: bool) -> bool:
+    def take(self, viewer: str, force: bool, name: str = "") -> bool:
         """Give the lock to a viewer, unless another one has it and ``force`` is not set."""
         if self.driver not in (None, viewer) and not force:
             return False
         if self.driver != viewer:
             self.driver, self.gear = viewer, 1
             self.let_go()
+        self.name = name
         return True
 
     def leave(self, viewer: str) -> None:

@@ -96,6 +96,7 @@ class Robot:
         lock = self.driver_lock
         return DriverState(
             id=lock.driver,
+            name=lock.name,
             hold=lock.state,
             gear=lock.gear,
             other=self._contest.other,

@@ -94,15 +94,15 @@ class RobotPage:
 
     def _take(self, viewer: str, message: client.Take) -> None:
         lock = self.robot.driver_lock
-        before = lock.driver
+        before, by = lock.driver, lock.name or f"viewer {lock.driver}"
         if not self.robot.may_drive:
             self._notify(viewer, "error", "barred")
-        elif not lock.take(viewer, message.force):
+        elif not lock.take(viewer, message.force, message.name):
             self._send([viewer], {"k": "taken"})
         elif before not in (None, viewer):
-            self._notify(str(before), "warning", "taken_over")
             who = message.name or f"viewer {viewer}"
-            self.robot.event("take_over", "info", f"{who} takes control from viewer {before}")
+            self._notify(str(before), "warning", f"{who} has taken over control.")
+            self.robot.event("take_over", "info", f"{who} takes control from {by}")
 
     def _drive(self, viewer: str, message: client.AnyMessage) -> None:
         robot, lock, notify = self.robot, self.robot.driver_lock, partial(self._notify, viewer)

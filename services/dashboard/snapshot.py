@@ -35,6 +35,7 @@ class DriverState(Struct, frozen=True):
     """The viewer with the driver lock, its hold, and whether this dashboard may drive at all."""
 
     id: str | None
+    name: str  # of its operator, as typed; may be empty
     hold: HoldState
     gear: int
     other: str | None  # another source that drives
@@ -104,7 +105,7 @@ def fast_snapshot(
         pose=(odometry.x, odometry.y, odometry.heading) if odometry else None,
         epoch=odometry.epoch if odometry else 0,
         ranges=sonar.ranges if sonar else (None,) * 8,
-        tones=tones(sonar, state.causes if state else ()),
+        tones=tones(sonar if state else None, state.causes if state else ()),
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
         safety=state,

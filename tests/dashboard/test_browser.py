@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page
 
+from sim.requests import Driver, Freeze
 from tests.dashboard.page import (
     BROWSER_MARKS,
     center_of,
@@ -84,20 +85,43 @@ def test_a_driver_holds_a_key_and_a_viewer_stops(
     browser: Browser, page: Page, server: Server, stack: RunningStack
 ) -> None:
     context, phone, _ = phone_of(browser, server, "zh-CN")
+    page.fill("#name", "Anna")
+    page.press("#name", "Enter")  # leaves the field
     take_control(page)
     page.keyboard.press("3")
     wait_for_text(page, "#top", "0.50")
     drive_until_moving(stack, lambda: page.keyboard.down("w"), lambda: page.keyboard.up("w"))
     wait_for_text(page, "#driver", "You drive")
-    wait_for_text(phone, "#driver", "驾驶")
+    wait_for_text(phone, "#driver", "Anna 正在驾驶")
     phone.tap("#estop")
     wait_for_standstill(stack)
     wait_for_text(page, "#verdict", "BRAKE")
     wait_for_text(phone, "#causes", "急停")
+    wait_for_text(page, "#events", "Emergency stop requested by viewer")
     page.keyboard.up("w")
     context.close()
     reset_all(page)
     wait_for_text(page, "#verdict", "STOP")
+
+
+def test_a_fault_that_is_still_present_is_not_reset_in_chinese_either(
+    page: Page, stack: RunningStack
+) -> None:
+    page.click("#language")
+    stack.control.do(Driver(side="left", bits=4))
+    wait_for_text(page, "#sentence", "左侧电机驱动器报告：编码器。原因仍然存在：请先排除，再复位。")
+    stack.control.do(Driver(side="left", bits=0))
+    wait_for_text(page, "#sentence", "复位后方可行驶。")
+    take_control(page)
+    reset_all(page)
+
+
+def test_without_a_board_the_page_names_the_own_switch(page: Page, stack: RunningStack) -> None:
+    stack.control.do(Freeze(seconds=8.0))
+    wait_for_text(page, "#sentence", "The vehicle may still move: use its own switch.")
+    wait_for_text(page, "#detail", "The board is silent")
+    page.wait_for_selector("#take:disabled")
+    wait_for_text(page, "#link", "Board: up")
 
 
 def test_driving_by_touch_and_a_second_finger_stops(

@@ -167,7 +167,8 @@ def test_one_viewer_drives_and_a_takeover_asks(
         fleet.join("001", viewer)
     lock = fleet._pages["001"].robot.driver_lock
     receive(buses["001"], keys.SAFETY, safety_state(heartbeat=5))
-    fleet.handle("001", "1", client.Take())
+    fleet.handle("001", "1", client.Take(name="Anna"))
+    assert lock.name == "Anna"
     for message in (client.Hold(5, x=1.0), client.Leave(), client.Gear(2), client.Reset(5)):
         fleet.handle("001", "2", message)
     assert (lock.state, lock.gear) == (HoldState.FREE, 1)
@@ -181,7 +182,8 @@ def test_one_viewer_drives_and_a_takeover_asks(
     assert lock.driver == "1"
     fleet.handle("001", "2", client.Take(force=True))
     assert lock.driver == "2"
-    assert (sent[-1][0], sent[-1][1]["text"]) == (["1"], "taken_over")
+    told = (sent[-1][0], sent[-1][1]["text"], lock.name)
+    assert told == (["1"], "viewer 2 has taken over control.", "")
     fleet.handle("001", "2", client.Gear(3))
     assert lock.gear == 3
     fleet.leave("001", "2")

@@ -1,6 +1,8 @@
 """The catalogue is complete: every text that the page uses, in both languages."""
 
+import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 
@@ -12,12 +14,13 @@ from common.root_cause import TEXTS as ROOT_TEXTS
 from services.bridge.core.lease import WAITING
 from services.dashboard import server
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.i18n import EVENTS, PHRASES, TEXTS
+from services.dashboard.i18n import EVENTS, PHRASES, TEXTS, phrases
 from services.safety.core.causes import RULES
 from tools.docs import DOCS
 
 CODE = Path(server.__file__).parent
 HAN = re.compile("[\u4e00-\u9fff]")
+MIXED = re.compile("[\u4e00-\u9fff] ?[,:;!?]|[，。：；？！] ")  # a mark of the other script
 
 
 def used_keys() -> set[str]:
@@ -26,9 +29,9 @@ def used_keys() -> set[str]:
     found = set(re.findall(r'data-t(?:-\w+)?="(\w+)"', page))
     for script in (CODE / "static").glob("*.js"):
         text = script.read_text(encoding="utf-8")
-        found |= set(re.findall(r'\bt\("([\w.]+)"\)', text))
+        found |= set(re.findall(r'\bt\("([\w.]+)"[,)]', text))
         found |= set(re.findall(r'toast\("(\w+)"', text))
-        found |= set(re.findall(r'"(release_\w+|moved_\w+|believed_\w+)"', text))
+        found |= set(re.findall(r'"(release_\w+)"', text))
     for name in ("fleet.py", "robot_page.py", "robot.py"):
         code = (CODE / name).read_text(encoding="utf-8")
         found |= set(re.findall(r'"(?:error|info|warning)", "(\w+)"', code))
@@ -37,7 +40,7 @@ def used_keys() -> set[str]:
 
 def test_every_used_key_has_a_text() -> None:
     used = used_keys()
-    assert {"estop", "too_late", "release_due"} <= used  # of the page, a script, the server
+    assert {"estop", "too_late", "also_latched"} <= used  # of the page, a script, the server
     assert used <= set(TEXTS)
 
 
@@ -66,7 +69,7 @@ def test_the_causes_have_the_texts_of_safety_and_each_direction_its_texts() -> N
     for part, text in [*ROOT_TEXTS.items(), ("may_move", MAY_MOVE)]:
         assert TEXTS[f"root.{part}"][0] == text
     directions = get_args(Direction)
-    for prefix in ("release", "release_forbidden", "believed", "moved"):
+    for prefix in ("release", "release_forbidden", "believed"):
         assert {f"{prefix}_{direction}" for direction in directions} <= set(TEXTS)
 
 
@@ -84,6 +87,46 @@ def test_every_event_has_its_text() -> None:
         assert {f"event.{service}.{name}", f"event.{name}"} & set(EVENTS), name
 
 
+SENTENCES = re.compile(r"(?<=[.!?]) (?=[A-Za-z])")  # as in phrases.js
+# Texts for programs, and for the terminal alone.
+NOT_SHOWN = re.compile(
+    "X: X|Latched: .*|The reset names no cause.|reset not sent: .*|key .* ignored: .*|cmd_vel of .*"
+)
+
+
+def literals(tree: ast.AST) -> Iterator[str]:
+    """Yield the texts below a node, with X in place of each value; no docstrings."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.JoinedStr):
+            parts = (it.value if isinstance(it, ast.Constant) else "X" for it in node.values)
+            yield re.sub("^X (?=[A-Z])", "", "".join(map(str, parts)))
+        elif isinstance(node, ast.Constant):
+            yield str(node.value)
+        elif not isinstance(node, ast.Expr) or not isinstance(node.value, ast.Constant):
+            yield from literals(node)
+
+
+def texts_of_services() -> Iterator[str]:
+    """Yield the sentences of safety, and the texts of all events."""
+    for file in CODE.parent.rglob("*.py"):
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        if "safety" in file.parts:
+            yield from (it for it in literals(tree) if re.fullmatch(r"[A-Z].+ .+\.", it))
+        calls = (it for it in ast.walk(tree) if isinstance(it, ast.Call))
+        for call in calls:
+            if ast.unparse(call.func).lower().endswith("event"):
+                yield from literals(ast.Tuple(call.args[2:]))
+
+
+def test_every_text_of_a_service_has_its_chinese() -> None:
+    patterns = (re.escape(it).replace(r"\{\}", ".+?") for it in phrases())
+    known = re.compile("|".join(patterns))
+    sentences = [one for it in texts_of_services() for one in SENTENCES.split(it) if " " in one]
+    assert len(sentences) > 80
+    for one in sentences:
+        assert known.fullmatch(one) or NOT_SHOWN.fullmatch(one), one
+
+
 def test_every_result_of_a_call_has_its_text() -> None:
     robot = (CODE / "robot.py").read_text(encoding="utf-8")
     found = re.findall(r'(?:reason|text|done\.text), "(\w+)"\)', robot)
@@ -97,7 +140,9 @@ def test_both_languages_have_each_text() -> None:
         if key != "language":  # each names the other one
             assert not HAN.search(english), key
             assert HAN.search(chinese), key
+            assert not MIXED.search(chinese), key
     assert all(map(HAN.search, EVENTS.values()))
     for english, chinese in PHRASES.items():
         assert HAN.search(chinese), english
+        assert not MIXED.search(chinese), english
         assert chinese.count("{}") == english.count("{}"), english

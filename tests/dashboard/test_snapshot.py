@@ -50,7 +50,7 @@ def full() -> TelemetryCache:
 
 
 NOBODY = snapshot.DriverState(
-    None, HoldState.FREE, 1, None, overruled=False, may=True, may_stop=True
+    None, "", HoldState.FREE, 1, None, overruled=False, may=True, may_stop=True
 )
 
 
@@ -68,6 +68,14 @@ def test_the_fast_snapshot() -> None:
     assert (seen.safety.verdict, seen.safety.latched) == ("brake", ("contact",))
     assert seen.safety.release == factories.release()
     assert seen.driver == NOBODY
+
+
+def test_without_safety_no_sector_is_clear() -> None:
+    telemetry = full()
+    newer = Ultrasonic(ranges=(1.0,) * 8, status=("ok",) * 8)
+    telemetry.update("tel/bridge/ultrasonic", newer, AT + NS_PER_S)
+    seen = fast(telemetry, at=AT + NS_PER_S)
+    assert (seen.safety, seen.ranges, seen.tones) == (None, (1.0,) * 8, ("dark",) * 8)
 
 
 def test_old_values_are_not_shown() -> None:

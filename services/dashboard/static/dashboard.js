@@ -29,7 +29,8 @@ let events = [];
 let hello = null;
 let drawn; // the drawn snapshot; null without a connection
 
-const t = (key) => texts[language][key] ?? key;
+// A text of the catalogue; values take the places of its `{}`.
+const t = (key, ...values) => values.reduce((text, it) => text.replace("{}", () => it), texts[language][key] ?? key);
 const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
 const name = () => $("name").value.trim();
@@ -96,7 +97,7 @@ const HANDLERS = {
     panels.showEvents(events, t, language);
   },
   notice: (message) => toast(message.text, message.level, message.about),
-  taken: () => confirm("take_over", `${stateBar.driverName(fast, t)} ${t("take_over_from")}`,
+  taken: () => confirm("take_over", t("take_over_from", stateBar.driverName(fast, t)),
     () => send({ k: "take", force: true, name: name() })),
 };
 const handle = (message) => HANDLERS[message.k]?.(message);

@@ -1,7 +1,8 @@
 // Input of the driver: stick, keys, gamepad, release. Only held controls drive. Every loss of input
 // releases them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
 // as the answer to a snapshot, with its heartbeat of safety, which bounds the age of the hold.
-import { translated } from "./phrases.js";
+import { gap, translated } from "./phrases.js";
+import { duration } from "./panels.js";
 import { isUsedUp, nextStep, resetRefusal } from "./state_bar.js";
 
 const DEADZONE = 0.12; // of the stick's range
@@ -54,7 +55,7 @@ function gamepad() {
   const pad = pressed.find((it) => seenUp.has(it.index));
   const named = pad ?? usable[0] ?? pads[0];
   const key = usable.length ? "gamepad" : "gamepad_unusable";
-  $("gamepad").textContent = named ? `${page.t(key)}: ${named.id}` : "";
+  $("gamepad").textContent = named ? page.t(key, named.id) : "";
   if (!pad) return null;
   return { x: shaped(-(pad.axes[STICKS.linear] ?? 0)), y: shaped(-(pad.axes[STICKS.angular] ?? 0)) };
 }
@@ -114,12 +115,11 @@ export function show(isDriver, fast) {
   const isLost = isDriver && (driver.overruled || hold === "expired");
   write("hold", refused && !isLost ? page.t(refused.key) : !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
   disable($("leave"), !isDriver);
-  disable($("take"), isDriver);
+  const off = !fast || !!fast.root.part; // nothing can drive
+  disable($("take"), isDriver || off);
   disable($("reset"), !isDriver || !!noReset);
   $("reset").title = noReset ? page.t(noReset) : "";
-  const off = !fast?.connected;
   $("stick").classList.toggle("disabled", off);
-  $("stick").title = off ? page.t("no_router") : "";
   $("reset").classList.toggle("due", next === "reset");
   $("release").classList.toggle("due", next === "release" || next === "by_hand");
   showRelease(isDriver, releasing ? fast?.safety?.release_refusal : "");
@@ -146,17 +146,15 @@ function showRelease(isDriver, answer) {
   }
   if (!release) return;
   write("release-free", isUsedUp(release) ? "" : believed());
-  write("release-left", `${page.t("release_left")}: ${metres(release.left)}`);
-  write("release-forbidden", [...reasons].join(" "));
+  write("release-left", page.t("release_left", metres(release.left)));
+  write("release-forbidden", [...reasons].join(gap(page.language())));
 }
 
 // The direction that safety believes free, with the last motion, its distance and its age.
 function believed() {
   const { believed_free: free, travelled, age } = release;
   if (!free) return page.t("release_unknown");
-  const motion = page.t(free === "forward" ? "moved_backward" : "moved_forward");
-  const ago = age == null ? "–" : `${age.toFixed(age < 10 ? 1 : 0)} s`;
-  return `${page.t(`believed_${free}`)} ${motion} ${metres(Math.abs(travelled))}, ${page.t("ago").replace("{}", ago)}`;
+  return page.t(`believed_${free}`, metres(Math.abs(travelled)), duration(age));
 }
 
 const metres = (value) => (Number.isFinite(value) ? `${value.toFixed(2)} m` : "– m");

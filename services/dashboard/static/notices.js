@@ -1,5 +1,5 @@
 // Notices, and questions before a consequence.
-import { translated } from "./phrases.js";
+import { capital, combined, translated } from "./phrases.js";
 
 const ERROR_MS = 20000;
 const NOTICE_MS = 5000;
@@ -15,10 +15,8 @@ export function begin(given) {
 // A text is a key of the catalogue, or a sentence of a service; `about` is the key of its result.
 function noticeText(text, about) {
   const { t, language } = page;
-  if (t(text) !== text || language() === "en") return t(text);
-  const details = translated(text, language());
-  const result = about && t(`event.${about}`);
-  return result && result !== details ? `${result} ${details}` : details;
+  if (t(text) !== text || language() === "en") return capital(t(text));
+  return combined(about && t(`event.${about}`), translated(text, language())).join("");
 }
 
 export function toast(text, level = "info", about = "") {

@@ -1,5 +1,5 @@
 // The panels of text: causes, limits, drivers, switches, services, events.
-import { translated } from "./phrases.js";
+import { capital, combined, gap, translated } from "./phrases.js";
 
 const $ = (id) => document.getElementById(id);
 const BITS = ["over_current", "over_voltage", "encoder", "under_voltage", "overload"];
@@ -36,8 +36,7 @@ export function causeText(cause, safety, t) {
   const known = t(`cause.${cause.name}`) !== `cause.${cause.name}`; // a newer safety may have other causes
   const by = (safety.limit_sources ?? []).filter(LIMITS[cause.name] ?? (() => false));
   if (!by.length) return known ? t(`cause.${cause.name}`) : cause.text;
-  const each = by.map((it) => it.source + (it.reason ? `: ${it.reason}` : ""));
-  return `${t(`limited.${cause.name}`)} ${each.join(", ")}`;
+  return t(`limited.${cause.name}`, by.map((it) => it.source + (it.reason && ` (${it.reason})`)).join(" · "));
 }
 
 /** Return what is missing between safety and the wheels; empty if nothing is. */
@@ -46,7 +45,7 @@ export const rootText = ({ root }, t) => (["", "router", "safety"].includes(root
 function rootLine({ root, safety }, t, language) {
   const line = create("li", t(`root.${root.part}`), { "data-action": "stop", "data-cause": root.part });
   const following = safety.causes.filter((it) => root.folded.includes(it.name)).map((it) => translated(it.text, language));
-  if (following.length) line.append(create("small", `${t("follows")} ${following.join(" ")}`));
+  if (following.length) line.append(create("small", t("follows", following.join(gap(language)))));
   return line;
 }
 
@@ -65,7 +64,7 @@ export function showCauses(fast, t, language) {
     const details = translated(it.text, language);
     const same = LIMITS[it.name] || details === text;
     const more = same ? "" : `${details} · `;
-    line.append(create("small", `${more}${t("since")} ${duration(it.age)}${latched}`));
+    line.append(create("small", more + t("since", duration(it.age)) + latched));
     return line;
   })]);
   const limits = safety?.limits;
@@ -83,7 +82,7 @@ export function showSlow(slow, t) {
   showDrivers(slow, t);
   for (const name of ["ultrasonic_brake", "bumper_brake"]) {
     const on = slow.switches?.[name];
-    $(name).textContent = `${t(name)}: ${on === true ? t("on") : on === false ? t("off") : t("unknown")}`;
+    $(name).textContent = t(name, on === true ? t("on") : on === false ? t("off") : t("unknown"));
     $(name).dataset.on = String(on);
   }
   $("services").replaceChildren(
@@ -120,7 +119,7 @@ function showDrivers(slow, t) {
     cell.append(create("b", t(side)), driver ? (driver.bits ? "" : t("no_fault")) : t("unknown"));
     const faults = driver ? bits(driver.bits) : [];
     return [cell, ...faults.map((bit) => create("div",
-      `${t(side)}, ${t("bit")} ${bit}: ${t(`fault.${BITS[bit] ?? "reserved"}`)}`, { class: "bad", "data-bit": bit }))];
+      t("bit", t(side), bit, t(`fault.${BITS[bit] ?? "reserved"}`)), { class: "bad", "data-bit": bit }))];
   }));
 }
 
@@ -128,11 +127,11 @@ const bits = (all) => [...Array(32).keys()].filter((bit) => Math.floor(all / 2 *
 
 // The kind of an event, in English by its name; its own text follows, as it has the figures.
 function eventTexts({ service, name, text }, t, language) {
-  if (language === "en") return [`${name[0]?.toUpperCase() ?? ""}${name.slice(1).replaceAll("_", " ")}: `, text];
   const keys = [`event.${service}.${name}`, `event.${name}`];
   const key = keys.find((it) => t(it) !== it); // a newer service may have other events
-  const details = translated(text, language);
-  return key && details !== t(key) ? [t(key), details] : [details];
+  const kind = language === "en" ? name.replaceAll("_", " ").replace("estop", "emergency stop") : t(key ?? "");
+  const [title, details] = combined(kind, translated(text, language));
+  return [capital(title) + (details && language === "en" ? ": " : ""), details];
 }
 
 export function showEvents(events, t, language) {

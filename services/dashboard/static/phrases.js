@@ -19,6 +19,19 @@ export function translated(text, language) {
   return text.split(SENTENCES).map((it) => phrase(it) ?? ` ${it} `).join("").trim();
 }
 
+const core = (text) => text.toLowerCase().replace(/[。.]$/, "");
+
+/** Return a title and its details, or one of them where it has the other. */
+export function combined(title, details) {
+  if (core(details).includes(core(title))) return [details];
+  return core(title).includes(core(details)) ? [title] : [title, details];
+}
+
+export const capital = (text) => text.slice(0, 1).toUpperCase() + text.slice(1);
+
+/** What separates two sentences. */
+export const gap = (language) => (language === "en" ? " " : "");
+
 // Null for an unknown sentence. A placeholder holds a figure, a name, a list of names, or a phrase.
 function phrase(text) {
   if (Object.hasOwn(words, text)) return words[text];

@@ -1,6 +1,6 @@
 // The state bar and the chips of the header: verdict, reason, speed, connections, driver.
 import { causeText, rootText } from "./panels.js";
-import { translated } from "./phrases.js";
+import { gap, translated } from "./phrases.js";
 
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
 const WITHOUT_STATE = ["lost", "none", "no_router"]; // verdicts of the page, not of safety
@@ -26,8 +26,8 @@ function showState(view) {
   $("state").dataset.verdict = verdict;
   document.title = `${t(`verdict.${verdict}`)} · ${view.robot} · T2`;
   const known = !WITHOUT_STATE.includes(verdict);
-  const reason = known ? sentence(view, worst) : t(`text.${verdict}`);
-  set("sentence", overruler ? `${t("overruled_by")} ${overruler}${view.language === "en" ? ". " : "。"}${reason}` : reason);
+  const reason = known ? sentence(view) : t(`text.${verdict}`);
+  set("sentence", overruler ? t("overruled_by", overruler) + (view.language === "en" ? ". " : "。") + reason : reason);
   set("detail", known ? detail(view, worst) : whatNext(view, verdict));
   set("speed", !fast?.measured ? "–" : fast.measured[0].toFixed(2));
   set("turn", !fast?.measured ? "–" : fast.measured[1].toFixed(2));
@@ -36,22 +36,20 @@ function showState(view) {
 // Which address does not answer, and the command that finds out why.
 function whatNext({ fast, t, router, doctor }, verdict) {
   const address = fast ? router : location.host;
-  return `${t(verdict === "none" ? "router_at" : "no_answer_at")} ${address} · ${t("next_step")} ${doctor}`;
+  return `${t(verdict === "none" ? "router_at" : "no_answer_at", address)} · ${t("next_step", doctor)}`;
 }
 
-// The other latched causes, and what to do.
+// The first missing part, the other latched causes, and what to do.
 function detail({ fast, t, language, isDriver, doctor }, worst) {
   const { safety } = fast;
   const root = rootText(fast, t);
   const others = safety.causes.filter((it) => (root || it !== worst) && safety.latched.includes(it.name));
-  const more = language !== "en" && worst && !root ? translated(worst.text, language) : "";
   return [
     root,
-    more === (worst && causeText(worst, safety, t)) ? "" : more,
-    others.length ? `${t("also_latched")} ${others.map((it) => causeText(it, safety, t)).join(" ")}` : "",
+    others.length ? t("also_latched", others.map((it) => causeText(it, safety, t)).join(gap(language))) : "",
     safety.latched.length && !isDriver && fast.driver.may ? t("take_to_reset") : "",
-    root ? `${t("next_step")} ${doctor}` : "",
-  ].filter(Boolean).join(" ");
+    root ? t("next_step", doctor) : "",
+  ].filter(Boolean).join(gap(language));
 }
 
 /** Return the next step that safety accepts: while the bumper is pressed, a reset clears the other causes only. */
@@ -70,21 +68,11 @@ const RESET_REFUSALS = { "": "nothing_latched", release: "reset_pressed", by_han
 /** Return why safety would refuse a reset, as a key; empty if it does not. */
 export const resetRefusal = (fast) => (fast?.connected ? RESET_REFUSALS[nextStep(fast)] ?? "" : "no_router");
 
-// What is due before driving, at a latched cause.
-function due(fast) {
-  const { safety, bumper } = fast;
-  const step = nextStep(fast);
-  if (step === "by_hand" || (bumper && safety.release && isUsedUp(safety.release))) return "release_by_hand";
-  if (step === "release") return "release_due";
-  return bumper && safety.release ? "reset_first" : "reset_due";
-}
-
-function sentence({ fast, t, language }, worst) {
-  const { safety } = fast;
+function sentence({ fast, t, language, isDriver }) {
   if (rootText(fast, t)) return t("root.may_move");
-  if (language === "en") return safety.text;
-  if (!worst) return translated(safety.text, language); // the source in control
-  return causeText(worst, safety, t) + (safety.latched.includes(worst.name) ? t(due(fast)) : "");
+  const { text, source } = fast.safety;
+  const isOwn = isDriver && !fast.driver.other;
+  return translated(isOwn ? text.replace(`${source} is in control.`, "You are in control.") : text, language);
 }
 
 function showHead(view) {
@@ -95,21 +83,21 @@ function showHead(view) {
   chip("driver", off ? "" : driver(view), isDriver && !fast.driver.other ? "clear" : "slow");
   const keeper = off || !keepsAlive ? "" : fast.keeper === viewer ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
-  chip("watching", off || !view.viewers ? "" : `${view.viewers} ${t("watching")}`);
+  chip("watching", off || !view.viewers ? "" : t("watching", view.viewers));
 }
 
-/** The viewer that has control, by its number. */
-export const driverName = (fast, t) => `${t("viewer")} ${fast?.driver.id ?? ""}`.trim();
+/** The viewer that has control, by its name or its number. */
+export const driverName = (fast, t) => fast?.driver.name || t("viewer", fast?.driver.id ?? "");
 
 function driver(view) {
   const { fast, t, isDriver } = view;
   const { id, may, other, overruled } = fast.driver;
   if (!may) return t("view_only");
-  if (isDriver && overruled) return `${t("overruled_by")} ${other}`;
-  if (isDriver) return other ? `${other} ${t("drives")}` : t("you_drive");
-  if (id) return `${driverName(fast, t)} ${t("drives")}`;
+  if (isDriver && overruled) return t("overruled_by", other);
+  if (isDriver) return other ? t("drives", other) : t("you_drive");
+  if (id) return t("drives", driverName(fast, t));
   const source = fast.safety?.source;
-  return source ? `${source} ${t("drives")}` : t("nobody_drives");
+  return source ? t("drives", source) : t("nobody_drives");
 }
 
 function chip(id, text, tone = "") {

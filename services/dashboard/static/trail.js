@@ -62,7 +62,7 @@ function grid(pen, width, height, screen, color) {
   }
   for (let y = Math.ceil(low / every) * every; y < low + height / scale; y += every) {
     line(pen, 0, screen([0, y])[1], width, screen([0, y])[1]);
-    pen.fillText(`${text(y)} m`, 3, screen([0, y])[1] - 3);
+    if (screen([0, y])[1] < height - 16) pen.fillText(`${text(y)} m`, 3, screen([0, y])[1] - 3); // above those of x
   }
 }
 
