@@ -245,6 +245,18 @@ class Log(Section, frozen=True, kw_only=True):
     format: Literal["auto", "text", "json"] = "auto"  # auto: text on a terminal, JSON otherwise
 
 
+# What a sonar's name says must stay seen, so its place and direction may differ by this much.
+MAX_SHIFT_M, MAX_AVERT = 0.3, 0.35  # m, rad
+
+
+class Place(Section, frozen=True, kw_only=True):
+    """Position (m) and direction (rad) of a sonar in ``base_link``."""
+
+    x: float
+    y: float
+    yaw: float
+
+
 class Vehicle(Section, frozen=True, kw_only=True):
     """Dimensions of the vehicle; the manual gives none, so measure yours.
 
@@ -257,6 +269,15 @@ class Vehicle(Section, frozen=True, kw_only=True):
     track: Annotated[float, Meta(ge=0.1, le=3.0)] = 0.56  # m, left wheels to right wheels
     sonar_min: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05  # m, nearer cannot be measured
     sonar_max: Annotated[float, Meta(ge=0.5, le=20.0)] = 5.0  # m, farther gives no echo
+    # where a sonar is, if not on the hull: front = { x = 0.5, y = 0.0, yaw = 0.0 }, m and rad
+    sonars: dict[str, Place] = msgspec.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        usual = {mount.name: mount for mount in _on_the_hull(self)}
+        if unknown := sorted(self.sonars.keys() - usual):
+            raise ValueError(f"sonars names {unknown[0]!r}, allowed are {', '.join(usual)}")
+        for mount in sonar_mounts(self):
+            _check_place(mount, usual[mount.name], self)
 
 
 class Mount(Struct, frozen=True):
@@ -270,6 +291,39 @@ class Mount(Struct, frozen=True):
 
 def sonar_mounts(vehicle: Vehicle) -> tuple[Mount, ...]:
     """Return the eight sonars in the manual's order, clockwise from the left (manual 2.3)."""
+    return tuple(
+        Mount(usual.name, place.x, place.y, place.yaw)
+        if (place := vehicle.sonars.get(usual.name))
+        else usual
+        for usual in _on_the_hull(vehicle)
+    )
+
+
+def recess(mount: Mount, vehicle: Vehicle) -> float:
+    """Return the distance (m) from a sonar along its axis to the hull: a reading has no room there.
+
+    Negative outside of the hull.
+    """
+    axis = math.cos(mount.yaw), math.sin(mount.yaw)
+    sides = (vehicle.length / 2, mount.x, axis[0]), (vehicle.width / 2, mount.y, axis[1])
+    return min((math.copysign(half, way) - at) / way for half, at, way in sides if way)
+
+
+def _check_place(mount: Mount, usual: Mount, vehicle: Vehicle) -> None:
+    is_inside = abs(mount.x) <= vehicle.length / 2 and abs(mount.y) <= vehicle.width / 2
+    if not is_inside or math.dist((mount.x, mount.y), (usual.x, usual.y)) > MAX_SHIFT_M:
+        raise ValueError(
+            f"sonars.{mount.name} is at ({mount.x:g}, {mount.y:g}), allowed are places in the hull "
+            f"(length, width) at most {MAX_SHIFT_M:g} m from ({usual.x:g}, {usual.y:g})"
+        )
+    if not math.cos(mount.yaw - usual.yaw) >= math.cos(MAX_AVERT):
+        raise ValueError(
+            f"sonars.{mount.name}.yaw is {mount.yaw:g}, allowed is {usual.yaw - MAX_AVERT:.2f} to "
+            f"{usual.yaw + MAX_AVERT:.2f} rad"
+        )
+
+
+def _on_the_hull(vehicle: Vehicle) -> tuple[Mount, ...]:
     front, left = vehicle.length / 2, vehicle.width / 2
     degrees = math.radians
     return (

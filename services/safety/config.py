@@ -168,7 +168,10 @@ class SafetyConfig(settings.Shared, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         # Space beyond ``sonar_max`` counts as free, so the vehicle must be able to stop within it.
-        one, range_m = self.safety, self.vehicle.sonar_max
+        deepest = max(
+            settings.recess(each, self.vehicle) for each in settings.sonar_mounts(self.vehicle)
+        )
+        one, range_m = self.safety, self.vehicle.sonar_max - deepest
         needed = (
             one.margin + one.reaction * one.max_linear + one.max_linear**2 / one.deceleration / 2
         )

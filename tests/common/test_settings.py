@@ -14,6 +14,7 @@ from common.settings import (
     ProtectedSection,
     Robot,
     Vehicle,
+    recess,
     sonar_mounts,
 )
 
@@ -159,3 +160,47 @@ def test_sonars_are_on_the_edge_clockwise_from_the_left_and_look_outward() -> No
         assert mount.x * math.cos(mount.yaw) + mount.y * math.sin(mount.yaw) > 0
         assert ("left" in mount.name) == (mount.y > 0)
         assert ("front" in mount.name) == (mount.x > 0)
+        assert recess(mount, Vehicle(length=2.0, width=1.0)) == 0.0
+
+
+def place(name: str, x: float, y: float, degrees: float = 0.0) -> dict[str, object]:
+    return {"sonars": {name: {"x": x, "y": y, "yaw": math.radians(degrees)}}}
+
+
+@pytest.mark.parametrize(
+    ("given", "depth"),
+    [
+        (place("front", 0.50, 0.1), 0.05),
+        (place("front", 0.45, 0.0, 20), 0.1 / math.cos(math.radians(20))),
+        (place("left", 0.1, 0.25, 90), 0.1),
+        (place("rear_right", -0.55, -0.25, -135), 0.0),  # on the end, looking past it
+        (place("rear_left", -0.50, 0.25, 135), 0.05 * math.sqrt(2)),
+    ],
+)
+def test_a_sonar_in_the_hull_has_no_room_up_to_it(given: dict[str, object], depth: float) -> None:
+    vehicle = msgspec.convert(given, Vehicle)
+    mounts = {mount.name: mount for mount in sonar_mounts(vehicle)}
+    assert tuple(mounts) == SONAR_NAMES
+    (name,) = vehicle.sonars
+    assert recess(mounts.pop(name), vehicle) == pytest.approx(depth, abs=1e-9)
+    assert tuple(mounts.values()) == tuple(m for m in sonar_mounts(Vehicle()) if m.name != name)
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        (place("nose", 0.5, 0.0), "sonars names 'nose', allowed are left, front_left, front,"),
+        (place("front", 0.56, 0.0), r"sonars.front is at \(0.56, 0\), allowed are places in the"),
+        (place("front", 0.24, 0.0), r"at most 0.3 m from \(0.55, 0\)"),
+        (place("front", 0.5, math.nan), "sonars.front is at"),
+        (
+            place("front", 0.5, 0.0, 21),
+            "sonars.front.yaw is 0.366519, allowed is -0.35 to 0.35 rad",
+        ),
+        (place("rear", -0.5, 0.0), "sonars.rear.yaw"),
+        (place("rear", -0.5, 0.0, math.nan), "sonars.rear.yaw"),
+    ],
+)
+def test_a_sonar_must_see_what_its_name_says(given: dict[str, object], sentence: str) -> None:
+    with pytest.raises(msgspec.ValidationError, match=sentence):
+        msgspec.convert(given, Vehicle)

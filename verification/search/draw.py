@@ -11,9 +11,10 @@ from pathlib import Path
 
 import msgspec
 from msgspec import Struct
+from msgspec.structs import replace
 
 from common.config import Setting, build
-from common.settings import Vehicle
+from common.settings import Place, Vehicle, sonar_mounts
 from sim.geometry import Rectangle
 from sim.model import Model
 from sim.world import Box, Plan, Spot, Wall, World
@@ -67,7 +68,22 @@ class Draw(Struct, frozen=True):
         """Return the simulated vehicle."""
         own = {name: value for name, value in self.values.items() if name.startswith(SIM)}
         given = {name.removeprefix(SIM): Setting(value, name) for name, value in own.items()}
-        return build(Model, given)
+        made = build(Model, given)
+        recess, aim = (float(self.get(f"vehicle.{name}", 0.0)) for name in ("recess", "aim"))
+        return replace(made, vehicle=mounted(made.vehicle, recess, aim))
+
+
+def mounted(vehicle: Vehicle, recess: float, aim: float) -> Vehicle:
+    """Return the vehicle with its sonars so deep in the hull (m), and turned (rad)."""
+    places = {
+        one.name: Place(
+            x=one.x - math.cos(one.yaw) * recess,
+            y=one.y - math.sin(one.yaw) * recess,
+            yaw=one.yaw + aim,
+        )
+        for one in sonar_mounts(vehicle)
+    }
+    return replace(vehicle, sonars=places) if recess or aim else vehicle
 
 
 @cache

@@ -6,6 +6,8 @@ from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
 
+from msgspec.structs import replace
+
 from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
@@ -131,6 +133,7 @@ class Stack:
             self.oracle.slack_ns += 150 * MS if line.drop or line.corrupt else 0
         self.vehicle = Vehicle(self.net, model, plan, seed)
         self._step_ns = step_ns
+        self._body = model.vehicle
         self._boots = 1000
         self._brake_ns = 0  # when the guard brakes next
         self._starts: dict[str, int] = {}
@@ -192,7 +195,10 @@ class Stack:
     def process(self, name: str) -> Process:
         """Return a new process on the bus."""
         self._boots += 1
-        return Process(name, self.net, CONFIGS.get(name), self._boots, self.oracle)
+        config = CONFIGS.get(name)
+        if isinstance(config, SafetyConfig):
+            config = replace(config, vehicle=self._body)
+        return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
         process: Any = self.process(name)

@@ -38,7 +38,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 from common.motion import STILL, Twist
-from common.settings import Mount, Vehicle, sonar_mounts
+from common.settings import Mount, Vehicle, recess, sonar_mounts
 from services.safety.core.causes import Token
 
 FARTHER_SAMPLES = 3
@@ -74,6 +74,7 @@ class Axis(Struct, frozen=True):
     linear: float
     angular: float
     swing: float = 0.0  # m from the middle to the corner that swings out to its side; 0 without one
+    recess: float = 0.0  # m from the sonar to the hull, in which a reading is no room
 
     def along(self, twist: Twist) -> float:
         """Return the speed (m/s) of the sonar along its axis."""
@@ -87,13 +88,13 @@ class Axis(Struct, frozen=True):
 
 def axes(vehicle: Vehicle) -> tuple[Axis, ...]:
     """Return the axes of a vehicle's sonars, in the manual's order."""
-    return tuple(_axis(mount, vehicle.length / 2) for mount in sonar_mounts(vehicle))
+    return tuple(_axis(mount, vehicle) for mount in sonar_mounts(vehicle))
 
 
-def _axis(mount: Mount, corner: float) -> Axis:
+def _axis(mount: Mount, vehicle: Vehicle) -> Axis:
     along, across = math.cos(mount.yaw), math.sin(mount.yaw)
-    flank = mount.name in ("left", "right")
-    return Axis(along, mount.x * across - mount.y * along, corner if flank else 0.0)
+    swing = vehicle.length / 2 if mount.name in ("left", "right") else 0.0
+    return Axis(along, mount.x * across - mount.y * along, swing, recess(mount, vehicle))
 
 
 class Sonar(Struct, frozen=True):
@@ -296,18 +297,18 @@ class SonarFilter(Struct, frozen=True):
         moved = STILL if measured is None or measured.is_standing else measured
         step_s = min((latest.received_ns - array.at_ns) / NS_PER_S, LONGEST_STEP_S)
         # 3 equivalent mutants: both have a row for each sonar.
-        distances, faults = zip(*map(trusted, sample.ranges, sample.status), strict=True)
-        saturation = array.saturation.updated(distances)
+        readings, faults = zip(*map(trusted, sample.ranges, sample.status), strict=True)
+        saturation = array.saturation.updated(readings)
         sonars = tuple(
             updated(
                 sonar,
-                distances[n],
+                max(0.0, readings[n] - self.axes[n].recess),
                 faults[n],
                 Moved(
                     along=self.axes[n].along(moved) * step_s,
                     turn=moved.angular * step_s,
-                    beyond=saturation.explains(distances[n]),
-                    alongside=_is_alongside(n, distances),
+                    beyond=saturation.explains(readings[n]),
+                    alongside=_is_alongside(n, readings),
                 ),
             )
             for n, sonar in enumerate(array.sonars)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S, Latest
 from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 from common.motion import Twist
-from common.settings import Vehicle
+from common.settings import Place, Vehicle
 from services.safety.core.sonars import (
     SHARED_SAMPLES,
     SHOWN_NS,
@@ -213,6 +213,19 @@ def doubts(array: SonarArray) -> str:
     text = _doubts(array.sonars)
     assert bool(text) == array.is_doubted
     return text
+
+
+@pytest.mark.parametrize(("reading", "room"), [(1.0, 0.9), (0.08, 0.0), (math.inf, math.inf)])
+def test_a_reading_is_no_room_up_to_the_hull(reading: float, room: float) -> None:
+    deep = Vehicle(sonars={"front": Place(x=0.45, y=0.0, yaw=0.0)})
+    made, array = SonarFilter(axes(deep), age_s=0.3), SonarArray()
+    read = {} if math.isinf(reading) else {"front": reading, "rear": reading}
+    for seq in range(1, 4):
+        array = made.update(array, sample(seq, **read), Twist(), seq * STEP_NS)
+    front, rear = (array.sonars[SONAR_NAMES.index(name)] for name in ("front", "rear"))
+    assert front.distance == pytest.approx(room)
+    assert rear.distance == reading
+    assert not front.fault
 
 
 def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> None:
