@@ -122,6 +122,8 @@ def test_without_a_board_the_page_names_the_own_switch(page: Page, stack: Runnin
     wait_for_text(page, "#detail", "The board is silent")
     page.wait_for_selector("#take:disabled")
     wait_for_text(page, "#link", "Board: up")
+    take_control(page)
+    reset_all(page)
 
 
 def test_driving_by_touch_and_a_second_finger_stops(

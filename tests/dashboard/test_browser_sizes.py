@@ -28,6 +28,9 @@ BOX = """where => {
   return [it.left, it.top, it.right, it.bottom];
 }"""
 
+CUT = """[...document.querySelectorAll('.chip:not(#driver)')]
+  .filter((it) => it.scrollWidth > it.clientWidth).map((it) => it.textContent)"""
+
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
@@ -71,6 +74,7 @@ def problems(page: Page, width: int, height: int, needed: Sequence[str]) -> list
     ]
     if page.evaluate("document.documentElement.scrollWidth") > width:
         found.append("it scrolls sideways")
+    found += [f"{chip} is cut" for chip in page.evaluate(CUT)]
     page.evaluate("scrollTo(0, 400)")
     page.wait_for_timeout(100)
     for where in ("#estop", "#verdict"):
@@ -142,7 +146,9 @@ def test_a_driver_sees_everything(
     assert page.get_attribute("#reset", "title") == page.text_content("#release-forbidden")
     page.click("#estop")
     wait_for_text(page, "#detail", "Also latched" if language == "en" else "同时锁定")
-    found |= on_all_screens(page, tmp_path, f"contact-{language}", notices=True)
+    found |= on_all_screens(
+        page, tmp_path, f"contact-{language}", (*NEEDED, "#reset"), notices=True
+    )
     stack.control.do(Bumper(pressed=False))
     page.set_viewport_size({"width": 1440, "height": 900})
     reset_all(page)
