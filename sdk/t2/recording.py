@@ -1,15 +1,15 @@
 """Recordings of T2: the messages of an MCAP file. Needs the extra ``recording`` of t2-sdk."""
 
-import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 
 from t2.errors import T2Error
 from t2.messages import ROOT, TOPICS, Message
 
+MAGIC = b"\x89MCAP0\r\n"  # at the beginning of each file
 KINDS = {kind.__name__: kind for _, kind in TOPICS.values()}
 
 
@@ -38,38 +38,30 @@ class Recording:
 
     def __iter__(self) -> Iterator[Entry]:
         try:
-            from mcap.exceptions import McapError
+            from mcap.stream_reader import StreamReader
         except ImportError as error:
             raise T2Error(f"a recording needs the extra [recording] of t2-sdk: {error}") from error
-        has_begun = self.is_cut = False
+        self.is_cut = False
         try:
             with self.path.open("rb") as file:
-                for entry in entries(file):
-                    has_begun = True
-                    yield entry
+                if file.read(len(MAGIC)) != MAGIC:
+                    raise T2Error(f"{self.path} is not a recording of T2")
+                yield from entries(StreamReader(file, skip_magic=True).records)
+        except T2Error:
+            raise
         except OSError as error:
             raise T2Error(f"{self.path}: cannot be read: {error.strerror}") from error
-        except (
-            McapError,
-            struct.error,
-            msgspec.MsgspecError,
-            ValueError,
-            EOFError,
-            KeyError,
-        ) as error:
-            if not has_begun:
-                raise T2Error(f"{self.path}: is not a recording of T2: {error}") from error
+        except Exception:  # of many types: the reader of MCAP takes damaged data for valid
             self.is_cut = True
 
 
-def entries(file: BinaryIO) -> Iterator[Entry]:
+def entries(records: Iterable[Any]) -> Iterator[Entry]:
     """Yield the messages of the bus, without the views for Foxglove."""
     from mcap.records import Channel
     from mcap.records import Message as Record
-    from mcap.stream_reader import StreamReader
 
     channels: dict[int, Channel] = {}
-    for record in StreamReader(file).records:
+    for record in records:
         if isinstance(record, Channel):
             channels[record.id] = record
         elif isinstance(record, Record):

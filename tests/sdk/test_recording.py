@@ -46,6 +46,22 @@ def test_a_truncated_recording_is_read_up_to_its_end(path: Path) -> None:
     assert recording.is_cut
 
 
+def test_a_damaged_recording_is_cut(path: Path) -> None:
+    data = path.read_bytes()
+    for at in range(8, len(data), 7):
+        path.write_bytes(data[:at] + b"\xff" + data[at + 1 :])
+        assert len(list(t2.Recording(path))) <= 4
+
+
+def test_a_recording_without_a_whole_message_is_cut(path: Path) -> None:
+    begin = path.read_bytes()[:200]
+    for size in range(8, len(begin)):
+        path.write_bytes(begin[:size])
+        recording = t2.Recording(path)
+        assert not list(recording)
+        assert recording.is_cut
+
+
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     with pytest.raises(t2.T2Error, match="cannot be read"):
         list(t2.Recording(tmp_path / "none.mcap"))
