@@ -15,7 +15,8 @@ from t2.stream import CONNECTED, check_process, robots_of
 
 LOCAL = "tcp/127.0.0.1:7447"
 SOURCE_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")  # in Zenoh's errors
-SCHEMES = ("tcp/", "tls/", "unixsock-stream/")
+ROBOT = re.compile(r"[^/*$#?]*")
+ENDPOINT = re.compile(r"(tcp|tls)/[^/\s]+:\d+([?#]\S*)?|unixsock-stream/\S+")
 TIMEOUT_MS = 3_000
 MAX_MESSAGE = 8 * 2**20  # larger ones are dropped; the messages of T2 are far smaller
 FILES = {
@@ -36,7 +37,7 @@ def connect(robot: str = "", *, endpoint: str = "", config: str | Path | None = 
     ...     print(robot.bumper.latest().pressed)
     False
     """
-    if set(robot) & set("/*$#?"):
+    if not ROBOT.fullmatch(robot):
         raise LinkError(f"{robot!r} is not the id of one robot, such as 001")
     session, address = open_session(endpoint, config)
     return Robot(session, robot or only_robot(session, address), address)
@@ -70,9 +71,8 @@ def open_session(endpoint: str, config: str | Path | None) -> tuple[zenoh.Sessio
     CONNECTED.add(os.getpid())
     addresses = [endpoint] if endpoint else bus.get("connect") or [LOCAL]
     for address in addresses:
-        if not address.startswith(SCHEMES):
-            known = ", ".join(SCHEMES)
-            raise LinkError(f"{address!r} needs a protocol of {known}: {SCHEMES[0]}{address}")
+        if not ENDPOINT.fullmatch(address):
+            raise LinkError(f"{address!r} is no endpoint, such as {LOCAL} or tls/ROBOT:7447")
     try:
         made = zenoh.open(zenoh.Config.from_json5(json.dumps(settings(addresses, bus))))
     except zenoh.ZError as error:

@@ -333,14 +333,9 @@ class Drive:
             if is_answer and state.source == self.source and not is_stopped(state):
                 return
             time.sleep(PERIOD_S)
-        if state.source not in (None, self.source):
-            raise Overruled(str(state.source))
         if state.source == self.source:
             raise Stopped(state.text, state.causes)
-        raise NotAllowed(
-            f"safety takes no requests of {self.source!r}: is it one of safety.sources? "
-            f"Safety's state: {state.text} See `t2 doctor`"
-        )
+        raise ignored(self.source, state)
 
     def _run(self) -> None:
         try:
@@ -377,10 +372,7 @@ class Drive:
         if stop := self._stop_of(target):
             return stop
         if self._publisher.denied:
-            return NotAllowed(
-                f"the router drops the requests of {self.source!r}: this certificate may not drive "
-                f"robot {self._robot.name} as this source; see `t2 keys list`"
-            )
+            return dropped(self.source, self._robot.name)
         if self._contest.is_lost:
             return Overruled(str(self._contest.other))
         return None
@@ -399,6 +391,24 @@ class Drive:
         if target.on_stop == "wait" and now_s - self._obeyed_s < WAIT_S:
             return None
         return Stopped(f"{state.text} Open another drive to go on.", state.causes)
+
+
+def ignored(source: str, state: SafetyState) -> T2Error:
+    """Return why safety, in this state, does not follow a source that sends requests."""
+    if state.source is not None:
+        return Overruled(state.source)
+    return NotAllowed(
+        f"safety takes no requests of {source!r}: is it one of safety.sources? "
+        f"Safety's state: {state.text} See `t2 doctor`"
+    )
+
+
+def dropped(source: str, robot: str) -> NotAllowed:
+    """Return the error of a source whose requests do not pass the router."""
+    return NotAllowed(
+        f"the router drops the requests of {source!r}: this certificate may not drive robot "
+        f"{robot} as this source (`t2 keys list`), or the robot's safety.sources lacks it"
+    )
 
 
 def is_stopped(state: SafetyState) -> bool:

@@ -10,7 +10,7 @@ class T2Error(Exception):
 
 
 class LinkError(T2Error):
-    """No router answers, or the settings of the connection are invalid."""
+    """No router answers, its settings are invalid, or the robot was closed."""
 
 
 class NoData(T2Error):
@@ -18,7 +18,7 @@ class NoData(T2Error):
 
 
 class NotAllowed(T2Error):
-    """The router drops what we send, or safety does not know our source."""
+    """The router drops our requests or calls, or safety does not know our source."""
 
 
 class NotConfirmed(T2Error):

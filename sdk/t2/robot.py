@@ -1,5 +1,6 @@
 """One robot: its streams, its calls, and what may be sent to it."""
 
+import re
 import threading
 import time
 from typing import Any, TypeVar
@@ -16,12 +17,12 @@ from t2.client import (
     request,
     reset_request,
 )
-from t2.drive import Drive
-from t2.errors import NoData, NotAllowed, NotConfirmed, Refused
+from t2.drive import Drive, dropped, ignored
+from t2.errors import NoData, NotAllowed, NotConfirmed, Refused, T2Error
 from t2.messages import ROOT, TOPICS
-from t2.motion import finite
+from t2.motion import check_word, finite
 from t2.publisher import PERIOD_S, DrivePublisher
-from t2.stream import Stream, check_process
+from t2.stream import LIVE_S, Stream, check_process
 from t2.third_party import Keepalive, SpeedLimit
 
 A = TypeVar("A", bound=msgspec.Struct)
@@ -29,7 +30,9 @@ R = TypeVar("R", bound="Robot")
 
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
+MATCH_S = 1.0  # until the router has announced the service
 STANDSTILL_S = 2.0  # a release is refused until the vehicle stands
+SOURCE = re.compile("[a-z][a-z0-9_-]{0,31}")
 SWITCH = "use the vehicle's own switch"
 
 
@@ -94,7 +97,7 @@ class Robot:
         ``safety.sources`` lists the sources with their priorities.
         """
         self._drives = [each for each in self._drives if each.is_open]
-        drive = Drive(self._session, self._key("drive", source=source), source, self)
+        drive = Drive(self._session, self._source_key("drive", source), source, self)
         self._drives.append(drive)
         return drive
 
@@ -116,7 +119,7 @@ class Robot:
         ``TypeError``, and ``NoData`` without safety.
         """
         if source not in self._limits or self._limits[source].has_ended:
-            key = self._key("limit", source=source)
+            key = self._source_key("limit", source)
             self._limits[source] = SpeedLimit(self._session, key, source, self.safety)
         self._limits[source].set(linear, angular, reason, seconds=seconds)
         return self._limits[source]
@@ -130,7 +133,7 @@ class Robot:
         ``safety.estop_keepalive`` must list the name. Raises as ``limit``.
         """
         if source not in self._keepalives or self._keepalives[source].has_ended:
-            key = self._key("estop_keepalive", source=source)
+            key = self._source_key("estop_keepalive", source)
             self._keepalives[source] = Keepalive(self._session, key, source, self.safety)
         self._keepalives[source].renew(seconds=seconds)
         return self._keepalives[source]
@@ -158,7 +161,7 @@ class Robot:
 
     def put_estop(self) -> None:
         """Send one emergency stop, without waiting for safety; ``estop`` confirms it."""
-        check_process()
+        self.safety.check()
         self._session.put(
             f"{ROOT}/{self.name}/estop",
             b"",
@@ -195,13 +198,13 @@ class Robot:
         As an operator who holds a release as this source, which needs ``operator`` in
         ``safety.sources``: at most 0.1 m/s and 0.15 m, and ``contact`` stays latched until
         ``reset``. Know which direction is free: the bumper has none. Another thread may end it
-        with ``ended``. Raises ``Refused`` with the
-        reason, ``NotAllowed``, ``NotConfirmed`` after ``timeout`` s, and ``NoData``.
+        with ``ended``. Raises ``Refused`` with the reason, ``NotAllowed``, ``Overruled``,
+        ``NotConfirmed`` after ``timeout`` s, ``NoData``, and ``ValueError``.
         """
-        publisher = DrivePublisher(self._session, self._key("drive", source=source), self.safety)
-        self.safety.latest()
+        check_word(direction, m.Direction)
+        publisher = DrivePublisher(self._session, self._source_key("drive", source), self.safety)
+        begin_s, is_known = time.monotonic(), False
         try:
-            begin_s = time.monotonic()
             while (passed_s := time.monotonic() - begin_s) < timeout:
                 if ended is not None and ended.is_set():
                     break
@@ -209,9 +212,10 @@ class Robot:
                 if not self.bumper.latest().pressed:
                     return
                 if publisher.denied:
-                    raise NotAllowed(
-                        f"the router drops the requests of {source!r}; see `t2 keys list`"
-                    )
+                    raise dropped(source, self.name)
+                is_known = is_known or state.source == source
+                if passed_s > STANDSTILL_S and not is_known:
+                    raise ignored(source, state)
                 is_refused = state.source == source and bool(state.release_refusal)
                 if is_refused and passed_s > STANDSTILL_S:
                     raise Refused(state.release_refusal)
@@ -239,7 +243,7 @@ class Robot:
         self._call("srv/odom/reset", request, m.Done)
 
     def _call(self, path: str, request: msgspec.Struct, reply: type[A]) -> A:
-        check_process()
+        self.safety.check()
         key = f"{ROOT}/{self.name}/{path}"
         payload = msgspec.msgpack.encode(request)
         for answer in self._session.get(
@@ -250,16 +254,39 @@ class Robot:
             text = answer.err.payload.to_bytes().decode(errors="replace") if answer.err else ""
             if text != "Timeout":  # Zenoh's own
                 raise Refused(text)
-        raise NoData(
-            f"no answer from {key} within {CALL_S:g} s: its service is not running, or this "
-            "certificate may not call it; see `t2 doctor`"
-        )
+        raise self._unanswered(key, path.split("/")[1])
+
+    def _unanswered(self, key: str, service: str) -> T2Error:
+        """Return why: the router announces no queryable to a certificate that may not call it."""
+        querier: Any = self._session.declare_querier(key)
+        token = f"{ROOT}/{self.name}/live/{service}/*"
+        found = self._session.liveliness().get(token, timeout=LIVE_S)
+        runs = any(it.ok is not None for it in found)
+        end_s = time.monotonic() + MATCH_S
+        while not querier.matching_status.matching and time.monotonic() < end_s:
+            time.sleep(PERIOD_S)
+        is_barred = runs and not querier.matching_status.matching
+        querier.undeclare()
+        if is_barred:
+            return NotAllowed(
+                f"no answer from {service}, though it runs: this certificate may not call it; "
+                "see `t2 keys list`"
+            )
+        return NoData(f"no answer from {key}: is {service} running? `t2 doctor` finds the reason")
 
     def _stream(self, name: str, depth: int = 1, **names: str) -> Stream[Any]:
         kind = TOPICS[name][1]
         made: Stream[Any] = Stream(self._session, self._key(name, **names), kind, name, depth)
         self._streams.append(made)
         return made
+
+    def _source_key(self, name: str, source: str) -> str:
+        if not SOURCE.fullmatch(source):
+            raise NotAllowed(
+                f"{source!r} cannot be a source: its name has 1 to 32 characters of a-z, 0-9, _ "
+                "and -, and begins with a letter"
+            )
+        return self._key(name, source=source)
 
     def _key(self, name: str, **names: str) -> str:
         return f"{ROOT}/{self.name}/{TOPICS[name][0].format(**names)}"

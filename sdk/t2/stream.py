@@ -88,6 +88,7 @@ class Stream(Generic[M]):
             self._changed.wait_for(lambda: self.closed or self.age <= timeout, timeout)
             if self._newest is not None and self.age <= timeout:
                 return self._newest
+        self.check()  # closed meanwhile
         raise NoData(f"no {self._what} within {timeout:g} s on {self.key}: {self._advice()}")
 
     def on(self, handle: Callable[[M], object]) -> "Subscription":
@@ -124,11 +125,17 @@ class Stream(Generic[M]):
             self._changed.wait_for(lambda: queue or self.closed, timeout)
             return queue.popleft() if queue else None
 
+    def check(self) -> None:
+        """Raise ``LinkError`` after the robot's ``close``, and in a fork."""
+        check_process()
+        if self.closed:
+            raise LinkError("the robot was closed; connect again")
+
     def open(self) -> None:
         """Subscribe, once."""
-        check_process()
+        self.check()
         with self._changed:
-            if self._subscriber is None and not self.closed:
+            if self._subscriber is None:
                 self._subscriber = self._session.declare_subscriber(self.key, self._on_sample)
 
     def close(self) -> None:
@@ -140,10 +147,7 @@ class Stream(Generic[M]):
     def _advice(self) -> str:
         """Return what to do about silence; another robot's name is a frequent reason."""
         mine = self.key[len(ROOT) + 1 :].partition("/")[0]
-        try:
-            names = robots_of(self._session)
-        except zenoh.ZError:  # the session is closed
-            return ADVICE
+        names = robots_of(self._session)
         if not names or mine in names:
             return ADVICE
         return f"no robot {mine} at this router, which has {', '.join(names)}"

@@ -174,7 +174,7 @@ def test_a_motion_that_is_held_up_requests_zero_and_goes_on(
     hold_up(wait)
     start = robot.odometry.latest()
     with robot.drive("nav") as drive:
-        end = drive.forward(0.6)
+        end = drive.forward(0.6, on_stop="wait")
     assert math.dist((start.x, start.y), (end.x, end.y)) == pytest.approx(0.6, abs=0.1)
 
 
@@ -232,6 +232,11 @@ def test_a_release_creeps_until_the_bumper_is_free(robot: t2.Robot, stack: Runni
         robot.reset()
     with pytest.raises(t2.Refused, match="operator"):
         robot.release("forward", "nav", timeout=30.0)
+    with pytest.raises(t2.NotAllowed, match=r"'stranger'.*safety\.sources"):
+        robot.release("forward", "stranger", timeout=30.0)
+    word: Any = "up"
+    with pytest.raises(ValueError, match="'up' is not one of forward, backward"):
+        robot.release(word, "teleop")
     with pytest.raises(t2.NotConfirmed, match=r"still pressed after 0\.3 s"):
         robot.release("backward", "teleop", timeout=0.3)
     freeing = threading.Thread(target=free)
@@ -308,6 +313,42 @@ def test_unknown_names_are_refused_with_the_known_ones(
         robot.drive("stranger"),
     ):
         pass
+
+
+@pytest.mark.parametrize("name", ["", "*", "a/b", "Nav"])
+def test_what_cannot_be_a_source_is_refused(robot: t2.Robot, name: str) -> None:
+    for use in (
+        lambda: robot.drive(name),
+        lambda: robot.limit(name, seconds=1),
+        lambda: robot.keepalive(name, seconds=1),
+        lambda: robot.release("forward", name),
+    ):
+        with pytest.raises(t2.NotAllowed, match="cannot be a source"):
+            use()
+
+
+def test_a_closed_robot_is_named(stack: RunningStack) -> None:
+    with t2.connect("001", endpoint=stack.endpoint) as robot:
+        robot.odometry.latest(timeout=20.0)
+        drive = robot.drive("nav")
+    with pytest.raises(t2.T2Error, match="is closed"), drive:
+        pass
+    for use in (
+        robot.estop,
+        robot.reset,
+        robot.set_pose,
+        lambda: robot.led(channel=1, mode=1),
+        lambda: robot.drive("nav"),
+        lambda: robot.limit("detector", seconds=1),
+        lambda: robot.keepalive("pendant", seconds=1),
+        lambda: robot.release("forward", "teleop"),
+        robot.odometry.latest,
+        lambda: robot.odometry.on(print),
+        lambda: list(robot.odometry),
+    ):
+        with pytest.raises(t2.LinkError, match="was closed"):
+            use()
+    robot.close()
 
 
 def test_another_source_of_higher_priority_overrules(robot: t2.Robot, stack: RunningStack) -> None:

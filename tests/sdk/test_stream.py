@@ -10,7 +10,7 @@ import zenoh
 
 import t2
 from common.bus.session import client_config
-from t2.connection import LOCAL, settings
+from t2.connection import ENDPOINT, LOCAL, settings
 from t2.messages import Velocity
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
@@ -153,9 +153,23 @@ def test_an_id_may_be_left_out_with_one_robot(endpoint: str) -> None:
             t2.connect(endpoint=endpoint)
 
 
-def test_an_endpoint_needs_a_protocol_and_the_reason_of_zenoh_is_kept() -> None:
-    with pytest.raises(t2.LinkError, match=r"'robot:7447' needs a protocol.*: tcp/robot:7447"):
-        t2.connect("001", endpoint="robot:7447")
+@pytest.mark.parametrize(
+    "endpoint",
+    ["robot:7447", "tcp/robot", "udp/robot:7447", "http://robot:7447", "tcp/tls/robot:7447"],
+)
+def test_what_is_no_endpoint_is_refused(endpoint: str) -> None:
+    with pytest.raises(t2.LinkError, match=r"is no endpoint, such as tcp/127\.0\.0\.1:7447"):
+        t2.connect("001", endpoint=endpoint)
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["tcp/[::1]:7447", "tls/robot:7447#iface=eth0", "unixsock-stream//run/t2/bus.sock"]
+)
+def test_the_endpoints_of_zenoh_are_known(endpoint: str) -> None:
+    assert ENDPOINT.fullmatch(endpoint)
+
+
+def test_the_reason_of_zenoh_is_kept() -> None:
     with pytest.raises(t2.LinkError, match=r"Zenoh: [^/]*\[.*127\.0\.0\.1:9.*\]") as refused:
         t2.connect("001", endpoint="tcp/127.0.0.1:9")
     assert "/zenoh/src/" not in str(refused.value)
