@@ -38,7 +38,7 @@ class Simulator:
     """The simulated vehicle and its board: what happens to them. Raises ``Refused``.
 
     >>> with t2.sim() as robot:  # doctest: +SKIP
-    ...     robot.simulator.sonar("front", 0.3)
+    ...     robot.simulator.sonar("front", 0.15)
     ...     robot.simulator.press_bumper()
     """
 
@@ -54,7 +54,10 @@ class Simulator:
         self.do("bumper", pressed=False)
 
     def sonar(self, name: SonarName, distance: float | None = None, *, fault: bool = False) -> None:
-        """Let a sonar report a range in m, or a fault; without either it measures again."""
+        """Let a sonar report a range in m, or a fault; without either it measures again.
+
+        Safety takes a range that stays while the vehicle moves for a frozen sonar, not for a wall.
+        """
         self.do("sonar", name=name, range=distance, fault=fault)
 
     def freeze(self, seconds: float) -> None:
