@@ -88,7 +88,7 @@ def filled(call: Call[Any, Any], request: Request, seen: SafetyState) -> Request
         request["causes"] = list(reset_request(seen).causes)
         for cause in seen.causes:
             if cause.id in request["causes"]:
-                output.warn(f"t2 call: clears {cause.name}: {cause.text}")
+                output.warn(f"t2 call: asks to clear {cause.name}: {cause.text}")
     return request
 
 
