@@ -153,6 +153,7 @@ def simulated_robot(stack: SimulatedStack, patch: pytest.MonkeyPatch) -> t2.Robo
     )
     thread = SimpleNamespace(
         Event=threading.Event,
+        Lock=threading.Lock,
         Thread=lambda target, **_: SimulatedThread(stack, target),
     )
     patch.setattr(t2.drive, "threading", thread)
