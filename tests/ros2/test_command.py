@@ -455,8 +455,9 @@ def test_no_motion_before_a_pause_after_motion_that_was_barred(
         if lost > UNHEARD or (lost and moved_s[gid] > 0):
             moved_s[gid] = now_s
         decided = sender.send(now_s, motion=twist(speed), barred=barred)
+        paused[gid] = paused[gid] or now_s - moved_s[gid] > 0.49
         if speed:
-            paused[gid] = not barred and (paused[gid] or now_s - moved_s[gid] > 0.49)
+            paused[gid] = paused[gid] and not barred
             moved_s[gid] = now_s
         if decided == TAKEN:
             assert paused[gid]
