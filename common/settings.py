@@ -245,8 +245,8 @@ class Log(Section, frozen=True, kw_only=True):
     format: Literal["auto", "text", "json"] = "auto"  # auto: text on a terminal, JSON otherwise
 
 
-# What a sonar's name says must stay seen, so its place and direction may differ by this much.
-MAX_SHIFT_M, MAX_AVERT = 0.3, 0.35  # m, rad
+# What a sonar's name says must stay seen, and a wall alongside must be known as one.
+MAX_SHIFT_M, MAX_AVERT = 0.3, 0.15  # m, rad from the usual place
 
 
 class Place(Section, frozen=True, kw_only=True):
@@ -254,7 +254,7 @@ class Place(Section, frozen=True, kw_only=True):
 
     x: float
     y: float
-    yaw: float
+    yaw: Annotated[float, Meta(ge=-3.2, le=3.2)]
 
 
 class Vehicle(Section, frozen=True, kw_only=True):
@@ -300,10 +300,7 @@ def sonar_mounts(vehicle: Vehicle) -> tuple[Mount, ...]:
 
 
 def recess(mount: Mount, vehicle: Vehicle) -> float:
-    """Return the distance (m) from a sonar along its axis to the hull: a reading has no room there.
-
-    Negative outside of the hull.
-    """
+    """Return the distance (m) from a sonar along its axis to the hull: no room is there."""
     axis = math.cos(mount.yaw), math.sin(mount.yaw)
     sides = (vehicle.length / 2, mount.x, axis[0]), (vehicle.width / 2, mount.y, axis[1])
     return min((math.copysign(half, way) - at) / way for half, at, way in sides if way)

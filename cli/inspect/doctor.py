@@ -162,7 +162,8 @@ def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Obse
     if "safety" in seen.instances:
         seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
         seen.may_call = opened.has_server(keys.RESET.on(robot))
-        seen.may_stop = seen.may_drive or not is_barred(opened, robot)
+        is_fleet = common_name(bus).startswith("fleet.")  # it may stop, and nothing else
+        seen.may_stop = is_fleet or seen.may_drive or not is_barred(opened, robot)
     return seen
 
 

@@ -289,6 +289,7 @@ class Drive:
 
         if not self._motion.acquire(blocking=False):
             raise T2Error("a motion of this drive is under way; wait for its end, or cancel it")
+        self._target = STILL  # an old one must not be judged as the motion
         try:
             self._until(arrived)
             self.stop()

@@ -58,6 +58,7 @@ class Robot:
         if settings.estop_keepalive:
             self._keepalives = KeepalivePublisher(bus, settings.estop_keepalive)
         self._requests_path = path_of(keys.DRIVE.on(bus.robot, source=settings.source))
+        self._stopped_by = ""  # who requested the last emergency stop
         self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
         self._log = Logger(robot=bus.robot)
         self._events = bus.publisher(keys.EVENTS, service="dashboard")
@@ -129,8 +130,10 @@ class Robot:
         self.bus.estop()
         state = self.telemetry.newest(keys.SAFETY, clock.now_ns())
         # A page sends its request twice, and repeats it.
-        if not (self._estop.is_pending or (state is not None and "estop" in state.latched)):
+        is_stopped = self._estop.is_pending or (state is not None and "estop" in state.latched)
+        if not is_stopped or requested_by != self._stopped_by:
             self.event("estop", "warning", f"emergency stop requested by {requested_by}")
+        self._stopped_by = requested_by
         self._estop.start(state)
 
     def keep_alive(self, viewer: str, answered: int, now_ns: int) -> None:

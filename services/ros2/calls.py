@@ -22,7 +22,7 @@ from services.ros2.endpoints import Answer, Endpoints
 
 CONFIRM_NS, REPEAT_S = 3 * NS_PER_S, 0.05
 FRESH_NS = NS_PER_S // 2  # age of safety's state; older, and safety counts as silent
-STOPS_MAX = 32  # calls that wait
+CALLS_MAX = 32  # stops that wait, and resets
 TOLERANCE_S = 0.2  # of the two clocks, and of the age of safety's state
 TRIGGER = "std_srvs/srv/Trigger"
 
@@ -49,7 +49,7 @@ class Calls:
 
     def _stop(self, _: Attachment, __: Value, answer: Answer) -> None:
         """Stop the robot, and answer when safety's state shows it."""
-        if len(self._stops) == STOPS_MAX:
+        if len(self._stops) == CALLS_MAX:
             answer((False, "Too many calls wait for their stop."))
             return
         self._node.bus.estop()
@@ -82,8 +82,8 @@ class Calls:
     def _reset(self, about: Attachment, _: Value, answer: Answer) -> None:
         """Clear what is latched now, unless it is newer than the request."""
         state = self._state(clock.now_ns() - FRESH_NS)
-        if state is None:
-            answer((False, "Safety is silent."))
+        if state is None or len(self._resets) == CALLS_MAX:
+            answer((False, "Too many resets wait." if state else "Safety is silent."))
             return
         if reason := reset_refusal(state, about.source_ns, time.time_ns()):
             answer((False, reason))

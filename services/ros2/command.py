@@ -46,7 +46,7 @@ FASTER_NS = NS_PER_S // 50  # a delivery this much faster starts the settling an
 DRIFT = 5e-4  # s of the minimum per s: what clocks that are slewed drift apart at most
 OWNER_NS = NS_PER_S // 2  # silence after which another publisher may drive
 SOURCE = "ros2"  # of the drive requests
-UNHEARD = 20  # 1 s
+UNHEARD = 20  # 1 s at the usual 20 Hz
 MAX_PUBLISHERS = 64  # remembered; the one that was silent longest is dropped first
 
 Axes = tuple[float, float, float]
@@ -249,7 +249,7 @@ class Commands:
         if known.begun_ns is None and not self._by_zero:
             if not has_paused:
                 return NOT_PAUSED
-            known.begun_ns = known.received_ns - about.source_ns
+            self._begin(known, about)
             known.settle(known.received_ns)
             return BEGINS
         if known.is_settling:
@@ -257,8 +257,12 @@ class Commands:
         if known.begun_ns is None:
             if twist.moves:
                 return NOT_ZERO
-            known.begun_ns = known.received_ns - about.source_ns
+            self._begin(known, about)
         return None
+
+    def _begin(self, known: Publisher, about: Attachment) -> None:
+        known.begun_ns = known.received_ns - about.source_ns
+        self._contest = Contest(SOURCE)
 
 
 def _of_content(twist: Twist) -> Refusal | None:

@@ -29,7 +29,7 @@ Seen = Callable[[str, bool], None]  # a token, and whether it appeared
 Declare = Callable[[zenoh.Session, str, str], Any]  # with the key and the token of an endpoint
 
 DEPTH = 32  # commands that wait for the loop
-MAX_BYTES = 4096  # of a command; a TwistStamped has some 80
+MAX_BYTES = 4096  # of a command or request; a TwistStamped has some 80
 LATCHED: dict[str, Any] = {
     "cache": zenoh.ext.CacheConfig(max_samples=1),
     "publisher_detection": True,
@@ -128,9 +128,7 @@ class Endpoints:
         waiting = OverwritingQueue(DEPTH, read, self._post, self.counters)
 
         def queue(sample: zenoh.Sample) -> None:
-            if len(sample.payload) > MAX_BYTES:
-                self.counters["undecodable"] += 1
-            else:
+            if not self._is_too_long(sample):
                 waiting.put((sample, clock.now_ns()))
 
         self._declare(
@@ -146,10 +144,21 @@ class Endpoints:
 
         waiting = OverwritingQueue(DEPTH, answer, self._post, self.counters)
 
+        def queue(query: zenoh.Query) -> None:
+            if self._is_too_long(query):
+                query.drop()
+            else:
+                waiting.put(query)
+
         def declare(session: zenoh.Session, key: str, _: str) -> Any:
-            return session.declare_queryable(key, waiting.put, complete=True)
+            return session.declare_queryable(key, queue, complete=True)
 
         self._declare("SS", service, interface, declare)
+
+    def _is_too_long(self, sent: zenoh.Sample | zenoh.Query) -> bool:
+        is_long = sent.payload is not None and len(sent.payload) > MAX_BYTES
+        self.counters["undecodable"] += is_long
+        return is_long
 
     def _answer(self, query: zenoh.Query, key: str, interface: str, handle: Serve) -> None:
         try:

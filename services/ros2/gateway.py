@@ -59,22 +59,17 @@ class Gateway:
             self._refuse(decided, about.gid)
             return
         self._drive.request(decided.linear, decided.angular)
-        if self._is_new(about.gid, "taken"):
-            self._note(translate.OK, "Taken.", {"publisher": self._sender(about.gid)})
+        self._note(translate.OK, "taken", "Taken.", about.gid)
 
     def _unreadable(self, reason: str) -> None:
         self._refuse(Refusal("unreadable", f"A command cannot be read: {reason}."), b"")
 
     def _refuse(self, refusal: Refusal, publisher: bytes) -> None:
-        """Count a refusal; report it unless the one before of this publisher was the same."""
         self._node.counters[f"cmd_vel_{refusal.name}"] += 1
-        if self._is_new(publisher, refusal.name):
-            values = {"reason": refusal.name, "publisher": self._sender(publisher)}
-            self._note(translate.WARN, refusal.text, values)
-            self._node.event("cmd_vel_refused", "warning", refusal.text, **values)
+        self._note(translate.WARN, refusal.name, refusal.text, publisher)
 
     def _is_new(self, publisher: bytes, decision: str) -> bool:
-        """Return whether to report a decision: each one of a publisher once a second at most."""
+        """Return whether it is not the last one; each of a publisher counts once a second."""
         known = publisher if publisher in self._publishers else b""  # anybody can invent a GID
         reported, now_ns = self._reported.setdefault(known, {}), clock.now_ns()
         is_repeated = now_ns - reported.get(decision, -REPORT_NS) < REPORT_NS
@@ -84,14 +79,17 @@ class Gateway:
         reported[decision] = now_ns
         return True
 
-    def _note(self, level: int, text: str, values: dict[str, str]) -> None:
-        status = translate.status(level, "cmd_vel", text, values)
-        self._diagnostics.note(status, clock.now_ns())
-        text = f"cmd_vel of {values['publisher']} ({values.get('reason', 'taken')}): {text}"
-        self._log.put(translate.log(time.time_ns(), level, text))
-
-    def _sender(self, publisher: bytes) -> str:
-        return self._publishers.get(publisher, "unknown")
+    def _note(self, level: int, decision: str, text: str, publisher: bytes) -> None:
+        """Show a decision in the diagnostics; log a new one, and report a new refusal."""
+        sender = self._publishers.get(publisher, "unknown")
+        values = {"reason": decision, "publisher": sender}
+        self._diagnostics.note(translate.status(level, "cmd_vel", text, values), clock.now_ns())
+        if not self._is_new(publisher, decision):
+            return
+        logged = f"cmd_vel of {sender} ({decision}): {text}"
+        self._log.put(translate.log(time.time_ns(), level, logged))
+        if level == translate.WARN:
+            self._node.event("cmd_vel_refused", "warning", text, **values)
 
     def _on_token(self, token: str, appeared: bool) -> None:
         """Keep the nodes that publish commands."""

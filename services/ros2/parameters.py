@@ -28,7 +28,8 @@ def parameters(config: Ros2Config, limits: Limits | None) -> Parameters:
 def _fields(sections: Mapping[str, object]) -> Iterator[tuple[str, Scalar]]:
     for name, section in sections.items():
         for field in getattr(section, "__struct_fields__", ()):
-            yield f"{name}.{field}", getattr(section, field)
+            if type(value := getattr(section, field)) in KINDS:
+                yield f"{name}.{field}", value
 
 
 def parameter_value(value: Scalar | None) -> Value:

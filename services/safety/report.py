@@ -20,7 +20,7 @@ from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched,
 from services.safety.core.inputs import Trigger
 from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, spent
 from services.safety.core.policy import Policy
-from services.safety.core.sonars import Sonar
+from services.safety.core.sonars import UNSEEN, Sonar
 from services.safety.core.state import State
 
 MOVING = ("run", "slow")
@@ -69,7 +69,11 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         release_refusal=state.release.refusal,
         estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
-        doubted_sonars=tuple(_doubted(state.sonar_array.sonars)),
+        doubted_sonars=tuple(
+            name
+            for name, doubt in _doubted(state.sonar_array.sonars).items()
+            if doubt in ("suspect", *UNSEEN)  # what is too near to measure is there
+        ),
     )
 
 

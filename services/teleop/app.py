@@ -29,6 +29,7 @@ QUERY = "\x1b7\x1b[{row};{column}H\x1b[6n\x1b8"  # move the cursor, query its po
 MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
 TALL = 30  # rows of a terminal with room for more causes
 REST = 20  # rows of the other panels, and borders
+EVENTS = 3  # of them those of the events, which yield to an alarm
 REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay the keys
 
 
@@ -103,7 +104,9 @@ class TeleopApp(App[None]):
         self._header.show(panels.header(view))
         least = 5 if self.size.height >= TALL else 2
         text = panels.safety(view, least, self._safety.content_size.width)
-        rows = min(text.plain.count("\n") + 1, self.size.height - REST)
+        self.set_class(bool(view.alarm), "alarm")
+        free = self.size.height - REST + (EVENTS if view.alarm else 0)
+        rows = min(text.plain.count("\n") + 1, free)
         self._safety.styles.height = max(least, rows) + 2  # with its borders
         self._safety.show(text)
         self._around.show(panels.around(view))

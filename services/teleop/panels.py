@@ -143,7 +143,9 @@ def safety(view: View, rows: int, width: int = 200) -> Text:
         lines += _verdict(badge, BADGES["inhibited"], text, width)
         return rows_of(*lines, Text(f"To stop, use the vehicle's own switch. Next: {view.doctor}"))
     badge, root = f" {state.verdict.upper()} ", _root(view)
-    text = state.text.replace(f"{view.source} is in control.", "You are in control.")
+    is_ours = view.may_drive and view.requested is not None  # another terminal has the same name
+    own = f"{view.source} is in control."
+    text = state.text.replace(own, "You are in control." if is_ours else own)
     if root.part in TEXTS:
         text = f"{TEXTS[root.part]} Next: {view.doctor}"
     lines += _verdict(badge, BADGES[state.verdict], text, width)

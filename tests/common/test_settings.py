@@ -171,7 +171,7 @@ def place(name: str, x: float, y: float, degrees: float = 0.0) -> dict[str, obje
     ("given", "depth"),
     [
         (place("front", 0.50, 0.1), 0.05),
-        (place("front", 0.45, 0.0, 20), 0.1 / math.cos(math.radians(20))),
+        (place("front", 0.45, 0.0, 8), 0.1 / math.cos(math.radians(8))),
         (place("left", 0.1, 0.25, 90), 0.1),
         (place("rear_right", -0.55, -0.25, -135), 0.0),  # on the end, looking past it
         (place("rear_left", -0.50, 0.25, 135), 0.05 * math.sqrt(2)),
@@ -194,11 +194,12 @@ def test_a_sonar_in_the_hull_has_no_room_up_to_it(given: dict[str, object], dept
         (place("front", 0.24, 0.0), r"at most 0.3 m from \(0.55, 0\)"),
         (place("front", 0.5, math.nan), "sonars.front is at"),
         (
-            place("front", 0.5, 0.0, 21),
-            "sonars.front.yaw is 0.366519, allowed is -0.35 to 0.35 rad",
+            place("front", 0.5, 0.0, 9),
+            "sonars.front.yaw is 0.15708, allowed is -0.15 to 0.15 rad",
         ),
         (place("rear", -0.5, 0.0), "sonars.rear.yaw"),
-        (place("rear", -0.5, 0.0, math.nan), "sonars.rear.yaw"),
+        (place("rear", -0.5, 0.0, math.nan), "yaw"),
+        (place("rear", -0.5, 0.0, math.inf), "yaw"),
     ],
 )
 def test_a_sonar_must_see_what_its_name_says(given: dict[str, object], sentence: str) -> None:

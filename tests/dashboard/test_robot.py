@@ -168,7 +168,10 @@ def test_an_event_names_who_stopped_and_who_reset(reset: RobotFixture) -> None:
     events = next(p for p in reset.bus.publishers if p.topic is keys.EVENTS)
     assert isinstance(events.last, Event)
     assert (events.last.name, events.last.text) == ("reset_request", "reset requested by Anna")
-    for name in ("Bob", "Eve"):  # a page repeats its stop
+    for name in ("Bob", "Eve"):
         reset.robot.estop(name)
-    assert isinstance(events.last, Event)
-    assert (events.last.name, events.last.text) == ("estop", "emergency stop requested by Bob")
+        assert isinstance(events.last, Event)
+        assert (events.last.name, events.last.text) == (
+            "estop",
+            f"emergency stop requested by {name}",
+        )

@@ -168,6 +168,15 @@ def test_who_was_overruled_must_pause(other: str) -> None:
     sender.drive(3.5)
 
 
+def test_who_was_overruled_begins_with_a_pause_while_another_source_drives() -> None:
+    other = state(source="nav")
+    sender = Sender(started()).drive()
+    assert sender.stream(1.0, 1.0, seen=other) == {TAKEN, "not_paused"}
+    assert sender.send(2.5, seen=other) == "begins"
+    assert sender.stream(2.55, 0.45, seen=other) == {"settling"}
+    assert sender.stream(3.0, 0.45, seen=other) == {TAKEN}
+
+
 def test_who_publishes_zeros_or_another_node_is_not_overruled() -> None:
     commands = started()
     sender = Sender(commands).drive()
@@ -189,6 +198,9 @@ def test_a_publisher_that_was_running_before_it_is_heard_must_pause() -> None:
     sender.sequence = UNHEARD
     assert sender.stream(0.1, 2.0) == {"not_paused"}
     sender.drive(2.6)
+    sender = Sender(started())
+    sender.sequence = 2 * UNHEARD
+    assert sender.send(0.0) == "not_paused"
 
 
 def test_the_first_commands_of_a_publisher_may_be_lost() -> None:

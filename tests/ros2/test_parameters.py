@@ -65,6 +65,16 @@ def test_names_are_listed_by_prefix_and_depth(
     assert groups == tuple(sorted({name.split(".")[0] for name in names}))
 
 
+def test_all_parameters_can_be_read() -> None:
+    names = tuple(KNOWN)
+    (values,), (kinds,), (described,) = (
+        respond(name, names)
+        for name in ("get_parameters", "get_parameter_types", "describe_parameters")
+    )
+    assert [value[0] for value in values] == [*kinds] == [each[1] for each in described]
+    assert set(kinds) == {1, 2, 3, 4}
+
+
 def test_nothing_can_be_set() -> None:
     changes = (("ros2.domain", NOT_SET), ("x", NOT_SET))
     assert respond("set_parameters", changes) == ((READ_ONLY, READ_ONLY),)

@@ -131,10 +131,14 @@ def test_a_control_character_reaches_no_panel(screen: Screen) -> None:
     play(screen, act)
 
 
+@pytest.mark.parametrize(
+    "alarm", ["", "EMERGENCY STOP NOT CONFIRMED: use the vehicle's own switch"]
+)
 @pytest.mark.parametrize("size", [(80, 24), (100, 32)])
 def test_the_safety_panel_shows_all_its_rows_and_hides_no_other(
-    screen: Screen, size: tuple[int, int]
+    screen: Screen, size: tuple[int, int], alarm: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(type(screen.controller), "_alarm", lambda *_: alarm)
     still = "The bumper was hit. Bumper polls were lost: move off first, then reset it here."
 
     async def act(pilot: Pilot[None]) -> None:
@@ -144,7 +148,7 @@ def test_the_safety_panel_shows_all_its_rows_and_hides_no_other(
         await pilot.pause()
         safety, hints = (screen.app.query_one(f"#{name}", Panel) for name in ("safety", "hints"))
         rows = screen.text_of("safety").split("\n")
-        assert len(rows) == (3 if size[0] == 80 else 2)
+        assert len(rows) == (3 if size[0] == 80 else 2) + bool(alarm)
         assert safety.content_size.height >= len(rows)
         assert hints.region.bottom == size[1]
 

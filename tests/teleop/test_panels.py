@@ -8,6 +8,7 @@ from common.client import request
 from common.messages import (
     Bumper,
     Cause,
+    Drive,
     Driver,
     Limits,
     Velocity,
@@ -99,7 +100,9 @@ def test_alarm_and_verdict_are_wrapped() -> None:
 
 def test_the_operator_in_control_is_you() -> None:
     state = safety_state(text="teleop is in control.")
-    assert panels.safety(view(safety=state), 2).plain == " RUN  You are in control."
+    assert panels.safety(view(safety=state), 2).plain == " RUN  teleop is in control."  # another
+    ours = view(safety=state, requested=Drive(linear=0.0, angular=0.0, echo=0))
+    assert panels.safety(ours, 2).plain == " RUN  You are in control."
 
 
 @pytest.mark.parametrize(

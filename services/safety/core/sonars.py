@@ -299,16 +299,17 @@ class SonarFilter(Struct, frozen=True):
         # 3 equivalent mutants: both have a row for each sonar.
         readings, faults = zip(*map(trusted, sample.ranges, sample.status), strict=True)
         saturation = array.saturation.updated(readings)
+        rooms = [max(0.0, readings[n] - axis.recess) for n, axis in enumerate(self.axes)]
         sonars = tuple(
             updated(
                 sonar,
-                max(0.0, readings[n] - self.axes[n].recess),
+                rooms[n],
                 faults[n],
                 Moved(
                     along=self.axes[n].along(moved) * step_s,
                     turn=moved.angular * step_s,
                     beyond=saturation.explains(readings[n]),
-                    alongside=_is_alongside(n, readings),
+                    alongside=_is_alongside(n, rooms),
                 ),
             )
             for n, sonar in enumerate(array.sonars)
@@ -317,11 +318,11 @@ class SonarFilter(Struct, frozen=True):
         return SonarArray(sonars, token, latest.received_ns, saturation, unseen)
 
 
-def _is_alongside(sonar: int, readings: Sequence[float]) -> bool:
+def _is_alongside(sonar: int, rooms: Sequence[float]) -> bool:
     """Return whether the flank on its side sees the wall that a corner sonar sees."""
     flank = FLANK_OF.get(SONAR_NAMES[sonar])
     if flank is None:
         return False
-    low, high = (share * readings[sonar] for share in ALONGSIDE)
+    low, high = (share * rooms[sonar] for share in ALONGSIDE)
     # 2 equivalent mutants: a range of measured numbers, with or without its ends.
-    return low <= readings[SONAR_NAMES.index(flank)] <= high
+    return low <= rooms[SONAR_NAMES.index(flank)] <= high
