@@ -259,14 +259,16 @@ class Robot:
     def _unanswered(self, key: str, service: str) -> T2Error:
         """Return why: the router announces no queryable to a certificate that may not call it."""
         querier: Any = self._session.declare_querier(key)
-        token = f"{ROOT}/{self.name}/live/{service}/*"
-        found = self._session.liveliness().get(token, timeout=LIVE_S)
-        runs = any(it.ok is not None for it in found)
-        end_s = time.monotonic() + MATCH_S
-        while not querier.matching_status.matching and time.monotonic() < end_s:
-            time.sleep(PERIOD_S)
-        is_barred = runs and not querier.matching_status.matching
-        querier.undeclare()
+        try:
+            token = f"{ROOT}/{self.name}/live/{service}/*"
+            found = self._session.liveliness().get(token, timeout=LIVE_S)
+            runs = any(it.ok is not None for it in found)
+            end_s = time.monotonic() + MATCH_S
+            while not querier.matching_status.matching and time.monotonic() < end_s:
+                time.sleep(PERIOD_S)
+            is_barred = runs and not querier.matching_status.matching
+        finally:
+            querier.undeclare()
         if is_barred:
             return NotAllowed(
                 f"no answer from {service}, though it runs: this certificate may not call it; "

@@ -14,13 +14,15 @@ function create(parent, tag, attributes) {
   return it;
 }
 
+const NAMES = ["left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left"];
+
 // In the manual's order: counted clockwise from the left.
-function mounts({ length, width }) {
+function mounts({ length, width, sonars }) {
   const [front, left] = [length / 2, width / 2];
   const degrees = [90, 45, 0, -45, -90, -135, 180, 135];
   const places = [[0, left], [front, left], [front, 0], [front, -left],
     [0, -left], [-front, -left], [-front, 0], [-front, left]];
-  return places.map(([x, y], i) => ({ x, y, yaw: (degrees[i] * Math.PI) / 180 }));
+  return places.map(([x, y], i) => sonars[NAMES[i]] ?? { x, y, yaw: (degrees[i] * Math.PI) / 180 });
 }
 
 export function build(vehicle) {
