@@ -134,7 +134,7 @@ def test_a_stop_waits_for_a_restarted_router(t2: Tool, monkeypatch: pytest.Monke
         late.start()
         result = Tool(where, "001", t2.capsys)("estop")
         late.join()
-    assert "sent, but safety of robot 001 does not confirm" in result.err
+    assert "sent; safety of robot 001 does not confirm" in result.err
 
 
 @pytest.mark.parametrize(
