@@ -166,12 +166,12 @@ class Commands:
 
     _owned_ns: int  # when the owner drove last
     _since_ns: int  # of ``listen``
+    _contest: Contest  # of the owner, since it began
 
     def __init__(self, *, by_zero: bool = False) -> None:
         self.owner: bytes | None = None  # GID of the publisher that drives
         self._by_zero = by_zero  # whether only zeros are neutral
         self._known: dict[bytes, Publisher] = {}
-        self._contest = Contest(SOURCE)
 
     def listen(self, now_ns: int) -> None:
         """Begin to receive, before the first command: what its publisher did before is unknown."""
@@ -225,6 +225,7 @@ class Commands:
                 received_ns=now_ns,
                 moved_ns=self._since_ns,
                 moved_source_ns=self._since_ns - delivery_ns,
+                # 1 equivalent mutant: any gap counts.
                 sequence=about.sequence - 1 if about.sequence <= UNHEARD else 0,
             )
         self._known[about.gid] = known  # the last one of the dictionary
