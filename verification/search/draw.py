@@ -69,21 +69,21 @@ class Draw(Struct, frozen=True):
         own = {name: value for name, value in self.values.items() if name.startswith(SIM)}
         given = {name.removeprefix(SIM): Setting(value, name) for name, value in own.items()}
         made = build(Model, given)
-        recess, aim = (float(self.get(f"vehicle.{name}", 0.0)) for name in ("recess", "aim"))
-        return replace(made, vehicle=mounted(made.vehicle, recess, aim))
+        recess = float(self.get("vehicle.recess", 0.0))
+        return replace(made, vehicle=mounted(made.vehicle, recess)) if recess else made
 
 
-def mounted(vehicle: Vehicle, recess: float, aim: float) -> Vehicle:
-    """Return the vehicle with its sonars so deep in the hull (m), and turned (rad)."""
+def mounted(vehicle: Vehicle, recess: float) -> Vehicle:
+    """Return the vehicle with its sonars so deep in the hull, in metres."""
     places = {
         one.name: Place(
             x=one.x - math.cos(one.yaw) * recess,
             y=one.y - math.sin(one.yaw) * recess,
-            yaw=one.yaw + aim,
+            yaw=one.yaw,
         )
         for one in sonar_mounts(vehicle)
     }
-    return replace(vehicle, sonars=places) if recess or aim else vehicle
+    return replace(vehicle, sonars=places)
 
 
 @cache

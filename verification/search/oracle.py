@@ -58,6 +58,7 @@ class Oracle:
     runs: int = 0  # frames that moved the vehicle
     comeback_ns: int = 0  # last restart of a process or the board
     slack_ns: int = 0  # addition to the budget for disturbances and stalls
+    recess: float = 0.0  # m that each sonar is deep in the hull
     estop_session_up: bool = True
     _records: dict[tuple[int, int], Record] = field(default_factory=dict)
     _links: dict[tuple[int, int], frozenset[Trip]] = field(default_factory=dict)
@@ -167,7 +168,9 @@ class Oracle:
         """Open the book of a started process."""
         self.comeback_ns = self.now_ns
         if process.name == "safety":
-            self.safety_books[process.boot] = SafetyBook(process.boot, bad_ns=self.now_ns)
+            self.safety_books[process.boot] = SafetyBook(
+                process.boot, self.recess, bad_ns=self.now_ns
+            )
         if process.name == "bridge":
             self.bridge_books[process.boot] = BridgeBook(process.boot)
 

@@ -49,6 +49,7 @@ class SafetyBook:
     """Messages delivered to one safety service, by the time of delivery."""
 
     boot: int
+    recess: float = 0.0  # m that each sonar is deep in the hull
     samples: dict[str, tuple[int, m.Message]] = field(default_factory=dict)
     ranges: deque[tuple[int, m.Ultrasonic]] = field(default_factory=lambda: deque(maxlen=3))
     bumpers: deque[m.Bumper] = field(default_factory=lambda: deque(maxlen=3))
@@ -268,7 +269,7 @@ class SafetyBook:
     def _of_zones(self, motion: m.Motion, now_ns: int) -> Iterator[str]:
         measured = self.samples.get("velocity")
         for sonar in range(len(SONARS)):
-            room = max(0.0, self._distance(sonar, now_ns) - MARGIN_M)
+            room = max(0.0, self._distance(sonar, now_ns) - self.recess - MARGIN_M)
             if not self.creeps(motion) and self._may_creep(sonar, motion.source, now_ns):
                 room = max(room, stopping_way(BLIND_MPS))
             speed = approach(sonar, motion.linear, motion.angular)

@@ -30,6 +30,7 @@ from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
 from verification.search.condition_books import IGNORED, LEASE_S, NEEDED
 from verification.search.oracle import STEP_NS, Oracle
 from verification.search.ros import RosSource
+from verification.search.safety_book import FRONT
 
 START_NS = 100 * NS_PER_S
 ASK_NS = 50 * MS
@@ -127,6 +128,8 @@ class Stack:
     ) -> None:
         self.net = Net(START_NS)
         self.oracle = Oracle(START_NS)
+        if front := model.vehicle.sonars.get("front"):
+            self.oracle.recess = FRONT - front.x
         # Lost and late datagrams may take the STOP that would have been in time.
         for line in (model.cable.to_board, model.cable.to_pc):
             self.oracle.slack_ns += round((line.delay + line.jitter) * 1e9)
