@@ -91,14 +91,17 @@ def comparable(before: Mileage, after: Mileage) -> bool:
     return (before.boot, before.epoch) == (after.boot, after.epoch)
 
 
-def stopping_ns(velocity: Twist, deceleration: float, angular_deceleration: float) -> int:
-    """Return the time until the vehicle must stand after a stop: v / a and the grace.
+def stopping_s(velocity: Twist, deceleration: float, angular_deceleration: float) -> float:
+    """Return the time (s) from slowing down to standstill.
 
     A vehicle in a curve slows down on both axes together, so the longer of the two times counts.
     """
-    linear_s = abs(velocity.linear) / deceleration
-    angular_s = abs(velocity.angular) / angular_deceleration
-    return round(max(linear_s, angular_s) * NS_PER_S) + GRACE_NS
+    return max(abs(velocity.linear) / deceleration, abs(velocity.angular) / angular_deceleration)
+
+
+def stopping_ns(velocity: Twist, deceleration: float, angular_deceleration: float) -> int:
+    """Return the time until the vehicle must stand after a stop: v / a and the grace."""
+    return round(stopping_s(velocity, deceleration, angular_deceleration) * NS_PER_S) + GRACE_NS
 
 
 def _steady(before: Twist, after: Twist) -> Twist:

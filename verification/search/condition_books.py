@@ -20,7 +20,8 @@ NO_CAP = (math.inf, math.inf)
 TIMEOUT_S = 1.0  # of a pendant
 
 BRAKING_MPS2, BRAKING_RADPS2, GRACE_S = 0.6, 1.0, 0.5
-FASTEST_MPS = 1.0
+FASTEST_MPS, FASTEST_RADPS = 1.0, 1.0
+LONGEST_STOP_S = 3.0
 STANDING_MPS, STANDING_RADPS = 0.02, 0.05
 AWAY = 0.05  # m or rad that a standing vehicle may be moved
 # Two samples and a decision later at 1.5 m/s, and what the oracle counts more generously.
@@ -176,6 +177,7 @@ class StandstillBook:
     newest: Velocity | None = None
     newest_ns: int = 0
     rolled: float = 0.0  # m or rad, the larger, since standstill was last commanded
+    turn_braking: float = BRAKING_RADPS2  # rad/s^2, guaranteed
 
     def on_velocity(self, velocity: Velocity, now_ns: int) -> None:
         """Take a velocity in."""
@@ -186,12 +188,20 @@ class StandstillBook:
         else:
             self.rolled = 0.0
         if self.due_ns is not None and not self._known(now_ns):  # the first one after a gap
-            self.due_ns = min(self.due_ns, now_ns + stopping_ns(velocity))
+            self.due_ns = min(self.due_ns, now_ns + self._stopping_ns(velocity))
         self.newest, self.newest_ns = velocity, now_ns
 
     def _known(self, now_ns: int) -> bool:
         """Return whether the velocity is known; an unknown one counts as the highest."""
         return now_ns - self.newest_ns <= FRESH_S * NS_PER_S
+
+    def _stopping_ns(self, velocity: Velocity | None) -> int:
+        """Return how long stopping may take from this velocity."""
+        linear, angular = (FASTEST_MPS, FASTEST_RADPS)
+        if velocity is not None:
+            linear, angular = velocity.linear, velocity.angular
+        stopping_s = max(abs(linear) / BRAKING_MPS2, abs(angular) / self.turn_braking)
+        return round(min(stopping_s + GRACE_S, LONGEST_STOP_S) * NS_PER_S)
 
     def complaint(self, motion: Motion, moves: bool, now_ns: int) -> str:
         """Return what is wrong with a motion that does not brake; empty if nothing is."""
@@ -202,7 +212,7 @@ class StandstillBook:
             self.stop_ns = self.due_ns = now_ns
         if now_ns - self.stop_ns <= GAP_S * NS_PER_S:  # the speed at STOP may be measured later
             speed = self.newest if self._known(now_ns) else None
-            self.due_ns = max(self.due_ns, self.stop_ns + stopping_ns(speed))
+            self.due_ns = max(self.due_ns, self.stop_ns + self._stopping_ns(speed))
         late_s = (now_ns - self.due_ns) / NS_PER_S
         if motion.command == "brake" or late_s < SLACK_S or not self._known(now_ns):
             return ""
@@ -213,12 +223,3 @@ class StandstillBook:
 def rolls(velocity: Velocity) -> bool:
     """Return whether a velocity is a motion."""
     return abs(velocity.linear) >= STANDING_MPS or abs(velocity.angular) >= STANDING_RADPS
-
-
-def stopping_ns(velocity: Velocity | None) -> int:
-    """Return how long stopping may take from this velocity."""
-    linear, angular = (
-        (FASTEST_MPS, 0.0) if velocity is None else (velocity.linear, velocity.angular)
-    )
-    stopping_s = max(abs(linear) / BRAKING_MPS2, abs(angular) / BRAKING_RADPS2)
-    return round((stopping_s + GRACE_S) * NS_PER_S)

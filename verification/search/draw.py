@@ -20,6 +20,8 @@ from sim.model import Model
 from sim.world import Box, Plan, Spot, Wall, World
 
 FILE = Path(__file__).with_name("ranges.toml")
+TURN_BRAKING = "vehicle.angular_deceleration"  # of the settings; the vehicle has a little more
+SPARE = 1.1
 SIM = "sim."  # prefix of the parameters of the simulated vehicle
 FAULTY = 0.5  # share of the runs with faults
 MOST_FAULTS = 3
@@ -67,6 +69,9 @@ class Draw(Struct, frozen=True):
     def model(self) -> Model:
         """Return the simulated vehicle."""
         own = {name: value for name, value in self.values.items() if name.startswith(SIM)}
+        if (weak := self.values.get(TURN_BRAKING)) is not None:
+            real = float(weak) * SPARE
+            own |= {f"{SIM}drive.angular_coast": real, f"{SIM}drive.angular_acceleration": real}
         given = {name.removeprefix(SIM): Setting(value, name) for name, value in own.items()}
         made = build(Model, given)
         recess = float(self.get("vehicle.recess", 0.0))

@@ -19,6 +19,7 @@ from sim import requests as q
 from sim import trace as t
 from verification.search.bridge_book import BridgeBook
 from verification.search.bus import MS, Envelope, Process
+from verification.search.condition_books import BRAKING_RADPS2, StandstillBook
 from verification.search.safety_book import FAST_S, SafetyBook
 
 # The bridge's lease and tick; the guard needs less.
@@ -59,6 +60,7 @@ class Oracle:
     comeback_ns: int = 0  # last restart of a process or the board
     slack_ns: int = 0  # addition to the budget for disturbances and stalls
     recess: float = 0.0  # m that each sonar is deep in the hull
+    turn_braking: float = BRAKING_RADPS2  # rad/s^2, of the settings
     estop_session_up: bool = True
     _records: dict[tuple[int, int], Record] = field(default_factory=dict)
     _links: dict[tuple[int, int], frozenset[Trip]] = field(default_factory=dict)
@@ -169,7 +171,11 @@ class Oracle:
         self.comeback_ns = self.now_ns
         if process.name == "safety":
             self.safety_books[process.boot] = SafetyBook(
-                process.boot, self.recess, bad_ns=self.now_ns
+                process.boot,
+                self.recess,
+                self.turn_braking,
+                bad_ns=self.now_ns,
+                standstill=StandstillBook(turn_braking=self.turn_braking),
             )
         if process.name == "bridge":
             self.bridge_books[process.boot] = BridgeBook(process.boot)

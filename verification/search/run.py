@@ -16,7 +16,8 @@ from common import messages as m
 from common.freshness import NS_PER_S
 from sim import requests as q
 from verification.search.bus import MS, Disturbance
-from verification.search.draw import Draw, Value, room
+from verification.search.condition_books import BRAKING_RADPS2
+from verification.search.draw import TURN_BRAKING, Draw, Value, room
 from verification.search.draw import draw as drawn
 from verification.search.judge import Judge, PoseError, Stop, pose_error
 from verification.search.operator import Operator
@@ -96,7 +97,8 @@ class Trial:
     def __init__(self, draw: Draw) -> None:
         model = draw.model()
         plan = room(draw, model.vehicle)
-        self.stack = Stack(model, plan, seed=draw.seed, step_ns=STEP_NS)
+        turn_braking = float(draw.get(TURN_BRAKING, BRAKING_RADPS2))
+        self.stack = Stack(model, plan, seed=draw.seed, step_ns=STEP_NS, turn_braking=turn_braking)
         self.operator = Operator(self.stack, draw)
         self.stack.sources["teleop"] = self.operator
         self.judge = Judge(START_NS)

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from common import messages as m
 from common.freshness import NS_PER_S
 from verification.search.condition_books import (
+    BRAKING_MPS2,
+    BRAKING_RADPS2,
     Channel,
     KeepaliveBook,
     LimitBook,
@@ -25,7 +27,7 @@ PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "ros2": 11, "
 AGES_S = {"velocity": 0.2, "bumper": 0.15, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
 GOOD_SAMPLES, SETTLE_S = 3, 0.5
 LAPSE_S = 1.0  # after its lease a source is as new
-MARGIN_M, REACT_S, BRAKING_MPS2, RANGES_AGE_S = 0.20, 0.25, 0.6, 0.3
+MARGIN_M, REACT_S, RANGES_AGE_S = 0.20, 0.25, 0.3
 # After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
 OPERATORS, BLIND_MPS, SHOWN_S = ("teleop", "checkout", "web"), 0.15, 1.0
 LOST_POLLS = 3  # of the bumper
@@ -50,6 +52,7 @@ class SafetyBook:
 
     boot: int
     recess: float = 0.0  # m that each sonar is deep in the hull
+    turn_braking: float = BRAKING_RADPS2  # rad/s^2, guaranteed
     samples: dict[str, tuple[int, m.Message]] = field(default_factory=dict)
     ranges: deque[tuple[int, m.Ultrasonic]] = field(default_factory=lambda: deque(maxlen=3))
     bumpers: deque[m.Bumper] = field(default_factory=lambda: deque(maxlen=3))
@@ -271,14 +274,21 @@ class SafetyBook:
         for sonar in range(len(SONARS)):
             room = max(0.0, self._distance(sonar, now_ns) - self.recess - MARGIN_M)
             if not self.creeps(motion) and self._may_creep(sonar, motion.source, now_ns):
-                room = max(room, stopping_way(BLIND_MPS))
+                room = max(room, reacting_way(BLIND_MPS, BLIND_MPS / BRAKING_MPS2))
             speed = approach(sonar, motion.linear, motion.angular)
-            if speed > ROUNDING and stopping_way(speed - ROUNDING) > room:
+            stop_s = self._stopping_s(motion)
+            if speed > ROUNDING and reacting_way(speed - ROUNDING, stop_s) > room:
                 yield f"{speed:.3f} m/s toward sonar {sonar} with {room:.3f} m of room"
             if measured is not None and isinstance(measured[1], m.Velocity):
                 real = approach(sonar, measured[1].linear, measured[1].angular) - ROUNDING
-                if stopping_way(max(0.0, real - 0.2)) > room or (room == 0 and real > 0.05):
+                slower = max(0.0, real - 0.2)
+                stop_s = self._stopping_s(measured[1]) * slower / real if slower else 0.0
+                if reacting_way(slower, stop_s) > room or (room == 0 and real > 0.05):
                     yield f"really {real:.3f} m/s toward sonar {sonar} with {room:.3f} m of room"
+
+    def _stopping_s(self, twist: m.Motion | m.Velocity) -> float:
+        """Return how long a vehicle on this curve takes to stop: as the slower axis, in s."""
+        return max(abs(twist.linear) / BRAKING_MPS2, abs(twist.angular) / self.turn_braking)
 
     def _distance(self, sonar: int, now_ns: int) -> float:
         """Return what may be believed: the nearest of the last three samples, in metres."""
@@ -287,9 +297,9 @@ class SafetyBook:
         return min(shown(message, sonar) for _, message in self.ranges)
 
 
-def stopping_way(speed: float) -> float:
-    """Return what reacting and stopping takes, in metres."""
-    return speed * REACT_S + speed * speed / (2 * BRAKING_MPS2)
+def reacting_way(speed: float, stop_s: float) -> float:
+    """Return what reacting and stopping in this time takes, in metres."""
+    return speed * (REACT_S + stop_s / 2)
 
 
 def shown(message: m.Ultrasonic, sonar: int) -> float:

@@ -27,7 +27,7 @@ from sim.requests import Asked
 from sim.simulation import Simulation
 from sim.world import Plan
 from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
-from verification.search.condition_books import IGNORED, LEASE_S, NEEDED
+from verification.search.condition_books import BRAKING_RADPS2, IGNORED, LEASE_S, NEEDED
 from verification.search.oracle import STEP_NS, Oracle
 from verification.search.ros import RosSource
 from verification.search.safety_book import FRONT
@@ -124,10 +124,17 @@ class Stack:
     """
 
     def __init__(
-        self, model: Model = IDEAL, plan: Plan = PLANE, *, seed: int = 1, step_ns: int = STEP_NS
+        self,
+        model: Model = IDEAL,
+        plan: Plan = PLANE,
+        *,
+        seed: int = 1,
+        step_ns: int = STEP_NS,
+        turn_braking: float = BRAKING_RADPS2,
     ) -> None:
+        """Set up; ``turn_braking`` is the angular deceleration of the settings (rad/s^2)."""
         self.net = Net(START_NS)
-        self.oracle = Oracle(START_NS)
+        self.oracle = Oracle(START_NS, turn_braking=turn_braking)
         if front := model.vehicle.sonars.get("front"):
             self.oracle.recess = FRONT - front.x
         # Lost and late datagrams may take the STOP that would have been in time.
@@ -199,8 +206,11 @@ class Stack:
         """Return a new process on the bus."""
         self._boots += 1
         config = CONFIGS.get(name)
+        turning = {"angular_deceleration": self.oracle.turn_braking}
         if isinstance(config, SafetyConfig):
-            config = replace(config, vehicle=self._body)
+            config = replace(config, vehicle=self._body, safety=replace(config.safety, **turning))
+        elif isinstance(config, BridgeConfig):
+            config = replace(config, bridge=replace(config.bridge, **turning))
         return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:

@@ -1,12 +1,13 @@
 """Planning: limits, zones and ramp turn a requested twist into the twist to command.
 
-Toward a reading d the vehicle may move at the v whose reaction and stopping distance fits:
+Toward a reading d a twist may approach at the speed s whose reaction and stopping distance fits:
 
-    v * t_react + v^2 / (2 a) = d - margin
+    s * t_react + s * t_stop / 2 = d - margin
 
-``Axis`` gives the speed of approach to what a sonar sees. A twist that is too fast for one sonar is
-scaled as a whole, which keeps its curve. A sonar without approach sets no limit, so motion away
-from an obstacle stays possible.
+``Axis`` gives s, the speed of approach to what a sonar sees. ``t_stop`` is the stopping time of the
+twist: the longer one of its two axes, because a vehicle in a curve slows down on both together. A
+twist that is too fast for one sonar is scaled as a whole, which keeps its curve. A sonar without
+approach sets no limit, so motion away from an obstacle stays possible.
 """
 
 import math
@@ -16,6 +17,7 @@ from msgspec import Struct
 
 from common.motion import RUN, STILL, Twist, clamp
 from common.settings import Vehicle
+from common.standstill import stopping_s
 from services.safety.config import Safety
 from services.safety.core.causes import BARRING, Latches, Observation
 from services.safety.core.release import stopping_distance, sweep
@@ -41,45 +43,59 @@ class Zones(Struct, frozen=True):
     margin: float  # m
     react: float  # s
     deceleration: float  # m/s^2
-
-    def allowed(self, distance: float) -> float:
-        """Return the speed (m/s) at which the vehicle can stop before the margin."""
-        room = max(0.0, distance - self.margin)
-        lag = self.deceleration * self.react
-        return math.sqrt(lag * lag + 2 * self.deceleration * room) - lag
+    angular_deceleration: float  # rad/s^2
 
     def room(self, speed: float) -> float:
-        """Return the distance (m) at which this speed is allowed."""
+        """Return the distance (m) at which this speed is allowed straight toward an obstacle."""
         return self.margin + stopping_distance(speed, self.react, self.deceleration)
 
     def limit(self, twist: Twist, distances: Sequence[float]) -> SonarLimit:
         """Return the limit on a twist; a factor of 0 means blocked."""
-        tightest = SonarLimit(1.0)
+        tightest, stop_s = SonarLimit(1.0), self._stop_s(twist)
         for sonar, axis in enumerate(self.axes):
             speed = axis.approach(twist)
             if speed <= GRAZING_MPS:
                 continue
-            factor = self.allowed(distances[sonar]) / speed
+            factor = self._factor(speed, stop_s, distances[sonar])
             if factor < tightest.factor:
                 tightest = SonarLimit(factor, sonar)
         return tightest
 
     def too_fast(self, measured: Twist, distances: Sequence[float]) -> int | None:
         """Return the sonar toward which the measured speed is too high, if any."""
+        stop_s = self._stop_s(measured)
         for sonar, axis in enumerate(self.axes):
             speed = axis.approach(measured)
             if speed <= MEASURED_CREEP_MPS:
                 continue
-            allowed = self.allowed(distances[sonar])
+            allowed = speed * self._factor(speed, stop_s, distances[sonar])
             # 1 equivalent mutant: a measured speed, at the limit or above it.
             if not allowed or speed > allowed + MEASURED_EXCESS_MPS:
                 return sonar
         return None
 
+    def _stop_s(self, twist: Twist) -> float:
+        return stopping_s(twist, self.deceleration, self.angular_deceleration)
+
+    def _factor(self, speed: float, stop_s: float, distance: float) -> float:
+        """Return the factor for a twist to stop before the margin; above 1 it may go faster.
+
+        ``speed`` is its speed of approach (m/s), ``stop_s`` its stopping time (s). Both shrink with
+        the factor: f * speed * react + f^2 * speed * stop_s / 2 is the room.
+        """
+        room_s = max(0.0, distance - self.margin) / speed
+        return (math.sqrt(self.react * self.react + 2 * stop_s * room_s) - self.react) / stop_s
+
 
 def zones(vehicle: Vehicle, settings: Safety) -> Zones:
     """Return the zones of this vehicle with these settings."""
-    return Zones(axes(vehicle), settings.margin, settings.reaction, settings.deceleration)
+    return Zones(
+        axes(vehicle),
+        settings.margin,
+        settings.reaction,
+        settings.deceleration,
+        settings.angular_deceleration,
+    )
 
 
 class RequestedTwist(Struct, frozen=True):

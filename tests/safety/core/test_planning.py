@@ -39,9 +39,10 @@ def field() -> Zones:
 
 def test_the_field_is_that_of_the_vehicle_and_the_settings() -> None:
     vehicle = Vehicle(length=1.2, width=0.8)
-    settings = Safety(margin=0.3, react=0.2, deceleration=0.5, unsafe_overrides=("deceleration",))
+    settings = Safety(margin=0.3, react=0.2, deceleration=0.5)
     field = zones(vehicle, settings)
     assert (field.margin, field.react, field.deceleration) == (0.3, 0.2, 0.5)
+    assert field.angular_deceleration == 1.0
     assert [axis.swing for axis in field.axes] == [0.6, 0, 0, 0, 0.6, 0, 0, 0]
 
 
@@ -65,13 +66,37 @@ def only(name: str, distance: float) -> tuple[float, ...]:
 def test_nothing_is_exactly_nothing_whatever_the_settings(
     field: Zones, react: float, deceleration: float
 ) -> None:
-    assert replace(field, react=react, deceleration=deceleration).allowed(0.2) == 0.0
+    other = replace(field, react=react, deceleration=deceleration)
+    assert other.limit(Twist(0.5, 0.1), only("front", 0.2)).factor == 0.0
 
 
-@given(st.floats(0.2, 10.0))
-def test_reacting_and_stopping_takes_the_room_there_is(field: Zones, distance: float) -> None:
-    speed = field.allowed(distance)
-    assert speed * 0.25 + speed**2 / (2 * 0.6) == pytest.approx(distance - 0.2, abs=1e-9)
+# Decelerations of the settings (m/s^2 and rad/s^2), and a reading (m) with 0.4 m of room.
+TURNING = [(0.6, 1.0), (0.6, 0.4), (0.6, 0.1), (0.1, 3.0), (1.0, 0.1)]
+
+
+@pytest.mark.parametrize(("deceleration", "angular_deceleration"), TURNING)
+@given(twist=st.builds(Twist, st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)))
+def test_reacting_and_stopping_takes_the_room_there_is(
+    field: Zones, deceleration: float, angular_deceleration: float, twist: Twist
+) -> None:
+    """Both axes slow down together, so the slower one gives the time."""
+    field = replace(field, deceleration=deceleration, angular_deceleration=angular_deceleration)
+    for name, axis in zip(SONAR_NAMES, field.axes, strict=True):
+        limit = field.limit(twist, only(name, 0.6))
+        slower = twist.scaled(limit.factor)
+        stop_s = max(abs(slower.linear) / deceleration, abs(slower.angular) / angular_deceleration)
+        needed = max(0.0, axis.approach(slower)) * (0.25 + stop_s / 2)
+        assert needed <= 0.4 + 1e-9
+        if limit.sonar is not None:
+            assert needed == pytest.approx(0.4)
+
+
+def test_a_weak_angular_deceleration_slows_a_turn_beside_a_wall(field: Zones) -> None:
+    field = replace(field, angular_deceleration=0.4)
+    for name in ("left", "right"):
+        assert field.limit(Twist(0.0, 1.0), only(name, 0.6)).factor == pytest.approx(
+            0.669, abs=1e-3
+        )
 
 
 @pytest.mark.parametrize(("speed", "room"), [(0.0, 0.2), (0.15, 0.25625), (1.0, 1.2833333)])
@@ -79,7 +104,8 @@ def test_the_room_of_a_speed_is_where_it_is_allowed(
     field: Zones, speed: float, room: float
 ) -> None:
     assert field.room(speed) == pytest.approx(room)
-    assert field.allowed(field.room(speed)) == pytest.approx(speed)
+    limit = field.limit(Twist(10.0), only("front", field.room(speed)))
+    assert 10.0 * limit.factor == pytest.approx(speed)
     assert replace(field, react=0.5, deceleration=0.4).room(0.2) == pytest.approx(0.35)
 
 
@@ -99,8 +125,7 @@ def test_a_limited_twist_is_allowed_toward_every_sonar(
     field: Zones, twist: Twist, ranges: tuple[float, ...]
 ) -> None:
     limited = twist.scaled(field.limit(twist, ranges).factor)
-    for sonar, distance in enumerate(ranges):
-        assert field.axes[sonar].approach(limited) <= field.allowed(distance) + 1e-5
+    assert field.limit(limited, ranges).factor == pytest.approx(1.0, abs=1e-5) or limited.is_zero
 
 
 @given(twists, distances)
@@ -128,6 +153,15 @@ def test_measured_motion_has_its_own_bounds(
 ) -> None:
     sonar = field.too_fast(Twist(measured, 0.0), only("front", distance))
     assert sonar == (SONAR_NAMES.index("front") if stops else None)
+
+
+@pytest.mark.parametrize(("angular_deceleration", "stops"), [(1.0, False), (0.1, True)])
+def test_a_measured_turn_is_judged_by_its_own_deceleration(
+    field: Zones, angular_deceleration: float, stops: bool
+) -> None:
+    field = replace(field, angular_deceleration=angular_deceleration)
+    sonar = field.too_fast(Twist(0.0, 0.8), only("left", 0.6))
+    assert sonar == (SONAR_NAMES.index("left") if stops else None)
 
 
 UP, DOWN = Twist(0.5, 1.5), Twist(0.6, 1.0)
