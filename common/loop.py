@@ -37,11 +37,6 @@ class Timer(Struct):
         self.due_ns += self.period_ns * (late_ns // self.period_ns + 1)
         self.handler(now_ns)
 
-    def defer(self, now_ns: int) -> None:
-        """Defer the next call to a period from now: its work was just done."""
-        self.late_ns = max(self.late_ns, now_ns - self.due_ns)
-        self.due_ns = now_ns + self.period_ns
-
 
 class Loop:
     """Runs handlers as they become due, until ``stop``."""

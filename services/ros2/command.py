@@ -17,6 +17,8 @@ pause of ``PAUSE_NS`` is neutral, by its clock and ours: what a network held bac
 | settling   | a delivery that shows that the pause was a delay   | must pause |                   |
 | settling   | a command ``SETTLE_NS`` later                      | drives     | the command       |
 | drives     | a command                                          | drives     | the command       |
+| drives     | a command after a pause                            | drives     | a neutral request,|
+|            |                                                    |            | then the command  |
 | any        | motion while safety bars it, or another one drives | must pause |                   |
 | any        | a command after ``LAPSE_NS`` without one           | must pause |                   |
 
@@ -41,7 +43,7 @@ from services.ros2.cdr import Attachment
 HELD_BACK_NS = NS_PER_S // 5
 SETTLE_NS = NS_PER_S // 2
 PAUSE_NS = NS_PER_S // 2  # silence, or zeros, that count as neutral
-LAPSE_NS = NS_PER_S  # safety wants a neutral request after a source's lease and so much
+LAPSE_NS = NS_PER_S  # of silence, after which a publisher begins anew
 FASTER_NS = NS_PER_S // 50  # a delivery this much faster starts the settling anew
 DRIFT = 5e-4  # s of the minimum per s: what clocks that are slewed drift apart at most
 OWNER_NS = NS_PER_S // 2  # silence after which another publisher may drive
@@ -113,6 +115,7 @@ class Request(NamedTuple):
 
     linear: float  # m/s
     angular: float  # rad/s
+    neutral_first: bool = False  # after a pause: safety wants it if the vehicle stood meanwhile
 
 
 class Publisher(Struct):
@@ -207,7 +210,8 @@ class Commands:
         if refusal := self._of_beginning(known, about, twist, has_paused=has_paused):
             return refusal
         self.owner, self._owned_ns = about.gid, received_ns
-        return Request(twist.linear[0], twist.angular[2])
+        resumes = has_paused and twist.moves and not self._by_zero
+        return Request(twist.linear[0], twist.angular[2], neutral_first=resumes)
 
     def gone(self, gid: bytes) -> None:
         """Let others drive: the publisher's token disappeared."""

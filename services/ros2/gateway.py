@@ -58,6 +58,8 @@ class Gateway:
                 self._drive.request(0.0, 0.0)
             self._refuse(decided, about.gid)
             return
+        if decided.neutral_first:
+            self._drive.request(0.0, 0.0)
         self._drive.request(decided.linear, decided.angular)
         self._note(translate.OK, "taken", "Taken.", about.gid)
 

@@ -12,12 +12,10 @@ from common.messages import (
     Level,
     Limits,
     Release,
-    ResetRequest,
     SafetyState,
 )
 from common.motion import RUN, Twist
 from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched, ordered
-from services.safety.core.inputs import Trigger
 from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, spent
 from services.safety.core.policy import Policy
 from services.safety.core.sonars import UNSEEN, Sonar
@@ -176,7 +174,7 @@ def signature(state: State) -> tuple[object, ...]:
     return state.verdict.name, ordered(state.latches), ids, state.verdict.source, *release
 
 
-def transitions(before: State, after: State, trigger: Trigger | None) -> Iterator[Transition]:
+def transitions(before: State, after: State) -> Iterator[Transition]:
     """Yield the transitions of one decision."""
     old, new = before.verdict, after.verdict
     tripped = [name for name in latched(after.latches) if _is_new(before, after, name)]
@@ -199,7 +197,7 @@ def transitions(before: State, after: State, trigger: Trigger | None) -> Iterato
         what = "Creeping off the bumper." if began else "No longer creeping off the bumper."
         yield Transition("release" if began else "release_end", "warning", what, {})
     yield from _release_events(before.release.refusal, after.release.refusal)
-    if isinstance(trigger, ResetRequest) and (reply := new.reply) is not None:
+    if (reply := new.reply) is not None:
         if reply.done:
             yield Transition("reset", "info", reply.text, {})
         else:

@@ -1,6 +1,10 @@
 """Bus shell of the safety service: subscribes to inputs and publishes verdicts.
 
-All decisions are made by ``Policy``.
+All decisions are made by ``Policy``, 50 times a second. What cannot wait is decided at once: a new
+contact, a driver fault, new ranges, an emergency stop, a reset. A motion leaves at each of the 50
+decisions, and at once if its command is more severe than the last one; such a motion takes the
+place of the next regular one. So no member of the bus can raise the rate of decisions or of frames
+to the board.
 """
 
 from collections.abc import Callable, Collection
@@ -21,16 +25,16 @@ from common.messages import (
     ResetRequest,
     SafetyState,
 )
+from common.motion import BRAKE, RUN, STOP
 from common.service import Node
 from services.safety.config import SafetyConfig
 from services.safety.core.conditions import LOST_SAMPLES
 from services.safety.core.inputs import (
     DriveRequest,
-    Estop,
     Inputs,
     KeepaliveRequest,
     LimitRequest,
-    Trigger,
+    SourceRequest,
 )
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, State
@@ -38,7 +42,8 @@ from services.safety.report import signature, state_message, transitions
 
 M = TypeVar("M", bound=Message)
 
-DECISION_PERIOD_S = 1 / 50  # at most, from one decision to the next
+DECISION_PERIOD_S = 1 / 50
+SEVERITY = {RUN: 0, STOP: 1, BRAKE: 2}
 STATE_PERIOD_S = 1 / 20
 # A single sample latches a hit or a driver fault, and the next one may already be clear. So no
 # sample may be dropped or skipped, even after a stall of a second.
@@ -61,7 +66,11 @@ class SafetyService:
         self._state_publisher = node.bus.publisher(keys.SAFETY)
         self._subscribe()
         node.is_stopped = self._is_stopped
-        self._decision_timer = node.loop.every(DECISION_PERIOD_S, lambda _: self._decide())
+        self._sent = STOP  # command of the newest motion
+        self._ahead = 0  # motions that left before their turn
+        self._estop_due = False  # another emergency stop while one is latched
+        self._may_reset = True  # one reset a period
+        node.loop.every(DECISION_PERIOD_S, self._on_tick)
         node.loop.every(STATE_PERIOD_S, self._publish_state)
 
     def _subscribe(self) -> None:
@@ -72,16 +81,16 @@ class SafetyService:
         self._subscribe_source(keys.ESTOP_KEEPALIVE, KeepaliveRequest, settings.estop_keepalive)
         self._node.bus.serve(keys.RESET, self._on_reset)
         estop_key = keys.estop_key(self._node.config.robot.id)
-        self._estop_bus.on_any(estop_key, lambda _: self._decide(Estop()))
+        self._estop_bus.on_any(estop_key, lambda _: self._on_estop())
         self._estop_bus.subscribe(keys.SAFETY, self._on_estop_path)
 
     def _subscribe_source(
         self,
         topic: Topic[M],
-        request: Callable[[str, M | None, int], Trigger],
+        request: Callable[[str, M | None, int], SourceRequest],
         known: Collection[str],
     ) -> None:
-        """Decide on each message of a source; on an invalid one, too, which is counted.
+        """Accept the messages of sources until the next decision; count the refused ones.
 
         The key of each known source is announced: to a client whose rights cover only one source,
         the router announces only subscribers of exactly its key.
@@ -89,14 +98,14 @@ class SafetyService:
 
         def accept(arrival: Arrival[M]) -> None:
             source = source_of(arrival.key)
-            self._decide(request(source, arrival.message, arrival.received_ns))
+            self._accept(request(source, arrival.message, arrival.received_ns))
 
         bus = self._node.bus
         bus.subscribe(
             topic,
             accept,
             depth=DRIVE_DEPTH,
-            refused=lambda key, _: self._decide(request(source_of(key), None, 0)),
+            refused=lambda key, _: self._accept(request(source_of(key), None, 0)),
             source="*",
         )
         for source in known:
@@ -140,7 +149,26 @@ class SafetyService:
         if due or bumper.pressed or before is None or _content(bumper) != _content(before.value):
             self._decide()
 
+    def _accept(self, request: SourceRequest) -> None:
+        self._state, refused = self._policy.accept(self._state, request, clock.now_ns())
+        if refused:
+            self._node.counters[f"refused_{refused}"] += 1
+
+    def _on_estop(self) -> None:
+        self._estop_due = True
+        if "estop" not in self._state.latches:
+            self._decide()
+
+    def _on_tick(self, _: int) -> None:
+        self._may_reset = True
+        self._decide(is_tick=True)
+
     def _on_reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
+        if not self._may_reset:
+            caller.refuse("Another reset is being decided: try again.")
+            return
+        self._may_reset = False
+
         def answer(reply: Reply) -> None:
             if not reply.done:
                 caller.refuse(reply.text)
@@ -155,34 +183,46 @@ class SafetyService:
         self._decide(request, answer)
 
     def _decide(
-        self, event: Trigger | None = None, answer: Callable[[Reply], None] | None = None
+        self,
+        reset: ResetRequest | None = None,
+        answer: Callable[[Reply], None] | None = None,
+        *,
+        is_tick: bool = False,
     ) -> None:
-        now_ns = clock.now_ns()
-        self._decision_timer.defer(now_ns)
-        inputs = replace(self._inputs, estop_connection=self._estop_bus.connection, event=event)
-        before = self._state
+        now_ns, before = clock.now_ns(), self._state
+        inputs = replace(
+            self._inputs,
+            estop_connection=self._estop_bus.connection,
+            estop=self._estop_due,
+            reset=reset,
+        )
+        self._estop_due = False
         for output in self._policy.decide(before, inputs, now_ns):
             if isinstance(output, Motion):
-                self._motion_publisher.put(output)
+                self._send(output, is_tick=is_tick)
             else:
                 self._state = output
-        self._report(before, event, answer, now_ns)
+        self._report(before, answer, now_ns)
 
-    def _report(
-        self,
-        before: State,
-        event: Trigger | None,
-        answer: Callable[[Reply], None] | None,
-        now_ns: int,
-    ) -> None:
+    def _send(self, motion: Motion, *, is_tick: bool) -> None:
+        """Publish a motion in its turn, or at once if it is more severe than the last one."""
+        if SEVERITY[motion.command] > SEVERITY[self._sent]:
+            self._ahead += not is_tick
+        elif not is_tick:
+            return
+        elif self._ahead:
+            self._ahead -= 1
+            return
+        self._sent = motion.command
+        self._motion_publisher.put(motion)
+
+    def _report(self, before: State, answer: Callable[[Reply], None] | None, now_ns: int) -> None:
         verdict = self._state.verdict
-        if verdict.refused:
-            self._node.counters[f"refused_{verdict.refused}"] += 1
         if answer and verdict.reply:
             answer(verdict.reply)
         if signature(before) != signature(self._state):
             self._publish_state(now_ns)
-        for transition in transitions(before, self._state, event):
+        for transition in transitions(before, self._state):
             self._node.event(transition.name, transition.level, transition.text, **transition.about)
 
     def _publish_state(self, now_ns: int) -> None:

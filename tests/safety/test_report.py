@@ -9,7 +9,6 @@ from msgspec.structs import replace
 from common.codec import decode, encode
 from common.messages import MAX_REASON, MAX_TEXT, SONAR_NAMES, Limits, ResetRequest, SafetyState
 from services.safety.config import LimitSource, Safety, Source
-from services.safety.core.inputs import Estop, Trigger
 from services.safety.core.operator_requests import BUMPER_FREE
 from services.safety.report import (
     sentence,
@@ -19,12 +18,11 @@ from services.safety.report import (
 from tests.safety.core.policy_fixture import PolicyFixture
 
 
-def noted(fixture: PolicyFixture, step: Callable[[], object] | Trigger) -> list[str]:
-    """Take a step, or decide on a trigger; return the events."""
+def noted(fixture: PolicyFixture, step: Callable[[], object]) -> list[str]:
+    """Take a step; return the events."""
     before = fixture.state
-    trigger = None if callable(step) else step
-    step() if callable(step) else fixture.decide(step)
-    return [note.name for note in transitions(before, fixture.state, trigger)]
+    step()
+    return [note.name for note in transitions(before, fixture.state)]
 
 
 def test_nothing_is_allowed_while_a_cause_is_latched() -> None:
@@ -84,15 +82,15 @@ def test_a_release_reports_its_beginning_its_first_refusal_and_its_success() -> 
 
 def test_a_repeated_emergency_stop_is_one_event() -> None:
     fixture = PolicyFixture().running()
-    assert noted(fixture, Estop()) == ["estop"]  # and not "No source is in control."
+    assert noted(fixture, fixture.estop) == ["estop"]  # and not "No source is in control."
     first = fixture.latched()
     fixture.tick(30)
-    assert noted(fixture, Estop()) == []
+    assert noted(fixture, fixture.estop) == []
     assert fixture.latched() != first  # the reset must name the newest one
     fixture.linear = 0.0
     fixture.tick(30)
     assert fixture.reset() == ""
-    assert noted(fixture, Estop()) == ["estop"]
+    assert noted(fixture, fixture.estop) == ["estop"]
 
 
 def test_transitions_are_reported_once() -> None:
@@ -104,16 +102,16 @@ def test_transitions_are_reported_once() -> None:
     assert noted(fixture, fixture.tick) == []
     fixture.left_bits = 3
     assert noted(fixture, fixture.tick) == ["driver_fault"]
-    assert noted(fixture, Estop()) == ["estop"]
-    assert noted(fixture, ResetRequest()) == ["reset_refused"]
+    assert noted(fixture, fixture.estop) == ["estop"]
+    assert noted(fixture, lambda: fixture.decide(reset=ResetRequest())) == ["reset_refused"]
     fixture.pressed, fixture.left_bits = False, 0
     fixture.tick(30)
     fixture.pressed = True
     assert noted(fixture, fixture.tick) == ["contact"]  # another press beside the first
     fixture.pressed = False
     fixture.tick(30)
-    assert noted(fixture, ResetRequest(echo=fixture.echo, causes=fixture.latched())) == ["reset"]
-    assert noted(fixture, ResetRequest(echo=fixture.echo, causes=(1,))) == ["reset_refused"]
+    assert noted(fixture, fixture.reset) == ["reset"]
+    assert noted(fixture, lambda: fixture.reset(1)) == ["reset_refused"]
 
 
 def test_untrusted_sonars_are_listed() -> None:
@@ -162,7 +160,7 @@ def test_zeros_after_an_emergency_stop_are_no_control() -> None:
     before = fixture.state
     fixture.request(0.0)
     assert fixture.state.verdict.source == "teleop"
-    assert list(transitions(before, fixture.state, None)) == []
+    assert list(transitions(before, fixture.state)) == []
 
 
 def test_the_longest_state_decodes() -> None:

@@ -14,7 +14,7 @@ from common import heartbeat, keys
 from common import messages as m
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.motion import Command
+from common.motion import Command, Twist
 from common.standstill import Displacement
 from common.wire import framing
 from common.wire.frame import Frame, Side
@@ -24,7 +24,7 @@ from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
 from services.ros2 import command
 from services.safety.config import LimitSource, Safety
-from services.safety.core import causes, conditions, operator_requests, policy, sources
+from services.safety.core import causes, conditions, operator_requests, planning, policy, sources
 from services.safety.core.causes import Held, Observation
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import Standstill
@@ -59,7 +59,8 @@ PROTECTIVE_STOP: Script = (
     lambda s: s.limit(0.0, 1500, source=IGNORED),
     lambda s: s.limit(None, source=IGNORED),  # while the stick is pushed
 )
-FRONT = range(2, 3)
+FRONT, LEFT = range(2, 3), range(1)
+CRAWL: Script = (lambda s: s.request(0.05, 1500),)
 
 
 def brakes_go_off_and_on(stack: Stack) -> None:
@@ -316,6 +317,10 @@ def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False)
     return STORE(ports, field)
 
 
+def as_straight(twist: Twist, deceleration: float, _: float) -> float:
+    return (abs(twist.linear) + abs(twist.angular) * 0.55) / deceleration
+
+
 def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
     lost = state.estop_connection > 0 and not inputs.estop_connection
     return Observation("estop_reader", lost, (0, now_ns))
@@ -427,6 +432,15 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "samples are not decided upon one by one": (
         (SafetyService, "_store", at_the_next_tick), (driver_blinks,), "safety knows of driver",
+    ),
+    "a source drives on from a standstill": (
+        (Arbiter, "at_rest", unchanged),
+        (*CRAWL, lambda s: s.silence("teleop", 900), *CRAWL), "was not neutral",
+    ),
+    "a turn is judged by the linear deceleration": (
+        (planning, "stopping_s", as_straight),
+        (lambda s: s.request(0.0, 400), lambda s: s.sonars(600, numbers=LEFT),
+         lambda s: s.request(0.0, 1500, angular=1.0)), "toward sonar 0",
     ),
     "the margin is ignored": (
         configured("safety", margin=0.0), (lambda s: s.sonars(250, numbers=FRONT),),

@@ -55,11 +55,16 @@ class RosSource(Source):
         about = Attachment(self._sent, now_ns, self._nodes.to_bytes(16, "big"))
         decided = self._commands.judge(about, self._twist, now_ns, now_ns, self._state)
         if decided is BEGINS:
-            if now_ns - moved_ns < PAUSE_NS:
-                self._violations.append("a neutral request without a pause of the ROS node")
-            self.put(m.Drive(linear=0.0, angular=0.0, echo=self.echo))
+            self._put_neutral(now_ns - moved_ns)
         elif isinstance(decided, Request):
+            if decided.neutral_first:
+                self._put_neutral(now_ns - moved_ns)
             self.put(m.Drive(linear=decided.linear, angular=decided.angular, echo=self.echo))
+
+    def _put_neutral(self, paused_ns: int) -> None:
+        if paused_ns < PAUSE_NS:
+            self._violations.append("a neutral request without a pause of the ROS node")
+        self.put(m.Drive(linear=0.0, angular=0.0, echo=self.echo))
 
     def _on_state(self, arrival: Any) -> None:
         self._state = arrival.message

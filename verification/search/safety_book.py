@@ -19,6 +19,7 @@ from verification.search.condition_books import (
     LimitBook,
     StandstillBook,
     channels,
+    rolls,
 )
 from verification.search.operator_book import OperatorBook, direction_of
 
@@ -66,6 +67,7 @@ class SafetyBook:
     barred_ns: int = 0  # when anything last wanted a neutral request
     better_ns: dict[str, int] = field(default_factory=dict)  # source: when it was last overruled
     let_go: set[str] = field(default_factory=set)  # sources whose next release may begin
+    stood_ns: int = 0  # when the newest two velocities were those of a standstill
     fast_ns: int | None = None  # since when the vehicle is measured to be too fast
     estop_session_was_up: bool = False
     decided_ns: int | None = None
@@ -86,12 +88,14 @@ class SafetyBook:
 
     def _on_drive(self, source: str, drive: m.Drive, sent_ns: int | None, now_ns: int) -> None:
         channel = self.requests[source]
-        lapsed = now_ns - channel.at_ns > (channel.lease_s + LAPSE_S) * NS_PER_S
+        over_ns = channel.at_ns + round(channel.lease_s * NS_PER_S)
+        rested = now_ns > over_ns and self.stood_ns > over_ns + STEP_S * NS_PER_S
+        lapsed = rested or now_ns > over_ns + LAPSE_S * NS_PER_S
         before, was_fresh = channel.message, channel.is_fresh(now_ns)
         if not channel.take(drive, sent_ns, now_ns):
             return
         if lapsed:
-            self.neutral.pop(source, None)  # a program that was suspended
+            self.neutral.pop(source, None)  # it does not drive on by itself
         if lapsed or (before and before.boot != drive.boot):
             self.let_go.discard(source)
         if channel.is_neutral:
@@ -109,6 +113,9 @@ class SafetyBook:
         if isinstance(message, m.Bumper):
             self._on_bumper(message, now_ns)
         if isinstance(message, m.Velocity):
+            _, before = self.samples.get("velocity", (0, None))
+            if isinstance(before, m.Velocity) and not rolls(before) and not rolls(message):
+                self.stood_ns = now_ns
             too_fast = abs(message.linear) > FAST_MPS
             self.fast_ns = (self.fast_ns or now_ns) if too_fast else None
             self.standstill.on_velocity(message, now_ns)

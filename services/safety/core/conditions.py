@@ -7,7 +7,7 @@ from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Driver
 from services.safety.config import Safety
 from services.safety.core.causes import Observation, Token
-from services.safety.core.inputs import Estop, Inputs
+from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.state import State
 
@@ -61,7 +61,7 @@ def _contact(inputs: Inputs) -> Observation:
 def _estop_received(inputs: Inputs, state: State) -> bool:
     """Return whether an emergency stop was received, by safety or since then by the bridge."""
     waiting = inputs.link.value.estop if inputs.link else None
-    return waiting not in (None, state.estop) or isinstance(inputs.event, Estop)
+    return waiting not in (None, state.estop) or inputs.estop
 
 
 def _estop_reader(inputs: Inputs, state: State, now_ns: int) -> Observation:

@@ -1,4 +1,4 @@
-"""Inputs of a decision: the newest sample of each stream, and at most one event."""
+"""Inputs of a decision: the newest sample of each stream, and what operators ask for."""
 
 from typing import Generic, TypeVar
 
@@ -45,11 +45,7 @@ class KeepaliveRequest(Request[EstopKeepalive], frozen=True):
     """A sign of life of an emergency stop."""
 
 
-class Estop(Struct, frozen=True):
-    """A PUT or DELETE on the estop key."""
-
-
-Trigger = DriveRequest | LimitRequest | KeepaliveRequest | Estop | ResetRequest
+SourceRequest = DriveRequest | LimitRequest | KeepaliveRequest
 
 
 class Inputs(Struct, frozen=True):
@@ -67,7 +63,8 @@ class Inputs(Struct, frozen=True):
     # This service's own state, received back through the router on that session.
     estop_path: Latest[SafetyState] | None = None
     leaving: bool = False  # whether this service is shutting down
-    event: Trigger | None = None
+    estop: bool = False  # a PUT or DELETE on the estop key since the last decision
+    reset: ResetRequest | None = None
     boot: int = 0  # this service's own
 
     def known_velocity(self, now_ns: int, age_s: float) -> Latest[Twist] | None:

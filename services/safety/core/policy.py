@@ -1,15 +1,14 @@
 """Policy: one decision, from inputs and state to the motion for the bridge.
 
-Each decision takes these steps, always in this order, so that a trip wins over an event that
-arrives with it:
+Messages of sources are accepted or refused as they arrive (``sources.py``). Each decision takes
+these steps, always in this order, so that a trip wins over a reset that arrives with it:
 
-1. accept    accept or refuse a message of a source (``sources.py``)
-2. sense     update sonars, runaway, standstill and the travel of a release
-3. observe   observe every cause that does not depend on a request (``conditions.py``); while one
+1. sense     update sonars, runaway, standstill and the travel of a release
+2. observe   observe every cause that does not depend on a request (``conditions.py``); while one
              bars motion, a neutral request is due (``Arbiter.barred``)
-4. handle    carry out a reset (``operator_requests.py``)
-5. arm       note which sources are overruled; begin, continue or end a release
-6. conclude  plan the requested motion (``planning.py``), then apply the worst action
+3. handle    carry out a reset (``operator_requests.py``)
+4. arm       note which sources are overruled; begin, continue or end a release
+5. conclude  plan the requested motion (``planning.py``), then apply the worst action
              (``causes.py``)
 
 RUN has one origin: the end of ``_conclude``, when no held cause demands STOP or BRAKE and a fresh
@@ -21,7 +20,7 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Motion, ResetRequest
+from common.messages import Motion
 from common.messages import Verdict as VerdictName
 from common.motion import BRAKE, RUN, STILL, STOP, Command
 from common.settings import Vehicle
@@ -38,7 +37,7 @@ from services.safety.core.causes import (
     ordered,
 )
 from services.safety.core.conditions import observe_inputs
-from services.safety.core.inputs import DriveRequest, Inputs, KeepaliveRequest, LimitRequest
+from services.safety.core.inputs import DriveRequest, Inputs, LimitRequest, SourceRequest
 from services.safety.core.motion_watch import Supervisor
 from services.safety.core.operator_requests import answered, carry_out
 from services.safety.core.planning import Plan, Planner, observations
@@ -70,8 +69,34 @@ class Policy:
             Keepalives(settings.estop_keepalive, settings.estop_keepalive_timeout),
         )
 
+    def accept(self, state: State, request: SourceRequest, now_ns: int) -> tuple[State, str]:
+        """Accept a message of a source; return the reason of its refusal, empty when accepted."""
+        settings = self.settings
+        match request:
+            case DriveRequest():
+                arbiter = self._noting_rest(state, now_ns)
+                checked = self._admission(state, settings.times.max_echo_age, now_ns)
+                arbiter, refused = arbiter.accept(request, checked)
+                return replace(state, arbiter=arbiter.overruled(now_ns)), refused
+            case LimitRequest():
+                checked = self._admission(state, settings.times.max_echo_age, now_ns)
+                limits, refused = state.speed_limits.accept(request, checked)
+                return replace(state, speed_limits=limits), refused and f"limit_{refused}"
+            case _:
+                checked = self._admission(state, settings.estop_keepalive_timeout, now_ns)
+                keepalives, refused = state.keepalives.accept(request, checked)
+                return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
+
+    def _admission(self, state: State, age_s: float, now_ns: int) -> Admission:
+        return Admission(state.heartbeat, round(age_s * NS_PER_S), now_ns)
+
+    def _noting_rest(self, state: State, now_ns: int) -> Arbiter:
+        """Return the arbiter, which remembers when the vehicle last stood."""
+        stands = state.motion.standstill.displacement.is_standing
+        return state.arbiter.at_rest(now_ns) if stands else state.arbiter
+
     def decide(self, state: State, inputs: Inputs, now_ns: int) -> Iterator[Motion | State]:
-        """Yield what to send, urgent first, then the new state; an event is handled once."""
+        """Yield what to send, urgent first, then the new state."""
         bumper = inputs.bumper
         if bumper is not None and bumper.value.pressed and "contact" not in state.latches:
             hit = Verdict(command=BRAKE, judged=_judged(inputs))
@@ -79,43 +104,24 @@ class Policy:
         step_s = min((now_ns - (state.decided_ns or now_ns)) / NS_PER_S, LONGEST_STEP_S)
         # 2 equivalent mutants: any step tells one decision from the next.
         state = replace(state, decision=state.decision + 1)
-        state, refused = self._accept(state, inputs, now_ns)
         state = self._sense(state, inputs, step_s, now_ns)
         state = self._observe(state, inputs, now_ns)
         # 1 equivalent mutant: an empty text is as false as None.
         reply = None
-        if isinstance(inputs.event, ResetRequest):
-            state, reply = carry_out(inputs.event, state, inputs, self.settings, now_ns)
+        if inputs.reset is not None:
+            state, reply = carry_out(inputs.reset, state, inputs, self.settings, now_ns)
         state = self._arm(state, now_ns)
         state = replace(state, release=answered(state, inputs, self.settings, now_ns))
         state, verdict = self._conclude(state, inputs, step_s, now_ns)
         state = replace(
             state,
             decided_ns=now_ns,
-            verdict=replace(verdict, refused=refused, reply=reply),
+            verdict=replace(verdict, reply=reply),
             estop_connection=inputs.estop_connection or state.estop_connection,
             estop=inputs.link.value.estop if inputs.link else None,
         )
         yield _motion(verdict, inputs, state.estop, is_latched=bool(latched(state.latches)))
         yield state
-
-    def _accept(self, state: State, inputs: Inputs, now_ns: int) -> tuple[State, str]:
-        event, settings = inputs.event, self.settings
-        is_kept = isinstance(event, KeepaliveRequest)
-        age_s = settings.estop_keepalive_timeout if is_kept else settings.times.max_echo_age
-        admission = Admission(state.heartbeat, round(age_s * NS_PER_S), now_ns)
-        match event:
-            case DriveRequest():
-                arbiter, refused = state.arbiter.accept(event, admission)
-                return replace(state, arbiter=arbiter), refused
-            case LimitRequest():
-                limits, refused = state.speed_limits.accept(event, admission)
-                return replace(state, speed_limits=limits), refused and f"limit_{refused}"
-            case KeepaliveRequest():
-                keepalives, refused = state.keepalives.accept(event, admission)
-                return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
-            case _:
-                return state, ""
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         sent, counters = state.verdict, inputs.mileage
@@ -160,7 +166,7 @@ class Policy:
         return replace(state, latches=held, fault_budget=budget, release=release, arbiter=arbiter)
 
     def _arm(self, state: State, now_ns: int) -> State:
-        arbiter, overrides = state.arbiter, state.overrides
+        arbiter, overrides = self._noting_rest(state, now_ns), state.overrides
         if state.sonar_array.unseen or overrides.since:
             neutral = {
                 # 1 equivalent mutant: both are before any fault.

@@ -18,8 +18,8 @@ restored snapshot: all earlier messages echo a heartbeat that is too old by then
 **Arbiter.** The fresh source of the highest priority is in control. A source is fresh while its
 last request is younger than its lease; it gives up control by silence. A source may move the
 vehicle only after a *neutral* request (zero): after its own start, after every cause that requires
-it, after a source of higher priority was in control, and when its lease has been over for
-``LAPSE_S``.
+it, after a source of higher priority was in control, when its lease was over while the vehicle
+stood, and when its lease has been over for ``LAPSE_S``.
 
 **Speed limits** by third parties: a lidar, a person detector, a fleet manager. The newest limit of
 a source holds for its lease. A cap scales the requested twist as a whole, which keeps its curve; it
@@ -149,6 +149,7 @@ class Arbiter(Struct, frozen=True):
     sources: Mapping[str, Source]
     channels: Mapping[str, DriveChannel] = {}
     barred_ns: int = 0  # the last decision with a cause that wants a neutral request
+    rested_ns: int = 0  # when the vehicle was last known to stand
 
     def accept(self, request: DriveRequest, admission: Admission) -> tuple["Arbiter", str]:
         """Check a request; return the reason of its refusal, empty when accepted."""
@@ -159,11 +160,25 @@ class Arbiter(Struct, frozen=True):
         before, lease_s = self.channels.get(name, DriveChannel()), self.sources[name].lease
         channel, refused = before.accept(drive, request.received_ns, lease_s, admission.max_age_ns)
         if not refused:
-            # A program that was suspended must not drive on by itself.
-            if not before.is_fresh(request.received_ns, lease_s + LAPSE_S):
+            if self._resumes(before, request.received_ns, lease_s):
                 channel = replace(channel, neutral_ns=None)
             channel = _requesting(channel, drive, request.received_ns)
         return replace(self, channels={**self.channels, name: channel}), refused
+
+    def _resumes(self, channel: DriveChannel, received_ns: int, lease_s: float) -> bool:
+        """Return whether a source must not drive on by itself after its silence.
+
+        The vehicle has come to rest meanwhile, or the program was suspended. A gap in which the
+        vehicle never stood changes nothing, or each stall of the host would end a program.
+        """
+        if channel.received_ns is None or channel.is_fresh(received_ns, lease_s):
+            return False
+        over_ns = channel.received_ns + lease_s * NS_PER_S
+        return self.rested_ns > over_ns or not channel.is_fresh(received_ns, lease_s + LAPSE_S)
+
+    def at_rest(self, now_ns: int) -> "Arbiter":
+        """Return the arbiter of a vehicle that stands now."""
+        return replace(self, rested_ns=now_ns)
 
     def in_control(self, now_ns: int) -> str | None:
         """Return the fresh source of the highest priority."""

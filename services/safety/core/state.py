@@ -21,7 +21,7 @@ class Reply(Struct, frozen=True):
 
 
 class Verdict(Struct, frozen=True):
-    """Command for the bridge, and the result of the event that came with the inputs."""
+    """Command for the bridge, and the reply to a reset that came with the inputs."""
 
     name: VerdictName = "inhibited"
     command: Command = STOP
@@ -30,7 +30,6 @@ class Verdict(Struct, frozen=True):
     control: str | None = None  # the source, unless a cause forbids every motion
     judged: Token = (0, 0)  # boot and seq of the newest bumper sample taken into account
     reply: Reply | None = None  # to a reset
-    refused: str = ""  # reason of a refused message, by the names in ``sources.py``
     limited_by: str | None = None  # the limit source that slows the requested twist
     slowed_by: int | None = None  # the sonar that does
     blocked_by: int | None = None  # the sonar without room for any motion

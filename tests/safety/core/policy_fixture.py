@@ -31,11 +31,10 @@ from services.safety.config import Safety
 from services.safety.core.causes import latched
 from services.safety.core.inputs import (
     DriveRequest,
-    Estop,
     Inputs,
     KeepaliveRequest,
     LimitRequest,
-    Trigger,
+    SourceRequest,
 )
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, Verdict
@@ -68,6 +67,7 @@ class PolicyFixture:
         self.inputs = Inputs()
         self.verdict = Verdict()
         self.motions: list[Motion] = []
+        self.refused = ""  # why the newest message of a source was refused
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
         self.driver_boot, self.driver_seq = 99, 0
@@ -85,8 +85,15 @@ class PolicyFixture:
         self.estop_connection = 1
         self.decide()  # a service decides before anything has come
 
-    def decide(self, event: Trigger | None = None) -> Verdict:
-        inputs = replace(self.inputs, estop_connection=self.estop_connection, event=event)
+    def accept(self, request: SourceRequest) -> Verdict:
+        """Accept a message of a source, and decide."""
+        self.state, self.refused = self.policy.accept(self.state, request, self.now_ns)
+        return self.decide()
+
+    def decide(self, *, estop: bool = False, reset: ResetRequest | None = None) -> Verdict:
+        inputs = replace(
+            self.inputs, estop_connection=self.estop_connection, estop=estop, reset=reset
+        )
         self.motions = []
         for output in self.policy.decide(self.state, inputs, self.now_ns):
             if isinstance(output, Motion):
@@ -152,7 +159,7 @@ class PolicyFixture:
             seq=self.driver_seq,
             boot=self.driver_boot,
         )
-        return self.decide(DriveRequest(source, drive, self.now_ns))
+        return self.accept(DriveRequest(source, drive, self.now_ns))
 
     def limit(
         self,
@@ -167,7 +174,7 @@ class PolicyFixture:
             linear=linear, angular=angular, reason=reason,
             echo=self.echo, seq=self.limit_seq, boot=self.limit_boot,
         )  # fmt: skip
-        return self.decide(LimitRequest(source, limit, self.now_ns))
+        return self.accept(LimitRequest(source, limit, self.now_ns))
 
     def keepalive(self, source: str = "pendant", echo: int | None = None) -> Verdict:
         """Put one keepalive."""
@@ -177,7 +184,7 @@ class PolicyFixture:
             seq=self.keepalive_seq,
             boot=66,
         )
-        return self.decide(KeepaliveRequest(source, message, self.now_ns))
+        return self.accept(KeepaliveRequest(source, message, self.now_ns))
 
     def drive(
         self,
@@ -216,7 +223,8 @@ class PolicyFixture:
 
     def reset(self, *causes: int, echo: int | None = None) -> str:
         """Reset these causes, all by default; return the reason of a refusal."""
-        self.decide(ResetRequest(echo=echo or self.echo, causes=causes or self.latched()))
+        call = ResetRequest(echo=echo or self.echo, causes=causes or self.latched())
+        self.decide(reset=call)
         return "" if self.reply().done else self.reply().text
 
     def hold(
@@ -257,7 +265,7 @@ class PolicyFixture:
         return text(self.state, name)
 
     def estop(self) -> Verdict:
-        return self.decide(Estop())
+        return self.decide(estop=True)
 
     def sonar(self, **distances: float | None) -> None:
         """Set readings by the sonar's name; None is a fault."""

@@ -13,7 +13,7 @@ from common.standstill import Displacement
 from services.safety.config import LimitSource, Safety
 from services.safety.core.causes import Held, Observation
 from services.safety.core.conditions import observe_inputs
-from services.safety.core.inputs import Estop, Inputs
+from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch, Phase, Standstill
 from services.safety.core.policy import Policy
 from services.safety.core.sources import (
@@ -112,7 +112,7 @@ def switched(ultrasonic: bool | None, strip: bool | None, age_s: float = 0.0) ->
 # Inputs that differ from the good ones, the observed cause, and its text; None: it is absent.
 BY_INPUTS: list[tuple[dict[str, Any], str, str | None]] = [
     (bumper(pressed=True), "contact", ""),
-    ({"event": Estop()}, "estop", ""),
+    ({"estop": True}, "estop", ""),
     (linked(estop=3), "estop", ""),
     (driver("left", "over_current", "bit_31", bits=9), "driver_left",
      "The left motor driver reports: over current, bit 31."),

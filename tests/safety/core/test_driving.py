@@ -50,7 +50,8 @@ def test_a_request_holds_for_its_lease_and_not_longer() -> None:
 def test_two_publishers_stop_the_vehicle_until_one_is_left_and_neutral() -> None:
     fixture = PolicyFixture().running()
     fixture.driver_boot, fixture.driver_seq = 100, 0
-    assert fixture.request(0.5).refused == "second_publisher"
+    fixture.request(0.5)
+    assert fixture.refused == "second_publisher"
     assert fixture.verdict.command == "stop"
     assert fixture.state.latches["two_publishers"].text == "Two publishers use teleop."
     fixture.driver_boot, fixture.driver_seq = 99, 10_000
@@ -119,7 +120,7 @@ def test_an_old_request_behind_a_queued_zero_moves_nothing() -> None:
             linear=linear, angular=0, echo=fixture.state.heartbeat.number, seq=fixture.driver_seq,
             boot=fixture.driver_boot,
         )  # fmt: skip
-        assert fixture.decide(DriveRequest("teleop", drive, received_ns)).twist.is_zero
+        assert fixture.accept(DriveRequest("teleop", drive, received_ns)).twist.is_zero
     assert fixture.verdict.source is None
 
 

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S, Latest
 from common.messages import (
     Bumper,
+    Drive,
     Limits,
     SafetyState,
     Switches,
@@ -16,7 +17,7 @@ from common.messages import (
 from common.motion import Twist
 from services.safety.config import Safety
 from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
-from services.safety.core.inputs import Inputs
+from services.safety.core.inputs import DriveRequest, Inputs
 from tests.factories import link
 from tests.safety.core.policy_fixture import DIRECTIONS, TICK_S, UNKNOWN_TEXT, PolicyFixture, hit
 
@@ -343,9 +344,48 @@ def test_a_new_contact_brakes_first_as_its_decision_does(latched_by: int | None)
     assert first.predecessor == latched_by
 
 
+@pytest.mark.parametrize(("source", "ticks"), [("nav", 12), ("teleop", 16)])
+def test_a_source_that_was_silent_at_a_standstill_does_not_drive_on(
+    source: str, ticks: int
+) -> None:
+    fixture = PolicyFixture().ready()
+    fixture.tick(20)
+    fixture.drive(source=source)
+    fixture.drive(0.5, seconds=1.0, source=source)
+    fixture.tick(ticks - 4)
+    fixture.request(0.5, source=source)
+    assert fixture.verdict.command == "run"  # its lease lives
+    fixture.tick(ticks + 40)  # it stops, and stands
+    assert fixture.verdict.twist.is_zero
+    fixture.drive(0.5, seconds=1.0, source=source)
+    assert fixture.verdict.command == "stop"
+    assert "neutral" in fixture.state.latches
+    fixture.drive(source=source)
+    assert fixture.drive(0.5, source=source).command == "run"
+
+
+def test_a_gap_in_which_the_vehicle_never_stood_changes_nothing() -> None:
+    fixture = PolicyFixture().running(0.5)
+    fixture.linear = 0.3  # it rolls on
+    fixture.tick(30)
+    assert fixture.verdict.command == "stop"
+    assert fixture.drive(0.5).command == "run"
+
+
+def test_a_zero_that_arrives_under_a_higher_source_is_not_neutral() -> None:
+    """Between two decisions the higher source falls silent."""
+    fixture = PolicyFixture().ready()
+    fixture.tick(15)
+    zero = Drive(linear=0.0, angular=0.0, echo=fixture.echo, seq=1, boot=3)
+    request = DriveRequest("nav", zero, fixture.now_ns)
+    state, _ = fixture.policy.accept(fixture.state, request, fixture.now_ns)
+    assert not state.arbiter.is_neutral("nav")
+
+
 def test_other_samples_yield_one_motion() -> None:
     fixture = PolicyFixture().running(0.3)
-    assert fixture.tick().refused == ""
+    fixture.tick()
+    assert fixture.refused == ""
     assert len(fixture.motions) == 1
     fixture = hit()  # a release may be moving the vehicle off the obstacle
     fixture.tick()

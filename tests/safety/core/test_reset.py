@@ -88,14 +88,14 @@ def test_a_reset_of_nothing_is_refused() -> None:
 
 def test_a_reset_that_names_nothing_is_refused() -> None:
     fixture = stopped()
-    refused = fixture.decide(ResetRequest(echo=fixture.echo)).reply
+    refused = fixture.decide(reset=ResetRequest(echo=fixture.echo)).reply
     assert refused == Reply(
         False,
         "The reset names no cause. Latched: Emergency stop. Send the `id` of each as `causes`.",
     )
     assert latched(fixture.state.latches) == ("estop",)
     blink(fixture)
-    refused = fixture.decide(ResetRequest(echo=fixture.echo)).reply
+    refused = fixture.decide(reset=ResetRequest(echo=fixture.echo)).reply
     fault = fixture.state.latches["driver_left"].text
     assert refused is not None
     assert f"Latched: Emergency stop. {fault} Send" in refused.text
@@ -123,7 +123,7 @@ def test_a_late_reset_is_refused(ticks: int, age: str) -> None:
 
 def test_a_reset_without_a_known_echo_is_refused() -> None:
     fixture = stopped()
-    assert fixture.decide(ResetRequest(echo=None, causes=fixture.latched())).reply == Reply(
+    assert fixture.decide(reset=ResetRequest(echo=None, causes=fixture.latched())).reply == Reply(
         False, NO_ECHO_TEXT
     )
     assert "unknown heartbeat" in fixture.reset(echo=2**62)
@@ -205,7 +205,7 @@ class Latches(RuleBasedStateMachine):
     def reset(self, name: str) -> None:
         before = {one.id: one for one in map(self.fixture.state.latches.__getitem__, self.held)}
         ids = self.seen if name == "seen" else self.fixture.latched()[: 1 if name == "first" else 9]
-        reply = self.fixture.decide(ResetRequest(echo=self.fixture.echo, causes=ids)).reply
+        reply = self.fixture.decide(reset=ResetRequest(echo=self.fixture.echo, causes=ids)).reply
         assert reply
         gone = before.keys() - set(self.fixture.latched())
         assert gone == set(reply.cleared)

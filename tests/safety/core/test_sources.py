@@ -219,6 +219,28 @@ def test_a_suspended_source_needs_a_neutral_request(gap_s: float, neutral: bool)
     assert arbiter.is_neutral("teleop") is neutral
 
 
+@pytest.mark.parametrize(
+    ("rested_ms", "gap_ms", "neutral"),
+    [
+        (0, 300, True),  # it stands, and the lease lives
+        (300, 301, True),  # it stood until the lease was over, and rolls on
+        (301, 302, False),
+        (500, 900, False),  # it stood, and another source moves it
+    ],
+)
+def test_a_source_whose_lease_was_over_at_a_standstill_resumes(
+    rested_ms: int, gap_ms: int, neutral: bool
+) -> None:
+    arbiter = request(DRIVES, 1)[0].at_rest(rested_ms * MS)
+    at_ns = gap_ms * MS
+    drive = Drive(linear=0.5, angular=0.0, echo=43, seq=2, boot=1)
+    arbiter, refused = arbiter.accept(
+        DriveRequest("teleop", drive, at_ns), Admission(BEAT.beat(at_ns), AGE_NS, at_ns)
+    )
+    assert refused == ""
+    assert arbiter.is_neutral("teleop") is neutral
+
+
 def test_a_zero_counts_that_was_received_after_the_last_bar() -> None:
     arbiter = request(request(DRIVES, 5)[0], 5, source="web", linear=0.5)[0]
     assert not arbiter.is_neutral("web")
