@@ -16,10 +16,12 @@ from common.bus.session import client_config
 from common.client import reset_request
 from common.config import Sources, load
 from common.loop import Loop
-from common.messages import Bumper, Drive, Motion, SafetyState, Velocity
+from common.messages import Bumper, Drive, Motion, ResetRequest, SafetyState, Velocity
+from common.motion import BRAKE, RUN, STOP
 from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
+from services.safety.core.inputs import DriveRequest
 from services.safety.service import SafetyService
 from tests.common.bus_fixture import until_received
 from tests.factories import safety_state
@@ -192,6 +194,72 @@ def test_only_its_own_state_shows_that_an_emergency_stop_would_arrive(
     for boot, counts in ((own + 1, False), (own, True)):
         service._on_estop_path(Arrival(replace(safety_state(), boot=boot), "", 1, None))
         assert (service._inputs.estop_path is not None) is counts
+
+
+class Refusing:
+    """A caller of a reset."""
+
+    def __init__(self) -> None:
+        self.answers: list[str] = []
+
+    def refuse(self, text: str) -> None:
+        self.answers.append(text)
+
+
+@pytest.fixture
+def sent(service: SafetyService, monkeypatch: pytest.MonkeyPatch) -> list[Motion]:
+    """Return the motions that leave from now on."""
+    motions: list[Motion] = []
+    monkeypatch.setattr(service._motion_publisher, "put", motions.append)
+    return motions
+
+
+def test_a_flood_raises_neither_decisions_nor_motions(
+    service: SafetyService, sent: list[Motion]
+) -> None:
+    """Of known and unknown sources, of emergency stops and resets, between 50 decisions."""
+    before, caller = service._state.decision, Refusing()
+    drive = Drive(linear=0.5, angular=0.0, echo=service._state.heartbeat.number, boot=1)
+    for tick in range(50):
+        service._on_tick(0)
+        for seq in range(20):
+            message = replace(drive, linear=0.5 * (seq % 2), seq=20 * tick + seq + 1)
+            for source, request in (("teleop", message), ("nobody", message), ("teleop", None)):
+                service._accept(DriveRequest(source, request, clock.now_ns()))
+            service._on_estop()
+            service._on_reset(ResetRequest(), caller)  # type: ignore[arg-type]
+    assert service._state.decision - before == 50 + 1 + 50  # ticks, the first stop, resets
+    assert len(sent) <= 51
+    assert service._node.counters["refused_unknown_source"] == 1000
+    assert caller.answers.count("Another reset is being decided: try again.") == 50 * 19
+    assert "estop" in service._state.latches
+
+
+def test_a_more_severe_motion_leaves_at_once_and_takes_the_next_turn(
+    service: SafetyService, sent: list[Motion]
+) -> None:
+    sent.clear()
+    run, stop, brake = (Motion(command=each, judged=0) for each in (RUN, STOP, BRAKE))
+    for motion, is_tick, leaves in (
+        (run, False, False),  # less severe than the STOP before it
+        (run, True, True),
+        (run, False, False),
+        (stop, False, True),
+        (run, False, False),
+        (stop, True, False),  # the STOP has taken its turn
+        (run, True, True),
+        (stop, False, True),
+        (stop, False, False),
+        (brake, False, True),
+        (brake, True, False),
+        (stop, True, False),
+        (stop, True, True),
+        (brake, True, True),
+        (stop, True, True),
+    ):
+        before = len(sent)
+        service._send(motion, is_tick=is_tick)
+        assert sent[before:] == [motion] * leaves
 
 
 def test_bumper_samples_without_news_are_decided_on_in_time_and_not_one_by_one(

@@ -156,6 +156,8 @@ GREEDY = [
     Fault("queries as fast as possible", injectors.query_flood, ON, hold_s=3.0),
     Fault("queries as fast as possible, then contact",
           steps(injectors.query_flood, pause(1.0), hit(0.3)), RESET, within(0.02)),
+    Fault("requests as fast as possible, then estop",
+          steps(injectors.request_flood, pause(1.0), estop), RESET, within(0.02)),
     Fault("browser's estop in floods of messages and events", injectors.browser_estop,
           RESET, within(0.3)),
 ]  # fmt: skip

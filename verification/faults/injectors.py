@@ -56,6 +56,21 @@ with session(sys.argv[1]) as bus:
             for _ in replies:
                 pass
 """
+# Of a source that may drive, of unknown ones, and garbage; 1,000 of each a second.
+REQUESTS = """
+import sys, time, msgpack
+from verification.faults.independent_client import ROOT, session
+drive, seq = {"linear": 0.0, "angular": 0.0, "echo": 0, "boot": 7}, 0
+with session(sys.argv[1]) as bus:
+    while True:
+        for _ in range(10):
+            seq += 1
+            message = msgpack.packb(drive | {"seq": seq, "linear": 0.3 * (seq % 2)})
+            bus.put(f"{ROOT}/@cmd/drive/nav", message)
+            bus.put(f"{ROOT}/@cmd/drive/nobody{seq % 50}", message)
+            bus.put(f"{ROOT}/@cmd/drive/nav", bytes([0xC1]) * 40)
+        time.sleep(0.01)
+"""
 # Control characters are escaped before they are shown, which makes them longer still.
 EVENTS = """
 import sys, time, msgpack
@@ -148,6 +163,12 @@ def flood(fixture: StackFixture) -> None:
 def query_flood(fixture: StackFixture) -> None:
     """Query the schemas of all services, 80 queries at once, as often as they are answered."""
     _start(fixture, QUERIES, operators_endpoint(fixture.running.config))
+
+
+@injector
+def request_flood(fixture: StackFixture) -> None:
+    """Publish requests of one known and many unknown sources, and garbage, 3,000 a second."""
+    _start(fixture, REQUESTS, operators_endpoint(fixture.running.config))
 
 
 def _start(fixture: StackFixture, program: str, word: str) -> None:
