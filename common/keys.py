@@ -159,6 +159,11 @@ def info_key(robot: str, service: str, part: str) -> str:
     return f"{ROOT}/{robot}/info/{service}/{part}"
 
 
+def app_key(robot: str, name: str) -> str:
+    """Return the prefix of the keys that a member of the bus may use as it likes."""
+    return f"{ROOT}/{robot}/app/{name}"
+
+
 def live_key(robot: str, service: str, instance: str) -> str:
     """Return the liveliness token of one running service."""
     return f"{ROOT}/{robot}/live/{service}/{instance}"

@@ -6,6 +6,7 @@ import zenoh
 
 from cli.keys import access
 from cli.keys.access import Rights, Verb
+from cli.keys.member_list import BOUND
 from cli.keys.members import OPERATORS_SOURCES, Profile, Role
 from common import keys
 from services.ros2 import names
@@ -14,16 +15,17 @@ from services.ros2.config import Ros2
 MINE, OTHER = "001", "002"  # a driver's robot, and another robot
 
 
-def _laptop(role: Role, *sources: str) -> Rights:
-    return access.laptop(Profile(role=role, name="x", robots=(MINE,), sources=sources))
+def _laptop(role: Role, name: str, *sources: str) -> Rights:
+    robots = (MINE,) if role in BOUND else ()
+    return access.laptop(Profile(role=role, name=name, robots=robots, sources=sources))
 
 
 ROLES: Mapping[str, Rights] = {
-    "viewer": _laptop("viewer"),
-    "driver of 001": _laptop("driver", *OPERATORS_SOURCES),
-    "driver of 001 as nav": _laptop("driver", "nav"),
-    "device lidar of 001": _laptop("device", "lidar"),
-    "fleet": _laptop("fleet"),
+    "viewer": _laptop("viewer", "hall"),
+    "driver of 001": _laptop("driver", "anna", *OPERATORS_SOURCES),
+    "driver of 001 as nav": _laptop("driver", "nav", "nav"),
+    "device lidar of 001": _laptop("device", "lidar", "lidar"),
+    "fleet": _laptop("fleet", "room"),
     "site's router": access.site(),
     "router of 001": access.robot(MINE),
     "ros of 001": access.ros(Ros2()),
@@ -59,6 +61,11 @@ CLASSES: Mapping[str, str] = {
     "health of an operator's dashboard": keys.HEALTH.on(MINE, service="dashboard"),
     "presence of an operator's dashboard": keys.live_key(MINE, "dashboard", "1"),
     "health of an operator's teleop": keys.HEALTH.on(MINE, service="teleop"),
+    "own keys of the viewer hall": keys.app_key(MINE, "hall"),
+    "own keys of the driver anna": f"{keys.app_key(MINE, 'anna')}/route/2/state",
+    "the same, with more than six chunks": f"{keys.app_key(MINE, 'anna')}/1/2/3/4/5/6/7",
+    "the same, at another robot": f"{keys.app_key(OTHER, 'anna')}/route",
+    "own keys of the driver nav": f"{keys.app_key(MINE, 'nav')}/route",
     "any other key of the robot": f"{keys.ROOT}/{MINE}/anything",
     "keys outside of T2": "anything",
     "ROS 2: topics of the domain": names.data_key(0, "/odom", "nav_msgs/msg/Odometry"),

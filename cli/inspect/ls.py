@@ -64,7 +64,7 @@ def active(session: BusSession, options: argparse.Namespace) -> list[dict[str, A
     with until_interrupt():
         for sample in session.probe.samples(options.duration):
             counts[sample.key] += 1
-            kinds[sample.key] = codec.kind_of(sample.encoding)
+            kinds[sample.key] = codec.kind_of(sample.encoding) or named(sample.encoding)
     span_s = time.monotonic() - began_s
     if not counts:
         raise RobotError(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
@@ -81,6 +81,11 @@ def active(session: BusSession, options: argparse.Namespace) -> list[dict[str, A
         }
         for key, count in sorted(counts.items())
     ]
+
+
+def named(encoding: str) -> str:
+    """Return the encoding of another program's message; empty if it has set none."""
+    return "" if encoding == "zenoh/bytes" else encoding
 
 
 def declared(session: BusSession) -> list[dict[str, Any]]:
@@ -131,7 +136,7 @@ def declarations(probe: Probe, robot: str) -> list[Declaration]:
 def services(found: Iterable[Declaration], does: str, key: str) -> list[str]:
     """Return the names of those that have declared a key."""
     return [
-        each.session.partition("/")[0]
+        each.session.rpartition("/")[0] or each.session
         for each in found
         if each.does == does and intersects(each.key, key)
     ]

@@ -11,6 +11,8 @@ import msgspec
 
 from common.text import printable
 
+SHOWN_BYTES = 64  # of a binary value, as text; JSON contains all
+
 
 def line(thing: object) -> None:
     """Print one JSON line."""
@@ -101,7 +103,8 @@ def scalar(thing: Any) -> str:
     if isinstance(thing, float):
         return f"{thing:.6g}"
     if isinstance(thing, bytes):
-        return thing.hex()
+        rest = f"... ({len(thing)} bytes)" if len(thing) > SHOWN_BYTES else ""
+        return thing[:SHOWN_BYTES].hex() + rest
     if isinstance(thing, str) and thing:
         return printable(thing)
     return json(thing)

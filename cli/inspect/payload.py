@@ -1,4 +1,4 @@
-"""Decoding of any payload: by its encoding, else as MessagePack, else as bytes. Never raises."""
+"""Decoding of any payload: by its encoding, without one as MessagePack. Never raises."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +12,8 @@ from common.errors import MessageError
 _CALLED: list[type[Struct]] = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
 _PUBLISHED: list[type[Struct]] = [topic.message for topic in keys.TOPICS]
 KINDS = {kind.__name__: kind for kind in (*_PUBLISHED, *_CALLED)}
+# Without an encoding a payload is "zenoh/bytes", and may be anything: MessagePack is tried.
+KNOWN = ("application/json", "application/msgpack", "zenoh/bytes")
 UNREADABLE = (msgspec.MsgspecError, RecursionError, UnicodeDecodeError, ValueError)
 
 
@@ -28,8 +30,10 @@ def read(payload: bytes, encoding: str) -> Reading:
     """Decode a payload as far as possible."""
     if not payload:
         return Reading("empty", None)
-    if encoding.startswith("text/"):
+    if encoding.startswith(("text/", "zenoh/string")):
         return Reading("text", payload.decode(errors="replace"))
+    if encoding and not encoding.startswith(KNOWN):
+        return Reading(encoding, payload)
     form = "JSON" if encoding.startswith("application/json") else "MessagePack"
     try:
         if form == "JSON":

@@ -45,7 +45,9 @@ KEPT_KEY = "@adv/pub/*/*/*"
 RECALLED = (KEPT, keys.EVENTS.on(ANY, service=ANY))
 EVERYTHING = (EVERY_KEY, EVERY_COMMAND, KEPT)
 ROUTERS = "@/*/*/**"  # their admin space: version, sessions, declarations
-QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS)
+EVERY_APP = f"{keys.app_key(ANY, ANY)}/**"
+QUERYABLE = (keys.info_key(ANY, ANY, ANY), KEPT, ROUTERS, EVERY_APP)
+APP_DEPTH = 6  # chunks below a member's own prefix: matching of long keys hangs a router
 
 # The services of a laptop: a member may publish as these and as no others. A recorder is not one of
 # them: a recorder on a laptop must not hide that the one on board is dead.
@@ -121,7 +123,8 @@ def rights(member: Profile, router: RouterSettings) -> Rights:
 def laptop(member: Profile) -> Rights:
     """Return the rights to see everything; a driver drives, a device limits, all but a viewer stop.
 
-    Drivers and devices do so for their robots, as their sources. Only an operator also resets.
+    Drivers and devices do so for their robots, as their sources. Only an operator also resets. Each
+    publishes on keys of its own.
     """
     role, sources = member.role, member.sources
     robots = {"viewer": (), "fleet": (ANY,)}.get(role, member.robots)
@@ -129,16 +132,25 @@ def laptop(member: Profile) -> Rights:
     if role == "driver":
         calls = keys.CALLS if {*OPERATORS_SOURCES} & {*sources} else PROGRAMS_CALLS
     own = publishing(DRIVER_SERVICES if role == "driver" else LAPTOP_SERVICES)
+    apps = [key for each in member.robots or (ANY,) for key in app_keys(each, member.name)]
     topics = COMMANDS.get(role, ())
     commands = (topic.on(each, source=s) for topic in topics for each in robots for s in sources)
     return {
         **own,
         "read": EVERYTHING,
         "know": (EVERY_KEY, KEPT),
-        "recall": RECALLED,
+        "recall": (*RECALLED, EVERY_APP),
         "ask": (*QUERYABLE, *(call.on(each) for each in robots for call in calls)),
-        "write": (*own["write"], *commands, *map(keys.estop_key, robots)),
+        "write": (*own["write"], *apps, *commands, *map(keys.estop_key, robots)),
+        "serve": (*own["serve"], *apps),
+        "live": (*own["live"], *apps),
     }
+
+
+def app_keys(robot: str, name: str) -> Sequence[str]:
+    """Return the expressions of a member's own keys, each of a fixed length."""
+    prefix = keys.app_key(robot, name)
+    return [prefix + f"/{ANY}" * depth for depth in range(APP_DEPTH + 1)]
 
 
 def site() -> Rights:
@@ -155,6 +167,7 @@ def site() -> Rights:
             ),
             keys.estop_key(ANY),
             *(keys.EVENTS.on(ANY, service=name) for name in DRIVER_SERVICES),
+            *app_keys(ANY, ANY),
         ),
     }
 

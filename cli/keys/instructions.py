@@ -29,6 +29,8 @@ def certificate_issued(member: Member, target: str, routers: Sequence[Profile]) 
         yield f"  for robots {robots}{as_sources}"
         if member.sources and set(OPERATORS_SOURCES).isdisjoint(member.sources):
             yield "  may not reset, release or set the brake switches: no operator's source"
+    if not member.listens and member.role != "ros":
+        yield f"  may publish keys of its own: app/{member.name}/**"
     if member.listens:
         yield f"1. Copy the folder to the {member.role}'s computer only, and restart its router:"
         yield f"     scp -rp {target}/. {_host(member)}:{PLACE}"

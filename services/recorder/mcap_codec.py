@@ -9,6 +9,7 @@ its fields; no message of T2 uses them:
 - ``_deleted``: the sample was a DELETE.
 """
 
+import re
 from base64 import b64decode, b64encode
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from services.recorder.foxglove_views import FoxgloveViews, Schema, schema_of
 RAW, PAYLOAD, DELETED = RESERVED = ("_raw", "_payload", "_deleted")
 JSON = "application/json"
 UNREADABLE = (msgspec.MsgspecError, RecursionError, UnicodeError, ValueError, TypeError)
+APP = re.compile(keys.app_key("[^/]+", "[^/]+"))  # keys of a member's own
 MESSAGE_TYPES: dict[str, type[Message]] = {
     topic.message.__name__: topic.message for topic in keys.TOPICS
 }
@@ -56,8 +58,8 @@ class Entry:
     @property
     def kind(self) -> str:
         """Return the name of its type, ``Odometry``; empty for a type unknown to T2."""
-        name = codec.kind_of(self.channel.encoding)
-        return name if name in MESSAGE_TYPES else ""
+        kind = _type_of(self.channel.topic, self.channel.encoding)
+        return kind.__name__ if kind else ""
 
     @property
     def message(self) -> Message | None:
@@ -92,7 +94,7 @@ class Encoder:
     def entries(self, sample: Sample, log_ns: int) -> Iterator[Entry]:
         """Yield the message, then the views derived from it."""
         fields = decode_fields(sample)
-        kind = MESSAGE_TYPES.get(codec.kind_of(sample.encoding))
+        kind = _type_of(sample.key, sample.encoding)
         channel = Channel(sample.key, schema_of(kind) if kind else None, sample.encoding)
         yield Entry(channel, encode_json(sample, fields), log_ns)
         message = _message(sample)
@@ -131,8 +133,18 @@ def _codec(encoding: str) -> Any:
     return msgspec.json if encoding.startswith(JSON) else msgspec.msgpack
 
 
+def _type_of(key: str, encoding: str) -> type[Message] | None:
+    """Return the type of a message of T2; None for one of another program.
+
+    A member chooses the encoding of its own keys, and must not place the vehicle in a view.
+    """
+    if APP.match(key):
+        return None
+    return MESSAGE_TYPES.get(codec.kind_of(encoding))
+
+
 def _message(sample: Sample) -> Message | None:
-    kind = MESSAGE_TYPES.get(codec.kind_of(sample.encoding))
+    kind = _type_of(sample.key, sample.encoding)
     try:
         return codec.decode(sample.payload, kind) if kind else None
     except MessageError:

@@ -63,6 +63,9 @@ def test_a_message_is_json_with_its_schema() -> None:
         bare("tel/mine", b"\xdf\x00\x00\x00\x00"),  # an empty map with a long header
         bare("tel/mine", b"\x91" * 3000 + b"\x90"),  # deeper than the recursion limit
         bare(VELOCITY, b"\xc1", codec.encoding(Velocity)),
+        bare("app/camera/front", b"\xff\xd8\xff\xe0", "image/jpeg"),
+        bare("app/camera/front", b"", "image/jpeg", deleted=True),
+        sample("app/planner/pose", samples.odometry(), raw=b"\x01"),
     ],
     ids=repr,
 )
@@ -83,6 +86,16 @@ def test_round_trip_of_arbitrary_bytes(payload: bytes, raw: bytes | None, delete
 def test_views_follow_the_message() -> None:
     made = ENCODER.entries(sample("tel/odom/odometry", samples.odometry()), 5)
     assert [each.key for each in made] == [f"{ROOT}/tel/odom/odometry", "foxglove/tf"]
+
+
+@pytest.mark.parametrize("path", ["app/planner/pose", "app/planner"])
+def test_keys_of_members_are_no_messages_of_t2(path: str) -> None:
+    """Whatever encoding they name: anybody could place the vehicle in a view or a report."""
+    made = list(ENCODER.entries(sample(path, samples.odometry()), 5))
+    assert [each.key for each in made] == [f"{ROOT}/{path}"]
+    assert (made[0].kind, made[0].message, made[0].channel.schema) == ("", None, None)
+    own = entry(sample("tel/app/odometry", samples.odometry()))
+    assert own.kind == "Odometry"
 
 
 @pytest.mark.parametrize("data", [b"[]", b"{", b'{"_payload": "?"}', b'{"_raw": 5}'])

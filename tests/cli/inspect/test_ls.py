@@ -45,6 +45,22 @@ def test_keys_and_services_with_publishers_and_readers(
     assert [name, "publishes", "tel/bridge/bumper"] in [line.split() for line in text]
 
 
+def test_own_keys_of_a_member(buses: BusFixture, tool: Tool) -> None:
+    """With their encoding; a liveliness token below them names the session."""
+    root = keys.app_key(buses.robot, "planner")
+    session = buses.session()
+    token = session.liveliness().declare_token(f"{root}/1")
+    publisher = session.declare_publisher(f"{root}/route", encoding="image/jpeg")
+    buses.loop.post(lambda: buses.loop.every(0.1, lambda _: publisher.put(b"\xff\xd8")))
+    (row,) = tool("ls", "app/**", "--duration", "1").lines
+    assert (row["key"], row["type"]) == ("app/planner/route", "image/jpeg")
+    assert row["publishers"] == ["app/planner"]
+    (echoed,) = tool("echo", "app/planner/route", "--once").lines
+    assert (echoed["type"], echoed["message"]) == ("image/jpeg", "ffd8")
+    assert "complaint" not in echoed
+    token.undeclare()
+
+
 def test_services_of_a_robot_that_dials_a_site(capsys: pytest.CaptureFixture[str]) -> None:
     """Its router is a peer and not listed as a member, neither on board nor at the site."""
     own, site = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))

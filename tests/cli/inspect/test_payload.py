@@ -23,6 +23,9 @@ TYPED = codec.encoding(Bumper)
         (b"caf\xe9", "text/plain", Reading("text", "caf\ufffd")),
         (b"\x81\xa1a\x01", "zenoh/bytes", Reading("msgpack", {"a": 1})),
         (b"\xc1", "zenoh/bytes", Reading("bytes", b"\xc1", "not MessagePack")),
+        (b"\x01", "image/jpeg", Reading("image/jpeg", b"\x01")),
+        (b"\x01", "", Reading("msgpack", 1)),
+        (b"go", "zenoh/string", Reading("text", "go")),
         (b"\xc1", TYPED, Reading("bytes", b"\xc1", "not MessagePack")),
         (
             b"\x81\xa1a\x01",
@@ -38,7 +41,7 @@ def test_foreign_payloads(payload: bytes, encoding: str, expected: Reading) -> N
 @given(
     st.binary() | st.integers(0, 400).map(lambda depth: b"\x91" * depth),
     st.sampled_from(
-        [TYPED, "application/msgpack;t2.v1.Odometry", "application/json", "text/x", ""]
+        [TYPED, "application/msgpack;t2.v1.Odometry", "application/json", "text/x", "a/b", ""]
     ),
 )
 @example(b"\x81\x91\x01\x01", "")  # a list for a key
@@ -72,6 +75,7 @@ def test_a_field_by_its_path() -> None:
         ("words\x07", "words\\u0007"),
         ("", '""'),
         (b"\x01\xff", "01ff"),
+        (bytes(70), f"{'00' * 64}... (70 bytes)"),
     ],
 )
 def test_fields(value: object, shown: str) -> None:

@@ -218,3 +218,92 @@ def test_late_subscribers_get_cached_events(
         break
     assert came[0] == "kept"
     published.undeclare()
+
+
+# --- a member's own keys --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reader", ["on board", "viewer", "fleet"])
+def test_a_declared_publisher_of_own_keys_is_read_by_all(
+    sessions: Mapping[str, zenoh.Session], reader: str
+) -> None:
+    key = f"{keys.app_key(MINE, 'nav')}/route/state"
+    came: list[str] = []
+    subscribed = sessions[reader].declare_subscriber(
+        f"{keys.ROOT}/{MINE}/**", lambda s: came.append(s.payload.to_string())
+    )
+    published: Any = sessions["driver of 001 as nav"].declare_publisher(
+        key, congestion_control=BLOCK, encoding="image/jpeg"
+    )
+    wait_until(lambda: published.matching_status.matching, "the reader, at the publisher")
+    for number in range(20):  # a publisher that may not know its readers sends one sample only
+        published.put(str(number))
+    wait_until(lambda: "19" in came, "the last sample")
+    assert came == [str(number) for number in range(20)]
+    published.undeclare()
+    subscribed.undeclare()
+
+
+def test_a_query_of_all_reaches_the_own_keys_of_each(
+    sessions: Mapping[str, zenoh.Session],
+) -> None:
+    at = {f"{keys.app_key(MINE, name)}/plan": name for name in ("nav", "hall")}
+    roles = {"nav": "driver of 001 as nav", "hall": "viewer"}
+    served = [
+        sessions[roles[name]].declare_queryable(key, partial(answer_as, key))
+        for key, name in at.items()
+    ]
+    every = f"{keys.app_key(MINE, '*')}/**"
+    for reader in ("on board", "driver of 001"):
+        wait_until(partial(answered_by, sessions[reader], every, set(at)), f"both, at {reader}")
+    for each in served:
+        each.undeclare()
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "t2/v1/*/app/**",
+        "t2/v1/**",
+        "t2/v1/001/app/**",
+        "t2/v1/001/app/*/route",
+        "t2/v1/001/app/n$*/route",
+        "t2/v1/001/app/nav/**",
+        "t2/v1/*/app/nav/route",
+        "t2/v1/001/app/nav2/route",
+        "t2/v1/001/app/nav/@cmd/route",
+        "t2/v1/001/app/nav/1/2/3/4/5/6/7",
+    ],
+)
+def test_own_keys_are_no_way_to_other_keys(sessions: Mapping[str, zenoh.Session], key: str) -> None:
+    came: list[tuple[str, str]] = []
+    subscribed = [
+        sessions["on board"].declare_subscriber(
+            each, lambda s: came.append((str(s.key_expr), s.payload.to_string()))
+        )
+        for each in EVERY
+    ]
+    marker = keys.app_key(MINE, "nav")
+    mine = sessions["driver of 001 as nav"]
+
+    def passed() -> bool:
+        mine.put(marker, "ping", congestion_control=BLOCK)
+        return bool(came)
+
+    wait_until(passed, "the subscribers on board")
+    mine.put(key, "foreign", congestion_control=BLOCK)
+    mine.put(marker, "end", congestion_control=BLOCK)
+    wait_until(lambda: (marker, "end") in came, "the last put")
+    assert not [each for each in came if each[1] == "foreign"]
+    for each in subscribed:
+        each.undeclare()
+
+
+def answer_as(key: str, query: zenoh.Query) -> None:
+    query.reply(key, b"yes")
+    query.drop()
+
+
+def answered_by(session: zenoh.Session, selector: str, wanted: set[str]) -> bool:
+    replies = session.get(selector, timeout=TIMEOUT_S)
+    return {str(reply.ok.key_expr) for reply in replies if reply.ok} >= wanted
