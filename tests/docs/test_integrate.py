@@ -6,9 +6,13 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
+import zenoh
 
+from common.bus.session import client_config
 from tests.docs.integrator import ROOT, Integrator, running_integrator
+from verification.harness.bus import at
 from verification.harness.waiting import wait_until
 
 pytestmark = pytest.mark.timed
@@ -53,6 +57,16 @@ def line_with(process: "subprocess.Popen[str]", text: str) -> str:
 def test_the_first_program_prints_the_pose(it: Integrator) -> None:
     with it.running("first.py") as process:
         assert line_with(process, "'child_frame_id': 'base_link'")
+
+
+def test_a_program_publishes_on_a_key_of_its_own(it: Integrator) -> None:
+    key = "t2/v1/001/app/planner/route"
+    where = client_config(at(it.stack.endpoint))
+    with zenoh.open(where) as session, it.running("plain/publish.py"):
+        newest = session.declare_subscriber(key, zenoh.handlers.RingChannel(1))
+        sample = newest.recv()
+    assert str(sample.encoding) == "application/msgpack"
+    assert msgspec.msgpack.decode(sample.payload.to_bytes())["next"] == [1.5, 0.0]
 
 
 def test_a_consumer_prints_pose_and_nearest_obstacle(it: Integrator, programs: Programs) -> None:
