@@ -8,6 +8,10 @@ from cli.keys.members import OPERATORS_SOURCES, Member, Profile
 
 PLACE = "/etc/t2/keys"  # on a router's machine, as in the systemd units and compose.yaml
 IN_CONTAINERS = "docker compose restart router"
+LATCHES = (
+    "   The restart of a robot's router latches its vehicle: do it while the vehicle stands, then",
+    "   look at it and reset (`t2 call safety/reset`); see docs/latches.md.",
+)
 
 
 def authority_created(folder: str, site: str, until: str) -> Iterator[str]:
@@ -21,20 +25,13 @@ def authority_created(folder: str, site: str, until: str) -> Iterator[str]:
 def certificate_issued(member: Member, target: str, routers: Sequence[Profile]) -> Iterator[str]:
     """Yield the instructions for a new certificate: where to copy it, which routers to update."""
     yield f"{member.common_name}, valid until {member.expires:%Y-%m-%d}"
-    if member.listens:
-        yield f"  addresses {', '.join(member.addresses)}; valid at no other address"
-    elif member.robots:
-        robots = ", ".join(member.robots).replace(EVERY_ROBOT, "all")
-        as_sources = f" as {' or '.join(member.sources)} only" if member.sources else ""
-        yield f"  for robots {robots}{as_sources}"
-        if member.sources and set(OPERATORS_SOURCES).isdisjoint(member.sources):
-            yield "  may not reset, release or set the brake switches: no operator's source"
-    if not member.listens and member.role != "ros":
-        yield f"  may publish keys of its own: app/{member.name}/**"
+    yield from _rights(member)
     if member.listens:
         yield f"1. Copy the folder to the {member.role}'s computer only, and restart its router:"
         yield f"     scp -rp {target}/. {_host(member)}:{PLACE}"
         yield f"     t2 router --config {PLACE}/{SETTINGS}"
+        if member.role == "robot":
+            yield from LATCHES
     else:
         yield f"1. Copy the folder {target} to {member.name}'s computer only. There:"
         folder = target.rpartition("/")[2]
@@ -47,6 +44,20 @@ def certificate_issued(member: Member, target: str, routers: Sequence[Profile]) 
     others = [each for each in routers if each.label != member.label]
     if others or not member.listens:  # a router's own folder holds the list
         yield from _update_routers("2. ", target, others)
+
+
+def _rights(member: Member) -> Iterator[str]:
+    """Yield what a certificate is valid for."""
+    if member.listens:
+        yield f"  addresses {', '.join(member.addresses)}; valid at no other address"
+    elif member.robots:
+        robots = ", ".join(member.robots).replace(EVERY_ROBOT, "all")
+        as_sources = f" as {' or '.join(member.sources)} only" if member.sources else ""
+        yield f"  for robots {robots}{as_sources}"
+        if member.sources and set(OPERATORS_SOURCES).isdisjoint(member.sources):
+            yield "  may not reset, release or set the brake switches: no operator's source"
+    if not member.listens and member.role != "ros":
+        yield f"  may publish keys of its own: app/{member.name}/**"
 
 
 def certificate_renewed(old: Member) -> Iterator[str]:
@@ -75,6 +86,8 @@ def _update_routers(number: str, target: str, routers: Sequence[Profile]) -> Ite
     for router in routers:
         copy = f"scp -p {folder}/{MEMBERS} {_host(router)}:{PLACE}/{MEMBERS}"
         yield f"     {copy}  # {router.role} {router.name}"
+    if any(router.role == "robot" for router in routers):
+        yield from LATCHES
     yield f"   A router in a container needs `{IN_CONTAINERS}` instead."
 
 

@@ -4,17 +4,42 @@ import subprocess
 
 from cli.keys import instructions
 from cli.keys.member_list import profile
+from cli.keys.members import Member
 from tests.cli.keys.site_fixture import certified
 from tools.docs import DOCS
 
 ROBOT = certified(profile("robot", "001"))
 SITE = certified(profile("site", "berlin", addresses=("site.example",)))
+VIEWER = certified(profile("viewer", "hall"))
 LAPTOP = certified(profile("ros", "laptop", ("001",)))
 
 
 def test_the_first_router_needs_no_list_update() -> None:
     printed = list(instructions.certificate_issued(ROBOT, "keys/robot.001", [ROBOT]))
     assert not [line for line in printed if "members.json" in line]
+
+
+def test_a_restart_that_latches_is_announced() -> None:
+    def announced(member: Member, *routers: Member) -> bool:
+        printed = "\n".join(instructions.certificate_issued(member, "keys/x", routers))
+        return "latches its vehicle" in printed
+
+    assert announced(ROBOT)
+    assert announced(VIEWER, ROBOT)
+    assert announced(SITE, ROBOT)
+    assert not announced(VIEWER, SITE)
+    assert not announced(SITE)
+    assert "latches its vehicle" in "\n".join(
+        instructions.certificates_revoked([VIEWER], "keys/viewer.hall", [ROBOT])
+    )
+
+
+def test_the_own_keys_are_named() -> None:
+    printed = [
+        list(instructions.certificate_issued(each, "keys/x", [])) for each in (VIEWER, ROBOT)
+    ]
+    assert "  may publish keys of its own: app/hall/**" in printed[0]
+    assert not [line for line in printed[1] if "app/" in line]
 
 
 def test_a_ros_computers_environment() -> None:
