@@ -51,6 +51,9 @@ SOURCE = "ros2"  # of the drive requests
 UNHEARD = 20  # 1 s at the usual 20 Hz
 MAX_PUBLISHERS = 64  # remembered; the one that was silent longest is dropped first
 
+# m/s and rad/s: the finest step of a motion frame, by either angular unit. What is less is zero.
+STEP = 0.001
+
 Axes = tuple[float, float, float]
 
 
@@ -59,6 +62,10 @@ class Twist(NamedTuple):
 
     linear: Axes
     angular: Axes
+
+    def in_steps(self) -> "Twist":
+        """Return it with zeros where a motion frame cannot represent the number."""
+        return Twist(_in_steps(self.linear), _in_steps(self.angular))
 
     @property
     def moves(self) -> bool:
@@ -192,6 +199,7 @@ class Commands:
 
         ``state`` is safety's newest one.
         """
+        twist = twist.in_steps()
         known = self._publisher(about, received_ns)
         if about.sequence <= known.sequence:
             return OUT_OF_ORDER
@@ -268,6 +276,11 @@ class Commands:
     def _begin(self, known: Publisher, about: Attachment) -> None:
         known.begun_ns = known.received_ns - about.source_ns
         self._contest = Contest(SOURCE)
+
+
+def _in_steps(axes: Axes) -> Axes:
+    x, y, z = (0.0 if abs(number) < STEP else number for number in axes)  # NaN stays
+    return x, y, z
 
 
 def _of_content(twist: Twist) -> Refusal | None:

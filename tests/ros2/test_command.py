@@ -335,6 +335,42 @@ def test_numbers_that_are_not_finite_and_other_axes(axis: int) -> None:
         assert sender.send(1.0, motion=motion) == expected
 
 
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize("number", [0.000999, 1e-17, 5e-324, 0.0, -0.0, -1e-17, -0.000999])
+def test_numbers_below_the_resolution_of_a_frame_are_zero(axis: int, number: float) -> None:
+    """Controllers and filters compute such remainders, also on axes that they do not use."""
+    sender = Sender(started()).drive()
+    axes = [0.3, 0.0, 0.0, 0.0, 0.0, 0.5]
+    axes[axis] = number
+    motion = Twist((axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5]))
+    taken = Request(0.0 if axis == 0 else 0.3, 0.0 if axis == 5 else 0.5)
+    assert sender.send(1.0, motion=motion) == taken
+    assert repr(sender.send(1.05, motion=motion)) == repr(taken)  # never -0.0
+
+
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize("number", [0.001, -0.001])
+def test_the_smallest_step_of_a_frame_is_motion(axis: int, number: float) -> None:
+    sender = Sender(started()).drive()
+    axes = [0.0] * 6
+    axes[axis] = number
+    motion = Twist((axes[0], axes[1], axes[2]), (axes[3], axes[4], axes[5]))
+    expected = Request(axes[0], axes[5]) if axis in (0, 5) else "other_axes"
+    assert sender.send(1.0, motion=motion) == expected
+
+
+def test_remainders_on_every_axis_are_neutral() -> None:
+    """A node that slows down by a filter never publishes zero exactly."""
+    rest = Twist((1e-17, -1e-9, 0.0009), (-0.0, 5e-324, 1e-6))
+    assert not rest.in_steps().moves
+    sender = Sender(started(by_zero=True))
+    sender.stream(0.0, 1.0, motion=rest)
+    assert sender.send(1.0) == Request(0.3, 0.0)
+    assert sender.stream(1.05, 1.0, barred=True) == {"not_zero"}
+    sender.stream(2.05, 0.6, motion=rest)
+    assert sender.send(2.7) == Request(0.3, 0.0)
+
+
 def test_a_refused_command_does_not_make_an_owner() -> None:
     commands = started()
     nav, joy = Sender(commands).drive(), Sender(commands, JOY)
