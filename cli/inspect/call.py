@@ -25,7 +25,11 @@ Request = dict[str, Any]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "key", metavar="KEY", nargs="?", help="such as safety/reset; lists the calls if omitted"
+        "key",
+        metavar="KEY",
+        nargs="?",
+        type=known,
+        help="such as safety/reset; lists the calls if omitted",
     )
     parser.add_argument(
         "request", metavar="JSON", nargs="?", type=json_object, default={},
@@ -44,12 +48,10 @@ def run(options: argparse.Namespace) -> int:
         ]  # fmt: skip
         output.rows(rows, as_json=options.json)
         return 0
-    call = known(options.key.strip("/"))
-    try:
-        codec.encode(msgspec.convert(options.request, call.request))
-    except (msgspec.ValidationError, OverflowError) as error:
+    call = options.key
+    if problem := complaint(call.request, options.request):
         name = call.request.__name__
-        output.warn(f"t2 call: not a {name}: {error}; its fields: docs/bus.md#{name.lower()}")
+        output.warn(f"t2 call: not a {name}: {problem}; its fields: docs/bus.md#{name.lower()}")
         return 2
     with open_session(options) as session:
         make(SafetyClient(session.probe, session.robot), call, options)
@@ -70,15 +72,30 @@ def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace
         raise RobotError("not confirmed: safety's state does not show this reset; run `t2 doctor`")
 
 
-def known(path: str) -> Call[Any, Any]:
+def known(word: str) -> Call[Any, Any]:
     """Return the call for ``srv/safety/reset`` or a shorter path."""
+    path = word.strip("/")
     found = [call for call in CALLS if f"/{call.path}".endswith(f"/{path}")]
     if not found:
-        raise RobotError(f"no call {path}; `t2 call` lists the calls")
+        raise argparse.ArgumentTypeError(f"no call {path}; `t2 call` lists the calls")
     if len(found) > 1:
         names = ", ".join(call.path.removeprefix("srv/") for call in found)
-        raise RobotError(f"{path} is ambiguous: {names}")
+        raise argparse.ArgumentTypeError(f"{path} is ambiguous: {names}")
     return found[0]
+
+
+def complaint(kind: type[msgspec.Struct], request: Request) -> str:
+    """Return why it is no request of this type; empty if it is one.
+
+    A server ignores names that it does not know: a misspelled one would leave a default in force.
+    """
+    if unknown := sorted(set(request) - set(kind.__struct_fields__)):
+        return f"no field {unknown[0]!r}"
+    try:
+        codec.encode(msgspec.convert(request, kind))
+    except (msgspec.ValidationError, OverflowError) as error:
+        return str(error)
+    return ""
 
 
 def filled(call: Call[Any, Any], request: Request, seen: SafetyState) -> Request:

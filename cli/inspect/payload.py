@@ -46,15 +46,21 @@ def read(payload: bytes, encoding: str) -> Reading:
 
 
 def at(value: Any, path: str) -> Any:
-    """Return the value at ``causes.0.name``; raise ``MessageError`` naming the existing fields."""
+    """Return the value at ``causes.0.name``; raise ``MessageError`` naming the existing fields.
+
+    A list may have fewer elements, and a value may be unknown (None): both are None.
+    """
     here = value
     for part in path.split("."):
+        if here is None:
+            return None
         if isinstance(here, dict) and part in here:
             here = here[part]
-        elif isinstance(here, list) and part.isdigit() and int(part) < len(here):
-            here = here[int(part)]
+        elif isinstance(here, list) and part.isdecimal():
+            here = here[int(part)] if int(part) < len(here) else None
         else:
             names = ", ".join(map(str, here)) if isinstance(here, dict) else ""
+            names = "a number from 0" if isinstance(here, list) else names
             raise MessageError(f"{path!r} has no field {part!r}; available: {names or 'none'}")
     return here
 

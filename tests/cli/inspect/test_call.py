@@ -141,11 +141,14 @@ def test_replies_and_refusals(buses: BusFixture, tool: Tool) -> None:
     [
         (("bridge/led", '{"channel": 1, "mode": 0}'), 1,
          "bridge does not answer"),
-        (("mine/x",), 1, "no call mine/x; `t2 call` lists the calls"),
-        (("reset",), 1, "reset is ambiguous: safety/reset, odom/reset"),
-        (("bridge/led", '{"chanel": 1}'), 2, "not a LedRequest"),
+        (("mine/x",), 2, "no call mine/x; `t2 call` lists the calls"),
+        (("reset",), 2, "reset is ambiguous: safety/reset, odom/reset"),
+        (("bridge/led", '{"chanel": 1}'), 2, "not a LedRequest: no field 'chanel'"),
+        (("bridge/led", '{"channel": 1}'), 2, "not a LedRequest: "),
+        (("odom/reset", '{"X": 1.0}'), 2, "not a PoseRequest: no field 'X'"),
+        (("/",), 2, "no call ; `t2 call` lists the calls"),
         (("safety/reset", "{"), 2, "is not a JSON object"),
-        (("safety/*",), 1, "no call safety/*"),
+        (("safety/*",), 2, "no call safety/*"),
     ],
 )  # fmt: skip
 def test_calls_that_fail(words: tuple[str, ...], code: int, phrase: str, tool: Tool) -> None:

@@ -35,6 +35,7 @@ def test_a_message_and_one_field(bridge: Bus, tool: Tool) -> None:
     assert head.startswith("# tel/bridge/bumper  Bumper  seq ")
     assert fields == ["pressed: true", "lost: 0", "---"]
     assert tool("echo", "bumper", "--field", "pressed", "--once").out == "true\n"
+    assert tool("echo", "bumper", "--field", "lost", "--once", text=True).out == "0\n"
     result = tool("echo", "bumper", "--field", "presed")
     assert (result.code, result.out) == (1, "")
     assert "no field 'presed'; available: seq" in result.err

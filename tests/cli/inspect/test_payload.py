@@ -58,9 +58,17 @@ def test_every_payload_is_decoded(payload: bytes, encoding: str) -> None:
 def test_a_field_by_its_path() -> None:
     value = {"causes": [{"name": "contact"}], "x": 1}
     assert at(value, "causes.0.name") == "contact"
-    for path in ("z", "causes.1", "causes.x"):
+    for path in ("z", "causes.x", "causes.-1", "causes.²", "causes.0.nam", "x.y"):
         with pytest.raises(MessageError, match="has no field"):
             at(value, path)
+
+
+@pytest.mark.parametrize(
+    "value", [{"causes": []}, {"causes": [{"name": "a"}]}, {"causes": None}, None]
+)
+def test_a_field_of_a_shorter_list_or_of_nothing_is_none(value: object) -> None:
+    """They change from message to message: that is no mistake of the command."""
+    assert at(value, "causes.1.name") is None
 
 
 # --- as text --------------------------------------------------------------------------------------
