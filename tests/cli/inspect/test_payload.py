@@ -58,7 +58,7 @@ def test_every_payload_is_decoded(payload: bytes, encoding: str) -> None:
 def test_a_field_by_its_path() -> None:
     value = {"causes": [{"name": "contact"}], "x": 1}
     assert at(value, "causes.0.name") == "contact"
-    for path in ("z", "causes.x", "causes.-1", "causes.²", "causes.0.nam", "x.y"):
+    for path in ("z", "causes.x", "causes.-1", "causes.²", "causes.0.z", "x.y"):
         with pytest.raises(MessageError, match="has no field"):
             at(value, path)
 
