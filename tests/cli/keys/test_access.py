@@ -1,14 +1,17 @@
 """Access rules by role, without a router."""
 
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from cli.keys.access import RouterSettings, Verb, access_control, rights, ros
-from cli.keys.members import Member, Role
+from cli.keys.members import Member, Members, Role, read
 from common import keys
+from common.errors import ConfigError
 from services.ros2 import names
 from services.ros2.config import Ros2
 from services.ros2.definitions import HASHES
@@ -88,6 +91,31 @@ def test_a_member_publishes_as_its_own_services_only(role: str) -> None:
     assert may(given, "serve", f"{kept}/pub/1f/uhlc/_")
     assert not may(given, "serve", f"{kept}/pub/1f/uhlc/_/a")
     assert not may(given, "read", f"{keys.VELOCITY.on(MINE)}/@adv/**"), "events alone are kept"
+
+
+@pytest.mark.parametrize("name", ["*", "**", "a/b", "an$*", "@a", "a#", "a?b", "", " "])
+def test_a_name_in_the_list_cannot_leave_its_prefix(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "members.json"
+    listed = Members(site="berlin", members=(member("driver", "placeholder", (MINE,)),))
+    file.write_bytes(msgspec.json.encode(listed).replace(b'"placeholder"', f'"{name}"'.encode()))
+    with pytest.raises(ConfigError, match="is no list of members"):
+        read(file)
+
+
+@pytest.mark.parametrize("robots", [(MINE,), (OTHER,), (MINE, OTHER), ("*",), ()])
+def test_own_keys_are_at_the_robots_of_the_certificate(robots: tuple[str, ...]) -> None:
+    """A viewer names no robot: its keys are at each."""
+    given = rights(member("driver" if robots else "viewer", "bo.1-x", robots), ROUTER)
+    for robot in (MINE, OTHER, "*"):
+        allowed = robot in robots or "*" in robots or not robots
+        for verb in ("write", "serve", "live"):
+            prefix = keys.app_key(robot, "bo.1-x")
+            for key in (prefix, f"{prefix}/a", f"{prefix}/1/2/3/4/5/6"):
+                assert may(given, verb, key) is allowed, (verb, key)
+            for key in (f"{prefix}/1/2/3/4/5/6/7", f"{prefix}/**", f"{prefix}/@adv/a"):
+                assert not may(given, verb, key), (verb, key)
+            for name in ("bo.1-xx", "bo.1-", "bo", "*", "**", "bo$*"):
+                assert not may(given, verb, f"{keys.app_key(robot, name)}/a")
 
 
 def test_a_robots_router_writes_only_its_own_keys() -> None:
