@@ -12,17 +12,19 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
+from msgspec.structs import replace
+
 from common import clock, keys, realtime
 from common import messages as m
 from common.bus.bus import Arrival, Caller
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
-from common.motion import BRAKE, STOP
+from common.motion import BRAKE
 from common.service import Node, run
 from services.bridge.config import BridgeConfig
 from services.bridge.core.core import TICK_S, Core
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
-from services.bridge.guard import DESCRIPTORS_ENV, Heartbeat
+from services.bridge.guard import BRAKES_ENV, DESCRIPTORS_ENV, Heartbeat
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 MOTIONS = 8  # queue length
@@ -45,7 +47,9 @@ def main() -> int:
     *sockets, pipe = map(int, os.environ[DESCRIPTORS_ENV].split(","))
     # The guard needs the higher priority: it brakes for this process.
     ahead = realtime.BRIDGE if realtime.priority(os.getppid()) > realtime.BRIDGE else 0
-    return run("bridge", BridgeConfig, lambda node: Bridge(node, sockets, pipe), priority=ahead)
+    braked = os.environ.get(BRAKES_ENV) == "1"
+    build = partial(Bridge, sockets=sockets, pipe=pipe, braked=braked)
+    return run("bridge", BridgeConfig, build, priority=ahead)
 
 
 class Histogram:
@@ -71,9 +75,14 @@ class Bridge:
     """Passes inputs to the core and carries out its outputs."""
 
     def __init__(
-        self, node: Node[BridgeConfig], sockets: Sequence[int] = (), pipe: int | None = None
+        self,
+        node: Node[BridgeConfig],
+        sockets: Sequence[int] = (),
+        pipe: int | None = None,
+        *,
+        braked: bool = False,
     ) -> None:
-        """Set up with the descriptors that a guard has opened."""
+        """Set up with the descriptors of a guard, and whether the bridge before held BRAKE."""
         self._node = node
         drive = node.open_drive(listens=True)  # safety accepts samples only from this link
         self._sockets = Sockets(node.config.board, sockets)
@@ -93,7 +102,8 @@ class Bridge:
             "link": drive.publisher(keys.LINK),
             "switches": drive.publisher(keys.SWITCHES),
         }
-        self._send(self._core.motions.order(STOP))
+        self._core.motions.lease = replace(self._core.motions.lease, braked=braked)
+        self._send(self._core.motions.order(BRAKE))  # as the guard did last
         drive.subscribe(keys.MOTION, self._on_motion, depth=MOTIONS)
         node.bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
         # Safety receives it, too, unless it hangs, restarts or is cut off.
@@ -152,8 +162,7 @@ class Bridge:
         if self._unsent:
             self._send(self._core.motions.order(BRAKE))
         self._do(self._core.tick(now_ns))
-        if self._heartbeat is not None:
-            self._heartbeat.beat(self._core.motions.port)
+        self._beat()
 
     def _on_second(self, _: int) -> None:
         sockets, counters, rejected = self._sockets, self._node.counters, self._core.rejected
@@ -197,6 +206,12 @@ class Bridge:
         sent = self._sockets.send(send.datagram, send.port, BRAKE_ATTEMPTS if is_brake else 1)
         if send.order is not None:
             self._unsent = is_brake and not sent
+            self._beat()  # the guard learns of a BRAKE at once
+
+    def _beat(self) -> None:
+        if self._heartbeat is not None:
+            motions = self._core.motions
+            self._heartbeat.beat(motions.port, brakes=motions.lease.braking)
 
     # --- the end ------------------------------------------------------------------------------
 

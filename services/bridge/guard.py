@@ -8,7 +8,7 @@ the socket that the bridge used:
 phase          BRAKE                           ends with
 ============== =============================== ==============================================
 starting       until the first heartbeat, that a heartbeat: alive; none in 10 s: killed
-               follows the bridge's first STOP
+               follows the bridge's first BRAKE
 alive          from 200 ms without one         five BRAKEs without one: killed; the pipe's end
 ending, killed until the child has exited      exit: restarted, the first time at once
 not started    until it could be started       started; retried after 0 to 5 s (no memory)
@@ -19,8 +19,9 @@ itself. A signal after the parent has died means that the supervisor was killed:
 then (see ``cli.run.supervisor``), and the bridge brakes at once instead of coasting.
 
 The bridge inherits the sockets and the write end of a pipe. A byte on the pipe is a heartbeat of
-the bridge's event loop; its value is the index of the port that commands leave from. End of file
-means that the bridge exits or has died.
+the bridge's event loop; its value is the index of the port that commands leave from, and whether
+the bridge holds BRAKE (``BRAKES``). The next bridge then holds it, too. End of file means that the
+bridge exits or has died.
 """
 
 import os
@@ -51,6 +52,8 @@ STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
 # Environment variable: the descriptors of the sockets, in the order of ``board.listen_ports``, and
 # of the write end of the pipe.
 DESCRIPTORS_ENV = "T2_BRIDGE_DESCRIPTORS"
+BRAKES_ENV = "T2_BRIDGE_BRAKES"  # "1" when the bridge before held BRAKE
+BRAKES = 0x80  # in a heartbeat: BRAKE is held until safety or an operator ends it
 
 
 class Heartbeat:
@@ -61,13 +64,13 @@ class Heartbeat:
         self._on_gone = on_gone
         os.set_blocking(descriptor, False)
 
-    def beat(self, port: int) -> None:
+    def beat(self, port: int, *, brakes: bool = False) -> None:
         """Send a heartbeat; ``on_gone`` is called once when the guard has died."""
         if self._descriptor is None:
             return
         try:
             with suppress(BlockingIOError):  # the pipe is full: the guard has heartbeats to read
-                os.write(self._descriptor, bytes((port,)))
+                os.write(self._descriptor, bytes((port | BRAKES * brakes,)))
         except OSError:
             self.end()
             self._on_gone()
@@ -88,6 +91,7 @@ class Guard:
         self._missed_ms = round(config.bridge.times.heartbeat * 1000)
         self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
         self._port = 0  # index of the port that the bridge uses
+        self._brakes = False  # whether the bridge holds BRAKE
         self._stopping = False
         self._parent = os.getppid()  # the supervisor
         self._child: subprocess.Popen[bytes] | None = None  # receives the signals
@@ -132,7 +136,7 @@ class Guard:
             # guard's session spares the bridge, which stops the vehicle.
             self._child = subprocess.Popen(
                 self._command,
-                env=child_process.environ() | {DESCRIPTORS_ENV: ",".join(map(str, given))},
+                env=child_process.environ() | self._state(given),
                 pass_fds=given,
                 start_new_session=True,
             )
@@ -145,6 +149,11 @@ class Guard:
             self._child.terminate()
         return self._child, heartbeat
 
+    def _state(self, descriptors: Sequence[int]) -> dict[str, str]:
+        """Return the variables that a bridge begins with."""
+        brakes = "1" if self._brakes else ""
+        return {DESCRIPTORS_ENV: ",".join(map(str, descriptors)), BRAKES_ENV: brakes}
+
     def _watch(self, child: "subprocess.Popen[bytes]", heartbeat: int) -> None:
         """Read heartbeats and brake while they are missing; return when the pipe is closed."""
         poll = select.poll()
@@ -155,7 +164,7 @@ class Guard:
                 beats = os.read(heartbeat, 4096)
                 if not beats:
                     return
-                self._port = beats[-1]
+                self._port, self._brakes = beats[-1] & ~BRAKES, bool(beats[-1] & BRAKES)
                 self._systemd.ready(clock.now_ns())
                 timeout_ms, missed, hangs = self._missed_ms, 0, HANG_BRAKES_MAX
             else:

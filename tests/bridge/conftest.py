@@ -19,6 +19,7 @@ from common.wire.commands import MotionKind
 from tests.factories import safety_state
 from verification.harness.bus import bus_on, running, set_options
 from verification.harness.fake_board import Board, board
+from verification.harness.waiting import wait_until
 
 
 @dataclass
@@ -66,6 +67,11 @@ class BridgeFixture:
 
     def events(self) -> list[str]:
         return [arrival.message.name for arrival in self.seen.get("evt/bridge", [])]
+
+    def beats(self, count: int) -> None:
+        """Wait for this number of safety's states."""
+        end = self.heartbeat + count
+        wait_until(lambda: self.heartbeat >= end, f"{count} states of safety")
 
     def drive(self) -> None:
         """Bring it to half a metre a second."""

@@ -138,6 +138,31 @@ def test_a_hang_up_for_both_comes_to_rest_with_stop_and_leaves_no_break(
     bridge.board.wait_for(MotionKind.STOP)
 
 
+def test_a_restarted_bridge_holds_the_brake_of_the_one_before(bridge: BridgeFixture) -> None:
+    """Until safety's first motion, however late; one that held none sends STOP by itself."""
+
+    def restarted() -> int:
+        """Kill the bridge while no safety commands; return the number of frames before it."""
+        bridge.driving = None
+        count, boot = len(bridge.board.motions), bridge.newest("tel/bridge/link").boot
+        os.kill(child_of(bridge.process.pid), signal.SIGKILL)
+        wait_until(lambda: bridge.newest("tel/bridge/link").boot != boot, "the next bridge")
+        return count
+
+    bridge.drive()
+    bridge.driving = {"command": Command.BRAKE}
+    bridge.board.wait_for(MotionKind.BREAK)
+    for _ in range(2):
+        count = restarted()
+        bridge.beats(80)  # 4 s, more than the time of a start
+        assert breaks_since(bridge.board, count) == len(bridge.board.motions) - count
+    bridge.driving = {"command": Command.STOP}
+    bridge.board.wait_for(MotionKind.STOP)
+    count = restarted()
+    bridge.board.wait_for(MotionKind.STOP)
+    assert breaks_since(bridge.board, count)
+
+
 SUPERVISOR = """
 import sys
 from cli.run.supervisor import Supervisor
@@ -148,7 +173,6 @@ Supervisor({"bridge": sys.argv[1:]}).run()
 def test_a_killed_supervisor_leaves_a_vehicle_that_was_braked() -> None:
     """The guard passes two signals on: the second one brakes a bridge that waits for rest."""
     with board() as made:
-        made.speed_mmps = 500
         command = [sys.executable, "-c", SUPERVISOR, *bridge_command(made, "tcp/127.0.0.1:1")]
         supervisor = subprocess.Popen(command)
         made.wait_for(MotionKind.STOP)
@@ -175,8 +199,11 @@ def test_a_board_that_has_not_sent_is_reported_again(monkeypatch: pytest.MonkeyP
 
 
 def test_a_bug_of_ours_leaves_a_break() -> None:
+    counts: list[int] = []
+
     def bug(_: int) -> None:
-        made.wait_for(MotionKind.STOP)
+        made.wait_for(MotionKind.BREAK)
+        counts.append(len(made.motions))
         raise ZeroDivisionError
 
     with board() as made:
@@ -190,5 +217,5 @@ def test_a_bug_of_ours_leaves_a_break() -> None:
         node.loop.every(1.0, bug)
         with pytest.raises(ZeroDivisionError):
             serve(node)
-        made.wait_for(MotionKind.BREAK)
+        wait_until(lambda: breaks_since(made, counts[0]), "BRAKE")
         bridge._sockets.close()  # the end of the process does it otherwise

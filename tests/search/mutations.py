@@ -332,6 +332,11 @@ MUTATIONS: dict[str, Mutation] = {
     "the bridge's lease never ends": (
         timed(Bridge, lease=10.0), (lambda s: s.kill("safety", 5000),), "a RUN is held",
     ),
+    "a new bridge waits too short for safety": (
+        (leases, "BEGIN_NS", NS_PER_S // 10),
+        (lambda s: s.kill("bridge", 200), lambda s: s.stall("safety", 700)),
+        "replaced the guard's BRAKE",
+    ),
     "no neutral after a lease": (
         (leases, "expire", still_neutral),
         (*LATE_STREAMS, lambda s: s.disturb("motion", Disturbance(lose=1), 250),

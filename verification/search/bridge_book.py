@@ -10,6 +10,7 @@ from common.wire.frame import Frame
 
 LEASE_NS, SILENCE_NS = NS_PER_S // 5, NS_PER_S // 5
 SLACK_NS = NS_PER_S // 40  # the bridge looks every 10 ms
+BEGIN_NS = 3 * NS_PER_S  # that BRAKE of the guard continues without a motion message
 CLEAR_SAMPLES = 3
 
 
@@ -18,6 +19,7 @@ class BridgeBook:
     """Messages delivered to one bridge, by the time of delivery."""
 
     boot: int
+    begun_ns: int = 0
     heard_ns: int | None = None
     ultrasonic: bool | None = None
     bumper: bool | None = None
@@ -81,6 +83,10 @@ class BridgeBook:
         """Return whether the board is connected, with both brakes on."""
         connected = self.heard_ns is not None and now_ns - self.heard_ns <= SILENCE_NS + SLACK_NS
         return connected and self.ultrasonic is True and self.bumper is True
+
+    def may_only_brake(self, now_ns: int) -> bool:
+        """Return whether the guard's BRAKE must continue: no safety has commanded yet."""
+        return self.authority is None and now_ns - self.begun_ns < BEGIN_NS
 
     def complaints(self, now_ns: int) -> Iterator[str]:
         """Yield the reasons why no RUN may be sent now."""

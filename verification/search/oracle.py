@@ -178,7 +178,7 @@ class Oracle:
                 standstill=StandstillBook(turn_braking=self.turn_braking),
             )
         if process.name == "bridge":
-            self.bridge_books[process.boot] = BridgeBook(process.boot)
+            self.bridge_books[process.boot] = BridgeBook(process.boot, self.now_ns)
 
     def on_end(self, process: Process) -> None:
         """Close the book of a process; trips known only to it are dropped."""
@@ -247,6 +247,8 @@ class Oracle:
             brakes = frame.kind is MotionKind.BREAK
             if bridge_book.brake_due and not brakes:
                 self.violations.append("a hit or an emergency stop without a BRAKE at once")
+            if bridge_book.may_only_brake(self.now_ns) and not brakes:
+                self.violations.append("a new bridge replaced the guard's BRAKE")
             bridge_book.brake_due, bridge_book.braked = False, brakes
             if frame.kind is MotionKind.RUN and (frame.linear_mmps or frame.angular_raw):
                 complaints = self._of_frame(bridge_book, process.taking, frame)

@@ -26,6 +26,10 @@ vehicle is not known to be at standstill (``motion_output`` defines that time). 
 it was the authority's last order. The authority is identified by the ``boot`` of the sender; until
 its lease is over, others are refused.
 
+A bridge begins with the BRAKE that its guard sent last. It continues for ``BEGIN_NS`` until the
+first motion of an authority, so that STOP does not replace a BRAKE that safety is about to repeat.
+Where the bridge before held BRAKE (``braked``), it continues without a limit.
+
 The lease counts from reception of a motion, not from its handling: a message that was queued for
 longer than the lease renews nothing and is not obeyed, except a BRAKE.
 
@@ -45,6 +49,7 @@ from common.messages import Motion
 from common.motion import BRAKE, RUN, STOP, Command
 
 STOP_PERIOD_NS = NS_PER_S * 3 // 100  # at the second tick of 20 ms: about 25 Hz
+BEGIN_NS = 3 * NS_PER_S  # longer than a restart of safety
 AT_ONCE = -STOP_PERIOD_NS  # a send time so old that the next STOP is due
 
 
@@ -87,7 +92,7 @@ class Lease(Struct, frozen=True):
     sent_ns: int = 0
     # Owner of the latch that was not reset: an authority, or the bridge.
     latched_by: int | None = None
-    braked: bool = False  # whether the authority's last order was BRAKE
+    braked: bool = False  # whether the authority's last order was BRAKE, to this bridge or before
     uncommanded: bool = False  # moved from standstill; safety has not latched it yet
 
     @property
@@ -219,6 +224,7 @@ def on_tick(
     if now_ns - lease.sent_ns < STOP_PERIOD_NS:
         return lease, None
     since_ns = lease.over_since_ns
-    coasted = since_ns is not None and now_ns - since_ns > coast_ns
-    brake = lease.braking or (coasted and not standing)
+    over_ns = 0 if since_ns is None else now_ns - since_ns
+    begins = lease.boot is None and over_ns <= BEGIN_NS
+    brake = lease.braking or begins or (over_ns > coast_ns and not standing)
     return replace(lease, sent_ns=now_ns), BRAKE if brake else STOP

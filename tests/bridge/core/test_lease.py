@@ -24,7 +24,7 @@ from services.bridge.core.lease import (
 )
 
 MS = NS_PER_S // 1000
-LEASE, COAST = 200 * MS, 1000 * MS
+LEASE, COAST, BEGIN = 200 * MS, 1000 * MS, 3000 * MS
 OWN_BOOT = 7
 NOW = 100 * NS_PER_S
 
@@ -35,7 +35,8 @@ HIT = replace(ARMED, hit=5)
 STOPPED = replace(ARMED, estop=NOW)
 MOVED = replace(ARMED, uncommanded=True, latched_by=OWN_BOOT)
 OWED = replace(ARMED, latched_by=3)  # by one that has ended
-OVER = Lease(over_since_ns=NOW, sent_ns=NOW)
+BEGUN = Lease(over_since_ns=NOW, sent_ns=NOW)
+OVER = replace(BEGUN, boot=1)
 
 
 def run(linear: float = 0.5, angular: float = 0.0, *, seq: int = 11, **more: Any) -> Motion:
@@ -303,6 +304,13 @@ def test_the_lease_ends_and_takes_the_neutral_along(age: int, obeyed: bool) -> N
         (OVER, COAST + 1, True, STOP),
         (OVER, 60 * NS_PER_S, False, BRAKE),
         (OVER, 3600 * NS_PER_S, True, STOP),
+        # At the start the guard's BRAKE continues: for 3 s, or without a limit if it was held
+        (BEGUN, 30 * MS - 1, True, None),
+        (BEGUN, 30 * MS, True, BRAKE),
+        (BEGUN, BEGIN, True, BRAKE),
+        (BEGUN, BEGIN + 1, True, STOP),
+        (BEGUN, BEGIN + 1, False, BRAKE),
+        (replace(BEGUN, braked=True), 3600 * NS_PER_S, True, BRAKE),
     ],
 )
 def test_what_is_due(given: Lease, age: int, standing: bool, order: Command | None) -> None:

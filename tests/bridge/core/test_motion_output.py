@@ -127,7 +127,7 @@ def test_standstill_must_be_measured_after_the_stop(output: Output, order: Comma
 
 def test_before_the_first_lease_the_coast_limit_counts() -> None:
     made = Output()
-    made.made.lease = Lease(over_since_ns=NOW)
+    made.made.lease = Lease(over_since_ns=NOW, boot=SAFETY)
     made.moves(0.5, NOW)
     assert made.tick(NOW + 40 * MS) == [STOP]
     made.moves(0.5, NOW + NS_PER_S)
