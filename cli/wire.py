@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import msgspec
+from msgspec.structs import replace
 
 from common.errors import RobotError
 from common.messages import FaultName
@@ -126,8 +127,9 @@ def parts(data: bytes) -> Iterator[tuple[int, Good | Rejected]]:
             offset += len(next(iter(good.values())).raw)  # the same bytes from each sender
         else:
             worst = min(bad, key=lambda each: FURTHEST.index(each.reason))
-            yield offset, worst
-            offset += len(worst.raw)
+            raw = min((each.raw for each in bad), key=len)  # up to a frame of either sender
+            yield offset, replace(worst, raw=raw)
+            offset += len(raw)
 
 
 def as_text(part: Good | Rejected) -> str:

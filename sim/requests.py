@@ -77,9 +77,11 @@ class Firmware(model.Firmware, frozen=True, kw_only=True, tag_field="do", tag="f
 
 
 class Flood(Request, frozen=True, kw_only=True, tag="flood"):
-    """Make the board send 20 000 extra velocity reports a second, for a time."""
+    """Make the board send extra velocity reports, or another datagram, for a time."""
 
     seconds: Seconds = 1.0
+    rate: Annotated[int, Meta(ge=100, le=20_000)] = 20_000  # a second, in hundreds
+    datagram: bytes = b""  # Base64 in JSON; empty: a velocity report
 
 
 class Wire(model.Line, frozen=True, kw_only=True, tag_field="do", tag="wire"):

@@ -38,7 +38,6 @@ STREAM_STEPS = 2  # velocity at 50 Hz
 SONAR_STEPS = 5  # one round of echoes: 20 Hz
 TRUTH_STEPS = 5  # 20 Hz
 CATCH_UP_NS = NS_PER_S // 2  # a longer gap is skipped: the world is paused meanwhile
-FLOOD_PER_STEP = 200  # datagrams: 20 000 a second
 
 COMMANDS = {
     MotionKind.STOP: Command.STOP,
@@ -89,7 +88,7 @@ class Simulation:
         self._contact = self.world.contact(self.body, self.pose)
         self._silent_until_ns = now_ns
         self._powered = True
-        self._flood_until_ns = now_ns
+        self._flood, self._flood_until_ns = q.Flood(), now_ns
         self._reported_pressed = False
         self._command = t.Command(mono_ns=now_ns, kind=Command.STOP, linear=0.0, angular=0.0)
 
@@ -171,6 +170,7 @@ class Simulation:
 
     @_apply.register
     def _(self, request: q.Flood, now_ns: int) -> None:
+        self._flood = request
         self._flood_until_ns = now_ns + round(request.seconds * NS_PER_S)
 
     @_apply.register
@@ -286,8 +286,8 @@ class Simulation:
         )
 
     def _send_flood(self) -> None:
-        payload = framing.pack(self.board.velocity())
-        for number in range(FLOOD_PER_STEP):
+        payload = self._flood.datagram or framing.pack(self.board.velocity())
+        for number in range(self._flood.rate * STEP_NS // NS_PER_S):
             port = self._ports[number % len(self._ports)]
             self._send([Datagram(payload, port)], self.now_ns)
 

@@ -3,13 +3,19 @@
 A datagram holds one or several frames, back to back; ``frame`` documents the header.
 
 Reading never raises. Invalid bytes become a ``Rejected`` run with one reason, and reading continues
-at the next magic; the runs and the frames together are the whole datagram. Valid frames take the
-fast path; the reason is determined only after a failure.
+at the next opening of a frame that the sender may send; the runs and the frames together are the
+whole datagram. Valid frames take the fast path; the reason is determined only after a failure.
+
+The work for a datagram is bounded: with ``REJECTED_MAX`` runs or more than ``PARTS_MAX`` parts it
+is dropped as a whole, as one run. Valid frames in it do not count either, wherever they are: no
+board packs such a datagram, and a hit is reported again within 20 ms.
 """
 
+import re
 import struct
 from collections.abc import Callable
 from enum import StrEnum
+from functools import cache
 
 import crcmod.predefined
 import msgspec
@@ -24,6 +30,10 @@ pack_header, unpack_header = HEADER.pack, HEADER.unpack_from
 checksum: Callable[[bytes], int] = crcmod.predefined.mkCrcFun("crc-16")
 
 
+REJECTED_MAX = 8  # invalid runs of a datagram
+PARTS_MAX = 64  # frames and runs; a board sends up to a dozen frames together
+
+
 class Reason(StrEnum):
     """Why bytes are not a valid frame."""
 
@@ -33,6 +43,7 @@ class Reason(StrEnum):
     BAD_SIZE = "bad_size"
     BAD_CRC = "bad_crc"
     BAD_VALUE = "bad_value"
+    TOO_MANY = "too_many_parts"
 
 
 class Received(msgspec.Struct, frozen=True, gc=False):
@@ -59,13 +70,15 @@ def pack(frame: Frame) -> bytes:
 def read(datagram: bytes, kinds: Kinds) -> list[Received | Rejected]:
     """Return the parts of a datagram, in order; ``kinds`` are the frames of its sender."""
     parts: list[Received | Rejected] = []
-    start, end = 0, len(datagram)
-    for _ in datagram:  # bounded: each part has at least one byte
+    start, end, rejected = 0, len(datagram), 0
+    while start < end:
         part = part_at(start, datagram, kinds)
         parts.append(part)
         start += len(part.raw)
-        if start == end:
-            break
+        rejected += isinstance(part, Rejected)
+        if rejected >= REJECTED_MAX or len(parts) > PARTS_MAX:
+            detail = f"{rejected} of its first {len(parts)} parts are invalid"
+            return [Rejected(Reason.TOO_MANY, datagram, detail)]
     return parts
 
 
@@ -78,15 +91,15 @@ def part_at(start: int, datagram: bytes, kinds: Kinds) -> Received | Rejected:
         payload = raw[PAYLOAD_OFFSET:]
         numbers = kind.LAYOUT.unpack(payload)
     except (struct.error, KeyError):  # truncated, or no known frame begins here
-        return _reject(datagram, start, *_fault(datagram, start, kinds))
+        return _reject(datagram, start, kinds, *_fault(datagram, start, kinds))
     computed = checksum(payload)
     if computed != crc:
         detail = f"header says 0x{crc:04x}, the bytes give 0x{computed:04x}"
-        return _reject(datagram, start, Reason.BAD_CRC, detail)
+        return _reject(datagram, start, kinds, Reason.BAD_CRC, detail)
     try:
         return Received(kind.from_wire(numbers), raw)
     except WireError as error:
-        return _reject(datagram, start, Reason.BAD_VALUE, str(error))
+        return _reject(datagram, start, kinds, Reason.BAD_VALUE, str(error))
 
 
 def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:
@@ -106,8 +119,15 @@ def _fault(datagram: bytes, start: int, kinds: Kinds) -> tuple[Reason, str]:
     return Reason.TRUNCATED, f"{left} of {size} bytes"
 
 
-def _reject(datagram: bytes, start: int, reason: Reason, detail: str) -> Rejected:
-    """Reject all bytes from ``start`` to the next magic."""
-    following = datagram.find(MAGIC, start + 1)
-    end = len(datagram) if following == -1 else following
+def _reject(datagram: bytes, start: int, kinds: Kinds, reason: Reason, detail: str) -> Rejected:
+    """Reject all bytes from ``start`` to the next opening of a known frame."""
+    following = _openings(*kinds).search(datagram, start + 1)
+    end = following.start() if following else len(datagram)
     return Rejected(reason, datagram[start:end], detail)
+
+
+@cache
+def _openings(*openings: bytes) -> re.Pattern[bytes]:
+    """Return the pattern of any of these openings."""
+    rests = (re.escape(opening.removeprefix(MAGIC)) for opening in openings)
+    return re.compile(re.escape(MAGIC) + b"(?:" + b"|".join(rests) + b")", re.DOTALL)

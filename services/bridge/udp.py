@@ -7,11 +7,14 @@ from collections.abc import Iterator, Sequence
 
 from common import clock
 from common.errors import LinkError
+from common.freshness import NS_PER_S
 from common.settings import Board
 
 DATAGRAM_MAX = 2048
-# Limit of datagrams per round, so that a flood does not delay the loop's timers.
+# Limits of a round for each port, so that a flood does not delay the loop's timers: datagrams, and
+# the time that they take. Both ports together take half a period of the heartbeat.
 BURST = 64
+BURST_NS = NS_PER_S // 200
 BURST_PAUSE_S = 20e-6
 BRAKE_ATTEMPTS = 4  # attempts when the system refuses to send a BRAKE
 
@@ -43,23 +46,28 @@ class Sockets:
         without it, Linux kills a SCHED_FIFO process in a flood (``realtime.limit``).
         """
         for port in dict.fromkeys(ports):
-            sock = self.sockets[port]
-            for _ in range(BURST):
-                try:
-                    datagram, source = sock.recvfrom(DATAGRAM_MAX)
-                except BlockingIOError:
-                    break
-                except OSError:
-                    continue  # ICMP error of an earlier send: no board, or no network
-                if source == self._relay:
-                    self._relay_report = datagram
-                elif source == self._board or (self._any_port and source[0] == self._board[0]):
-                    yield port, datagram, clock.now_ns()
-                else:
-                    self.refused += 1
-                    self.last_foreign_source = source
+            yield from self._burst(port)
+
+    def _burst(self, port: int) -> Iterator[tuple[int, bytes, int]]:
+        sock, end_ns = self.sockets[port], clock.now_ns() + BURST_NS
+        for _ in range(BURST):
+            try:
+                datagram, source = sock.recvfrom(DATAGRAM_MAX)
+            except BlockingIOError:
+                return
+            except OSError:
+                continue  # ICMP error of an earlier send: no board, or no network
+            read_ns = clock.now_ns()
+            if source == self._relay:
+                self._relay_report = datagram
+            elif source == self._board or (self._any_port and source[0] == self._board[0]):
+                yield port, datagram, read_ns
             else:
-                time.sleep(BURST_PAUSE_S)
+                self.refused += 1
+                self.last_foreign_source = source
+            if clock.now_ns() > end_ns:
+                break
+        time.sleep(BURST_PAUSE_S)
 
     def take_relay_report(self) -> bytes:
         """Return the newest report of a relay once; or empty."""

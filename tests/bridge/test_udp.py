@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from common import clock
 from common.settings import Board
 from services.bridge.udp import BURST, BURST_PAUSE_S, Sockets
 from verification.harness.ports import free_port
@@ -53,6 +54,22 @@ def test_a_flood_is_read_in_bursts_with_a_breath_after_each(
         assert slept == [BURST_PAUSE_S]
         assert len(list(sockets.read(0))) == 1
         assert slept == [BURST_PAUSE_S]
+
+
+def test_a_round_ends_when_its_datagrams_take_too_long(
+    peer: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with sockets_of(peer) as sockets:
+        for _ in range(8):
+            peer.sendto(b"frame", sockets.sockets[0].getsockname())
+        now_ns = [0]
+        slept: list[float] = []
+        monkeypatch.setattr(clock, "now_ns", lambda: now_ns[0])
+        monkeypatch.setattr(time, "sleep", slept.append)
+        for _ in sockets.read(0):
+            now_ns[0] += 2_000_000  # of handling
+        assert (now_ns[0], slept) == (6_000_000, [BURST_PAUSE_S])
+        assert len(list(sockets.read(0))) == 5
 
 
 def test_a_strangers_datagram_is_not_yielded(peer: socket.socket) -> None:

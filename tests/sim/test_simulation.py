@@ -97,6 +97,14 @@ def test_a_flood_comes_to_both_ports_at_its_rate_and_ends() -> None:
     assert len(sim.after(0.1)) == own
 
 
+def test_a_flood_of_another_datagram() -> None:
+    sim = SimFixture()
+    sim.do(Flood(seconds=0.1, rate=200, datagram=b"GS" * 1024))
+    sim.after(0.1)
+    payloads = [datagram.payload for datagram in sim.datagrams]
+    assert 18 <= payloads.count(b"GS" * 1024) <= 20
+
+
 # --- requests ---------------------------------------------------------------------------------
 
 

@@ -153,6 +153,10 @@ GREEDY = [
     # More than the bridge can publish: answers to its queries are lost, the bumper's first.
     Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
           (*ON, *ITSELF, *NEUTRAL), hold_s=1.0, harmless=True),
+    # What a parser resumes at most often; each costs one step, and the reflex is not delayed.
+    Fault("board's 300 datagrams/s of GS, then contact",
+          steps(do(Flood(seconds=1.3, rate=300, datagram=b"GS" * 1024)), pause(0.7), hit(0.3)),
+          RESET, within(0.02), harmless=True),
     Fault("queries as fast as possible", injectors.query_flood, ON, hold_s=3.0),
     Fault("queries as fast as possible, then contact",
           steps(injectors.query_flood, pause(1.0), hit(0.3)), RESET, within(0.02)),

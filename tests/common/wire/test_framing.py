@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.wire import framing
+from common.wire import reports as reported
 from common.wire.commands import TO_BOARD, DistanceQuery, DriverQuery, MotionCommand, MotionKind
 from common.wire.frame import HEADER, MAGIC, OPENING, Frame, Kinds, Side
 from common.wire.framing import Reason, Received, Rejected
@@ -148,6 +149,48 @@ def test_a_magic_inside_a_good_payload_is_payload() -> None:
 
 def test_a_frame_of_the_other_direction_is_refused() -> None:
     assert rejected(read_all(framing.pack(LedReport(True)), TO_BOARD)) == [Reason.BAD_SIZE]
+
+
+# --- bounded work ---------------------------------------------------------------------------
+
+WHOLE = framing.pack(reported.BumperReport(True))
+DAMAGED = WHOLE[:-1] + b"\0"
+OPENED = WHOLE[:6]
+FOREIGN = framing.pack(DistanceQuery())  # of the other direction
+
+
+@pytest.mark.parametrize(
+    ("raw", "found", "why", "steps"),
+    [
+        (b"GS" * 1024, 0, [Reason.UNKNOWN_ID], 1),
+        (b"GS" * 32_753, 0, [Reason.UNKNOWN_ID], 1),
+        (WHOLE + b"GS" * 1024 + WHOLE, 2, [Reason.UNKNOWN_ID], 3),
+        (FOREIGN * 200 + WHOLE, 1, [Reason.BAD_SIZE], 2),
+        (frame_bytes(0x7602, b"", size=0xFFFF) * 200, 0, [Reason.BAD_SIZE], 1),
+        (DAMAGED * 7 + WHOLE, 1, [Reason.BAD_CRC] * 7, 8),
+        # Dropped as a whole, with a valid frame in it
+        (WHOLE + DAMAGED * 8, 0, [Reason.TOO_MANY], 9),
+        (DAMAGED * 8 + WHOLE, 0, [Reason.TOO_MANY], 8),
+        (DAMAGED * 200, 0, [Reason.TOO_MANY], 8),
+        (OPENED * 300, 0, [Reason.TOO_MANY], 8),
+        (WHOLE * 64, 64, [], 64),
+        (WHOLE * 200, 0, [Reason.TOO_MANY], 65),
+        (b"", 0, [], 0),
+    ],
+)
+def test_the_work_for_a_datagram_is_bounded(
+    raw: bytes, found: int, why: list[Reason], steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts: list[int] = []
+    part_at = framing.part_at
+
+    def counted(start: int, datagram: bytes, kinds: Kinds) -> Received | Rejected:
+        starts.append(start)
+        return part_at(start, datagram, kinds)
+
+    monkeypatch.setattr(framing, "part_at", counted)
+    parts = read_all(raw, FROM_BOARD)
+    assert (len(frames(parts)), rejected(parts), len(starts)) == (found, why, steps)
 
 
 # --- CRC ------------------------------------------------------------------------------------
