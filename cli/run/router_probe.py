@@ -2,8 +2,9 @@
 
 A working old session is no evidence for a new one: key expressions can keep Zenoh busy for minutes,
 whatever the access rules, and ``t2 estop`` then gets no session. So each attempt of the probe is a
-new session and one query, with a deadline (``bus.probe_deadline``). The probe is a process of its
-own with the next higher priority, because hung threads may use a whole processor.
+new session and one query, with a deadline (``bus.probe_deadline``). A full table of sessions is no
+hang: then the session before is asked (``common.bus.session.RouterCheck``). The probe is a process
+of its own with the next higher priority, because hung threads may use a whole processor.
 
 The router starts its probe with ``RouterProbe``: ``python -m cli.run.router_probe SETUP``. The
 probe writes a byte to its standard output for each answer in time, and ends with its parent.
@@ -22,7 +23,7 @@ import msgspec
 
 from common import child_process, realtime
 from common import log as logs
-from common.bus.session import ONE_POOL, RUNTIME_ENV, answers, router_at
+from common.bus.session import ONE_POOL, RUNTIME_ENV, RouterCheck, router_at
 from common.child_process import Backoff
 from common.settings import BusSettings, Log
 
@@ -109,10 +110,10 @@ def main(text: str) -> int:
 
 def watch(parent: int, where: BusSettings) -> bool:
     """Return whether the parent was killed; False if it ended by itself."""
-    attempts, deadline_s = Attempts(), where.probe_deadline
+    attempts, check, deadline_s = Attempts(), RouterCheck(where), where.probe_deadline
     while os.getppid() == parent:
         began_s = time.monotonic()
-        answered = answers_in_time(where)
+        answered = answers_in_time(check, deadline_s)
         took_s = time.monotonic() - began_s
         if answered:
             os.write(sys.stdout.fileno(), b".")
@@ -123,12 +124,12 @@ def watch(parent: int, where: BusSettings) -> bool:
     return False
 
 
-def answers_in_time(where: BusSettings) -> bool:
-    """Return whether the router answers a new session within the deadline."""
+def answers_in_time(check: RouterCheck, deadline_s: float) -> bool:
+    """Return whether the router answers within the deadline."""
     ended: queue.SimpleQueue[bool] = queue.SimpleQueue()
-    threading.Thread(target=lambda: ended.put(answers(where)), daemon=True).start()
+    threading.Thread(target=lambda: ended.put(check.answers()), daemon=True).start()
     try:
-        return ended.get(timeout=where.probe_deadline)
+        return ended.get(timeout=deadline_s)
     except queue.Empty:
         return False
 

@@ -51,6 +51,9 @@ CLIENT_MAX, ROUTER_MAX = 8 * 2**20, 16 * 2**20
 # In a certificate, first the issuer's and then the subject's: object id 2.5.4.3, then a text as its
 # type, its length (one byte: at most 64) and its bytes. Python's `ssl` decodes no client's own.
 COMMON_NAME = b"\x06\x03\x55\x04\x03"
+# A router's sessions, and connections that have not opened one yet: together fewer than the 1024
+# files that a process may open by default. Zenoh's limit of 1000 sessions is not.
+MAX_SESSIONS, MAX_PENDING = 500, 100
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
 # Motions come in bursts, and each takes a batch because it is express. With Zenoh's two batches, up
 # to one in five bursts of eight lost its newest message on a busy machine.
@@ -178,20 +181,42 @@ def router_at(where: BusSettings) -> BusSettings:
     return replace(where, connect=replace(where, connect=()).endpoints[:1])
 
 
-def answers(where: BusSettings) -> bool:
-    """Return whether a router works: it accepts a session and answers an admin query.
+class RouterCheck:
+    """Checks whether a router works: it accepts a session and answers an admin query.
 
-    A hanging router may block the caller for long: use a separate thread.
+    A router whose table of sessions is full refuses a new one at once; one that hangs does not
+    reply. So the last session stays open, and is asked when a new one is refused.
     """
-    with contextlib.suppress(zenoh.ZError), zenoh.open(client_config(where)) as session:
+
+    def __init__(self, where: BusSettings) -> None:
+        self._where = where
+        self._kept: zenoh.Session | None = None
+        self._is_full = False
+
+    def answers(self) -> bool:
+        """Check; a hanging router may block the caller for long: use a separate thread."""
+        began_s = time.monotonic()
+        try:
+            session = zenoh.open(client_config(self._where, once=True))
+        except zenoh.ZError:
+            refused = time.monotonic() - began_s < OPEN_MS / 1000
+            if refused and not self._is_full:
+                Logger().warning("the router refuses new sessions", limit=MAX_SESSIONS)
+            self._is_full = refused
+            return refused and (self._kept is None or self._asks(self._kept))
+        kept, self._kept, self._is_full = self._kept, session, False
+        if kept is not None:
+            kept.close()
+        return self._asks(session)
+
+    def _asks(self, session: zenoh.Session) -> bool:
         # A robot's router with a connection to a site's router is a peer.
         routers = (*session.info.routers_zid(), *session.info.peers_zid())
         return any(
             reply.ok
             for zid in routers
-            for reply in session.get(f"@/{zid}/*", timeout=where.probe_deadline)
+            for reply in session.get(f"@/{zid}/*", timeout=self._where.probe_deadline)
         )
-    return False
 
 
 def common_name(where: BusSettings) -> str:
@@ -230,15 +255,15 @@ def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
 # --- configurations -----------------------------------------------------------------------------
 
 
-def client_config(where: BusSettings, attempt: int = 0) -> zenoh.Config:
+def client_config(where: BusSettings, attempt: int = 0, *, once: bool = False) -> zenoh.Config:
     """Return the configuration of a client of one of these routers, without scouting.
 
     Zenoh spends the whole timeout on a first endpoint that is silent, so each attempt begins with
-    another one.
+    another one. With ``once`` it ends at the first refusal.
     """
     first = attempt % len(where.endpoints)
     endpoints = [*where.endpoints[first:], *where.endpoints[:first]]
-    connect = {"endpoints": endpoints, "timeout_ms": 1500, "retry": RETRY}
+    connect = {"endpoints": endpoints, "timeout_ms": 0 if once else 1500, "retry": RETRY}
     return _parsed(_common(where) | {"mode": "client", "connect": connect})
 
 
@@ -273,7 +298,12 @@ def router_config(
     if robot and (rules := downsampling_rules(robot, where.laptop_rate)):
         parts["downsampling"] = rules
     full = {"congestion_control": {"block": {"wait_before_close": BLOCKED_TIMEOUT_US}}}
-    return _common(where, {"queue": full}, ROUTER_MAX) | parts
+    accepting = {
+        "max_sessions": MAX_SESSIONS,
+        "accept_pending": MAX_PENDING,
+        "accept_timeout": OPEN_MS,
+    }
+    return _common(where, {"queue": full}, ROUTER_MAX, accepting) | parts
 
 
 def downsampling_rules(robot: str, rate_hz: float) -> list[dict[str, Any]]:
@@ -299,7 +329,10 @@ def _parsed(config: Mapping[str, object]) -> zenoh.Config:
 
 
 def _common(
-    where: BusSettings, sending: Mapping[str, object] | None = None, largest: int = CLIENT_MAX
+    where: BusSettings,
+    sending: Mapping[str, object] | None = None,
+    largest: int = CLIENT_MAX,
+    accepting: Mapping[str, int] | None = None,
 ) -> dict[str, object]:
     link: dict[str, object] = {
         "tx": {"lease": round(where.lease * 1000), "keep_alive": 4, **(sending or {})},
@@ -322,6 +355,6 @@ def _common(
         "transport": {
             "link": link,
             "shared_memory": {"enabled": False},  # our frames are tiny
-            "unicast": {"open_timeout": OPEN_MS},
+            "unicast": {"open_timeout": OPEN_MS, **(accepting or {})},
         },
     }

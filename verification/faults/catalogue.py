@@ -162,6 +162,9 @@ GREEDY = [
           steps(injectors.query_flood, pause(1.0), hit(0.3)), RESET, within(0.02)),
     Fault("requests as fast as possible, then estop",
           steps(injectors.request_flood, pause(1.0), estop), RESET, within(0.02)),
+    # The table is full after some 5 s; the probe must not take that for a hang.
+    Fault("a viewer's sessions until the router refuses more", injectors.session_flood, ON,
+          hold_s=15.0, harmless=True),
     Fault("browser's estop in floods of messages and events", injectors.browser_estop,
           RESET, within(0.3)),
 ]  # fmt: skip

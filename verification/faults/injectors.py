@@ -71,6 +71,16 @@ with session(sys.argv[1]) as bus:
             bus.put(f"{ROOT}/@cmd/drive/nav", bytes([0xC1]) * 40)
         time.sleep(0.01)
 """
+SESSIONS = """
+import contextlib, sys, time
+from verification.faults.independent_client import session
+with contextlib.ExitStack() as held:
+    while True:
+        try:
+            held.enter_context(session(sys.argv[1]))
+        except Exception:  # the table is full
+            time.sleep(0.1)
+"""
 # Control characters are escaped before they are shown, which makes them longer still.
 EVENTS = """
 import sys, time, msgpack
@@ -169,6 +179,12 @@ def query_flood(fixture: StackFixture) -> None:
 def request_flood(fixture: StackFixture) -> None:
     """Publish requests of one known and many unknown sources, and garbage, 3,000 a second."""
     _start(fixture, REQUESTS, operators_endpoint(fixture.running.config))
+
+
+@injector
+def session_flood(fixture: StackFixture) -> None:
+    """Open sessions with the router until it refuses more, and hold them."""
+    _start(fixture, SESSIONS, operators_endpoint(fixture.running.config))
 
 
 def _start(fixture: StackFixture, program: str, word: str) -> None:

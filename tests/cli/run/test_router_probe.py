@@ -4,6 +4,7 @@ import contextlib
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +18,7 @@ from common.bus.session import client_config, router_at
 from common.settings import BusSettings
 from tests.cli.processes import PATIENCE_S, alive, wait_gone
 from tests.common.systemd_manager import Manager
-from verification.harness.bus import at, router_process
+from verification.harness.bus import at, router_process, set_options
 from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
@@ -101,6 +102,32 @@ def test_a_router_that_hangs_on_key_matching_is_killed(endpoint: str) -> None:
         wait_until(lambda: b"router_probe" in _command(probe_of(process)), "its probe")
         explode(endpoint)
         assert process.wait(DETECTED_S + NOISE_S) == -signal.SIGKILL
+
+
+SMALL = """
+import sys
+from cli.__main__ import main
+from common.bus import session
+session.MAX_SESSIONS = 6
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_full_table_of_sessions_is_no_hang_and_hides_none(
+    manager: Manager, endpoint: str
+) -> None:
+    sets = set_options(f"bus.listen={endpoint}", f"bus.probe_deadline={DEADLINE_S}")
+    command = [sys.executable, "-c", SMALL, "router", *sets]
+    with subprocess.Popen(command) as router, contextlib.ExitStack() as sessions:
+        wait_until(lambda: manager.beats() > 0, "an answer")
+        with contextlib.suppress(zenoh.ZError):
+            while True:
+                sessions.enter_context(zenoh.open(client_config(at(endpoint), once=True)))
+        count = manager.beats()
+        wait_until(lambda: router.poll() is not None or manager.beats() > count + 12, "beats")
+        assert router.poll() is None
+        router.send_signal(signal.SIGSTOP)
+        assert router.wait(DETECTED_S + NOISE_S) == -signal.SIGKILL
 
 
 YES, NO, STALLED = (True, False), (False, False), (False, True)  # answered, stalled
