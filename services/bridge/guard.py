@@ -7,8 +7,8 @@ the socket that the bridge used:
 ============== =============================== ==============================================
 phase          BRAKE                           ends with
 ============== =============================== ==============================================
-starting       until the first heartbeat, that a heartbeat: alive; none in 10 s: killed
-               follows the bridge's first BRAKE
+starting       until the first heartbeat, that a heartbeat: alive; none in 10 s of its CPU time
+               follows the bridge's first BRAKE or of its sleep (``Start``): killed
 alive          from 200 ms without one         five BRAKEs without one: killed; the pipe's end
 ending, killed until the child has exited      exit: restarted, the first time at once
 not started    until it could be started       started; retried after 0 to 5 s (no memory)
@@ -31,6 +31,7 @@ import subprocess
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from pathlib import Path
 from types import FrameType
 
 from common import child_process, clock
@@ -45,7 +46,7 @@ from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 BRAKE_MS = 50
 HANG_BRAKES_MAX = 5  # BRAKEs without a heartbeat, until the bridge is killed
-START_BRAKES_MAX = 200
+START_S = 10.0  # of CPU time and of sleep, until a starting bridge is killed
 EXIT_BRAKES_MAX = 20  # BRAKEs after the bridge closed its pipe, until it is killed
 NOT_STARTED = 1  # exit code when the bridge could not be started
 STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
@@ -80,6 +81,40 @@ class Heartbeat:
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
+
+
+class Start:
+    """The time that a starting bridge has used: its CPU time and its sleep.
+
+    While it waits for the CPU or the disk of a busy host no time counts: killed, it would begin
+    again. Where the system does not report it, each period counts.
+    """
+
+    TICK_S = 1 / os.sysconf("SC_CLK_TCK")
+    WAITS = b"RD"  # states of a process that is ready to run, or reads the disk
+
+    def __init__(self, pid: int) -> None:
+        self.used_s = 0.0
+        self._stat = Path(f"/proc/{pid}/stat")
+        self._cpu_s = 0.0
+
+    def add(self, period_s: float) -> None:
+        """Add a period without a heartbeat."""
+        state, cpu_s = self._read()
+        if cpu_s > self._cpu_s:
+            self.used_s += cpu_s - self._cpu_s
+        elif state not in self.WAITS:
+            self.used_s += period_s
+        self._cpu_s = cpu_s
+
+    def _read(self) -> tuple[bytes, float]:
+        """Return the state of the process and its CPU time."""
+        try:
+            _, _, fields = self._stat.read_bytes().rpartition(b") ")  # after its name
+        except OSError:
+            return b"?", 0.0
+        state, *numbers = fields.split()
+        return state, sum(map(int, numbers[10:12])) * self.TICK_S
 
 
 class Guard:
@@ -158,19 +193,22 @@ class Guard:
         """Read heartbeats and brake while they are missing; return when the pipe is closed."""
         poll = select.poll()
         poll.register(heartbeat, select.POLLIN)
-        timeout_ms, missed, hangs = BRAKE_MS, 0, START_BRAKES_MAX
-        while missed < hangs:
+        timeout_ms, missed, alive, start = BRAKE_MS, 0, False, Start(child.pid)
+        while missed < HANG_BRAKES_MAX and start.used_s < START_S:
             if poll.poll(timeout_ms):
                 beats = os.read(heartbeat, 4096)
                 if not beats:
                     return
                 self._port, self._brakes = beats[-1] & ~BRAKES, bool(beats[-1] & BRAKES)
                 self._systemd.ready(clock.now_ns())
-                timeout_ms, missed, hangs = self._missed_ms, 0, HANG_BRAKES_MAX
+                timeout_ms, missed, alive = self._missed_ms, 0, True
             else:
                 self.brake()
                 timeout_ms = BRAKE_MS
-                missed += 1
+                if alive:
+                    missed += 1
+                else:
+                    start.add(BRAKE_MS / 1000)
         child.kill()
         self._log.error("the bridge hangs: killed")
 

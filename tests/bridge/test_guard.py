@@ -24,7 +24,7 @@ from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
 from services.bridge import guard as guard_module
 from services.bridge.config import BridgeConfig
-from services.bridge.guard import Guard, Heartbeat
+from services.bridge.guard import Guard, Heartbeat, Start
 from services.bridge.udp import Sockets
 from tests.common.rights import needs_right
 from tests.common.systemd_manager import PATIENCE_US, Manager
@@ -98,6 +98,56 @@ def test_a_bridge_that_was_only_held_up_lives_on(
     assert run(guard_of(made, "beat(); time.sleep(0.5); beat(); end()")) == EXIT_LINK
     assert lives() == 1
     wait_until(lambda: len(made.motions) > 4, "BRAKE meanwhile")
+
+
+def test_a_bridge_that_sleeps_in_its_start_is_killed(
+    made: Board, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guard_module, "START_S", 0.3)
+    assert run(guard_of(made, "first and time.sleep(1000); beat(); end()")) == EXIT_LINK
+    assert lives() == 2
+
+
+def test_a_bridge_that_waits_for_the_cpu_in_its_start_lives_on(
+    made: Board, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Here a sleep counts as such a wait: it would be killed after six BRAKEs otherwise."""
+    monkeypatch.setattr(guard_module, "START_S", 0.3)
+    monkeypatch.setattr(Start, "WAITS", b"RDS")
+    monkeypatch.setattr(Start, "TICK_S", 0.0)  # of the interpreter's start
+    assert run(guard_of(made, "time.sleep(2); beat(); end()")) == EXIT_LINK
+    assert lives() == 1
+    wait_until(lambda: len(made.motions) > 20, "BRAKE meanwhile")
+
+
+@pytest.mark.parametrize(
+    ("state", "ticks", "used_s"),
+    [
+        ("R", [0, 0], 0.0),  # starved
+        ("D", [0, 0], 0.0),  # reads the disk
+        ("S", [0, 0], 2.0),
+        ("T", [0, 0], 2.0),
+        ("R", [100, 300], 3.0),  # runs away
+        ("S", [30, 30], 1.3),
+        ("R", [30, 30], 0.3),
+    ],
+)
+def test_the_time_of_a_start_is_its_cpu_time_and_its_sleep(
+    state: str, ticks: list[int], used_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Start, "TICK_S", 0.01)
+    start, start._stat = Start(0), tmp_path / "stat"
+    for count in ticks:
+        start._stat.write_text(f"7 (a) S) {state} {'0 ' * 10}{count - 10 if count else 0} "
+                               f"{10 if count else 0} {'0 ' * 30}")  # fmt: skip
+        start.add(1.0)
+    assert start.used_s == pytest.approx(used_s)
+
+
+def test_the_time_of_a_start_is_all_time_where_the_system_reports_none(tmp_path: Path) -> None:
+    start, start._stat = Start(0), tmp_path / "none"
+    start.add(1.0)
+    assert start.used_s == 1.0
 
 
 def test_a_permanent_error_is_passed_on_and_braked_for(made: Board) -> None:
