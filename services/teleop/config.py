@@ -26,8 +26,8 @@ class Teleop(settings.ProtectedSection, frozen=True, kw_only=True):
     hold_first: Hold = 0.6  # s that a tap drives: most terminals send the first repeat after ~0.5 s
     hold: Hold = 0.3  # s that a repeat drives
     round_trip: Annotated[float, Meta(gt=0.0, le=5.0)] = 0.15  # s; slower: no driving keys
-    gamepad: bool = True  # use the first one that SDL finds
-    gamepad_silence: Annotated[float, Meta(gt=0.0, le=60.0)] = 2.0  # s without an event
+    gamepad: bool = True  # use the one whose deadman is held
+    gamepad_silence: Annotated[float, Meta(gt=0.0, le=60.0)] = 2.0  # s without a change
     deadzone: Annotated[float, Meta(ge=0.02, le=0.5)] = 0.1  # of a stick's range
     expo: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.5  # 0 is straight, 1 is cubic
     linear_axis: Index = 1  # left stick, up and down

@@ -181,12 +181,25 @@ class Controller:
             self._node.event("gamepad", "info", f"gamepad: {self._gamepad.status}")
         if self._controls.is_gamepad_silent:
             self._report("gamepad_silent", (
-                f"gamepad released: deflected, and no event for {self._settings.gamepad_silence:g} "
-                "s; release the deadman, then press it again"))  # fmt: skip
+                "gamepad released: deflected, and its reading is unchanged for "
+                f"{self._settings.gamepad_silence:g} s; "
+                "release the deadman, then press it again"))  # fmt: skip
         else:
             self._reported.discard("gamepad_silent")
+        self._report_ignored(self._gamepad.ignored)
         is_shown = now_ns - self._drawn_ns <= SCREEN_TIMEOUT_S * NS_PER_S
         return stick if is_shown and not self._leaving else None
+
+    def _report_ignored(self, axes: dict[int, float]) -> None:
+        """Report axes that are off centre, once for each press of the deadman."""
+        if axes and "off_centre" not in self._reported:
+            for axis, position in axes.items():
+                text = (
+                    f"gamepad: axis {axis} is at {position:.2f} as the deadman goes down: ignored; "
+                )
+                text += "centre it and press again, or correct teleop.*_axis or teleop.deadzone"
+                self._event_log.add("teleop", "warning", text)
+        (self._reported.add if axes else self._reported.discard)("off_centre")
 
     # --- emergency stop -----------------------------------------------------------------------
 
@@ -298,6 +311,14 @@ class Controller:
         by = self._overruled_by
         return f"OVERRULED by {by}: release the controls" if by else ""
 
+    def _gamepad_notice(self, now_ns: int) -> str:
+        if self._controls.is_gamepad_due(now_ns):
+            return "no change: MOVE THE STICK"
+        if self._controls.is_gamepad_silent:
+            return "FROZEN: release the deadman"
+        axes = ", ".join(map(str, self._gamepad.ignored))
+        return f"OFF CENTRE, ignored: axis {axes}" if axes else ""
+
     def _make_view(self, now_ns: int) -> View:
         controls = self._controls
         return View(
@@ -315,7 +336,7 @@ class Controller:
             keys_refused=self.terminal.refusal(now_ns),
             keys_muted=controls.is_muted(now_ns),
             gamepad=self._gamepad.status,
-            move_stick=controls.is_gamepad_due(now_ns),
+            gamepad_notice=self._gamepad_notice(now_ns),
             lines=self._event_log.lines(),
             **{name: self._newest(name, now_ns) for name in TOPICS},
         )

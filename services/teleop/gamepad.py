@@ -1,7 +1,8 @@
 """Gamepad input through SDL, with hot-plugging.
 
 pygame is imported only if a gamepad is enabled, because the import takes a second. SDL requires
-that all calls come from one thread: the loop's.
+that all calls come from one thread: the loop's. SDL misses the event of some devices that come or
+go, so the devices are listed regularly, too. ``core.pads`` decides which one drives.
 """
 
 import contextlib
@@ -10,7 +11,8 @@ from types import ModuleType
 from typing import Any
 
 from services.teleop.config import Teleop
-from services.teleop.core.controls import Deflection, Stick
+from services.teleop.core.controls import Stick
+from services.teleop.core.pads import Pads, Reading, is_usable
 
 ENVIRON = {
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",  # its banner would overwrite the screen
@@ -18,6 +20,7 @@ ENVIRON = {
     "SDL_JOYSTICK_ALLOW_BACKGROUND_EVENTS": "1",  # without a window there is no foreground
     "SDL_NO_SIGNAL_HANDLERS": "1",  # teleop handles ctrl-c
 }
+LIST_READS = 100  # from one list of the devices to the next: 5 s
 
 
 class Gamepad:
@@ -25,6 +28,7 @@ class Gamepad:
 
     def __init__(self, status: str) -> None:
         self.status = status  # its name, or why it is missing
+        self.ignored: dict[int, float] = {}  # axes that do not count, with their position
 
     def read(self) -> Stick | None:
         """Return the current state; None without a gamepad."""
@@ -32,50 +36,64 @@ class Gamepad:
 
 
 class SdlGamepad(Gamepad):
-    """The first gamepad that SDL finds; after its loss, the next one."""
+    """All gamepads that SDL finds; the one whose deadman is held drives."""
 
     def __init__(self, pygame: ModuleType, settings: Teleop) -> None:
         super().__init__("none")
         self._pygame: Any = pygame
         self._settings = settings
-        self._joystick: Any = None
-        self._events = 0  # axis and button events
-        self._input_events = {
-            pygame.JOYAXISMOTION, pygame.JOYBALLMOTION, pygame.JOYHATMOTION,
-            pygame.JOYBUTTONDOWN, pygame.JOYBUTTONUP,
-        }  # fmt: skip
+        self._pads = Pads(settings)
+        self._devices: dict[int, Any] = {}  # usable ones, by SDL's number
+        self._reads = 0
         pygame.display.init()
         pygame.joystick.init()
 
     def read(self) -> Stick | None:
         """Return the current state; None without a gamepad."""
-        for event in self._pygame.event.get():
-            self._handle(event)
-        if self._joystick is None and self._pygame.joystick.get_count():
+        events = {event.type for event in self._pygame.event.get()}
+        is_due = self._reads % LIST_READS == 0
+        if is_due and self._reads and not self._devices:  # SDL may have missed one
+            self._pygame.joystick.quit()
+            self._pygame.joystick.init()
+        if is_due or events & {self._pygame.JOYDEVICEADDED, self._pygame.JOYDEVICEREMOVED}:
+            self._list()
+        self._reads += 1
+        readings = {}
+        for number, device in self._devices.items():
             with contextlib.suppress(self._pygame.error):  # unplugged in the meantime
-                self._joystick = self._pygame.joystick.Joystick(0)
-        self.status = str(self._joystick.get_name()) if self._joystick else "none"
-        return self._stick() if self._joystick else None
+                readings[number] = _reading(device)
+        stick = self._pads.update(readings)
+        self.ignored = self._pads.ignored
+        if self._pads.driving is not None:
+            self.status = str(self._devices[self._pads.driving].get_name())
+        return stick
 
-    def _handle(self, event: Any) -> None:
-        if not self._joystick:
+    def _list(self) -> None:
+        """Open all devices, and name the one that can drive, or why none can."""
+        before, settings = set(self._devices), self._settings
+        self._devices, unusable = {}, ""
+        for index in range(self._pygame.joystick.get_count()):
+            with contextlib.suppress(self._pygame.error):  # unplugged in the meantime
+                device = self._pygame.joystick.Joystick(index)
+                if is_usable(settings, device.get_numaxes(), device.get_numbuttons()):
+                    self._devices[device.get_instance_id()] = device
+                else:
+                    unusable = f": {device.get_name()} has no such axes or deadman"
+        if set(self._devices) == before and before:
             return
-        if getattr(event, "instance_id", None) != self._joystick.get_instance_id():
-            return
-        if event.type == self._pygame.JOYDEVICEREMOVED:
-            self._joystick = None
-        elif event.type in self._input_events:
-            self._events += 1
+        names = [str(device.get_name()) for device in self._devices.values()]
+        self.status = f"{len(names)} found: hold a deadman" if len(names) > 1 else "".join(names)
+        self.status = self.status or f"none{unusable}"
 
-    def _stick(self) -> Stick:
-        joystick, settings = self._joystick, self._settings
-        linear, angular = (  # a missing axis or button is at rest
-            joystick.get_axis(index) if index < joystick.get_numaxes() else 0.0
-            for index in (settings.linear_axis, settings.angular_axis)
-        )
-        button = settings.deadman_button
-        deadman = button < joystick.get_numbuttons() and bool(joystick.get_button(button))
-        return Stick(Deflection(-linear, -angular), deadman, self._events)
+
+def _reading(device: Any) -> Reading:
+    return Reading(
+        axes=tuple(device.get_axis(index) for index in range(device.get_numaxes())),
+        buttons=(
+            *(device.get_button(index) for index in range(device.get_numbuttons())),
+            *(device.get_hat(index) for index in range(device.get_numhats())),
+        ),
+    )
 
 
 def find(settings: Teleop) -> Gamepad:

@@ -253,9 +253,7 @@ def motion(view: View) -> Text:
         "motor L": Text(*_faults(view.left)),
         "motor R": Text(*_faults(view.right)),
         "driver": _driver(view),
-        "gamepad": Text("no event: MOVE THE STICK", WARN)
-        if view.move_stick
-        else Text(view.gamepad),
+        "gamepad": Text(view.gamepad_notice, WARN) if view.gamepad_notice else Text(view.gamepad),
     }
     return rows_of(*(Text.assemble((f"{name:<8}", DIM), row) for name, row in rows.items()))
 

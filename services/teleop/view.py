@@ -56,7 +56,7 @@ class View:
     keys_refused: str = ""  # why keys are refused
     keys_muted: bool = False  # until they were released
     gamepad: str = ""  # its status
-    move_stick: bool = False  # the gamepad drives and sent no event for a while
+    gamepad_notice: str = ""  # what the operator must do with it
     safety: SafetyState | None = None
     velocity: Velocity | None = None
     odometry: Odometry | None = None

@@ -161,6 +161,32 @@ def test_a_gamepad_drives_while_the_screen_is_redrawn(operator: Operator) -> Non
     assert sent[20:] == [0.0, 0.0, 0.0, None]  # the screen is not redrawn any more
 
 
+def test_the_screen_and_the_events_name_what_a_gamepad_lacks(operator: Operator) -> None:
+    pad = FakeGamepad()
+    operator.controller.use_gamepad(pad)
+
+    def notices(count: int, events: int) -> list[str]:
+        found = []
+        for _ in range(count):
+            operator.controller.screen_drawn(operator.now_ns)
+            pad.stick = stick(deadman=events > 0, events=events)
+            operator.ticks(1)
+            found.append(operator.controller.view.gamepad_notice)
+        return found
+
+    notices(1, 0)
+    due, frozen = "no change: MOVE THE STICK", "FROZEN: release the deadman"
+    assert notices(60, 1) == [""] * 21 + [due] * 20 + [frozen] * 19
+    assert notices(1, 0) == [""]
+    for _ in range(2):
+        pad.ignored = {3: -1.0}
+        assert notices(3, 2) == ["OFF CENTRE, ignored: axis 3"] * 3
+        pad.ignored = {}
+        notices(1, 0)
+    off_centre = "gamepad: axis 3 is at -1.00 as the deadman goes down: ignored; "
+    assert [line.startswith(off_centre) for line in operator.lines] == [False, True]
+
+
 def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -> None:
     def hold(ticks: int, source: str | None) -> list[float | None]:
         speeds: list[float | None] = []

@@ -12,7 +12,7 @@ import pytest
 
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
-from services.teleop.gamepad import SdlGamepad, find
+from services.teleop.gamepad import LIST_READS, SdlGamepad, find
 
 MAPS = Path("/proc/self/maps")
 DEADMAN = 4
@@ -50,22 +50,22 @@ def test_a_missing_gamepad_names_the_reason(
 
 
 class VirtualGamepad:
-    """A virtual gamepad of SDL: six axes, eleven buttons."""
+    """A virtual gamepad of SDL."""
 
-    def __init__(self) -> None:
+    def __init__(self, axes: int = 6, buttons: int = 11) -> None:
         library = next(
             line.split()[-1] for line in MAPS.read_text().splitlines() if "libSDL2-" in line
         )
         self._sdl = ctypes.CDLL(library)
         self._sdl.SDL_JoystickOpen.restype = ctypes.c_void_p
-        self.index = self._sdl.SDL_JoystickAttachVirtual(1, 6, 11, 0)
+        self.index = self._sdl.SDL_JoystickAttachVirtual(1, axes, buttons, 0)
         self._handle = ctypes.c_void_p(self._sdl.SDL_JoystickOpen(self.index))
 
     def push(self, axis: int, value: int) -> None:
         self._sdl.SDL_JoystickSetVirtualAxis(self._handle, axis, ctypes.c_int16(value))
 
-    def press(self, button: int) -> None:
-        self._sdl.SDL_JoystickSetVirtualButton(self._handle, button, 1)
+    def press(self, button: int, *, down: bool = True) -> None:
+        self._sdl.SDL_JoystickSetVirtualButton(self._handle, button, down)
 
     def unplug(self) -> None:
         self._sdl.SDL_JoystickClose(self._handle)
@@ -100,26 +100,72 @@ def test_sticks_and_buttons_are_read_and_each_change_counts(
     virtual.press(DEADMAN)
     virtual.push(1, HALF)
     virtual.push(3, HALF // 2)
-    assert pad.read() == Stick(Deflection(0.5, 0.25), deadman=True, events=3)
+    assert pad.read() == Stick(Deflection(0.5, 0.25), deadman=True, events=1)
     virtual.push(1, HALF)  # still, or frozen
-    assert pad.read() == Stick(Deflection(0.5, 0.25), deadman=True, events=3)
-    pad._settings = Teleop(angular_axis=9, deadman_button=20)  # missing ones are at rest
-    assert pad.read() == Stick(Deflection(0.5, 0.0), deadman=False, events=3)
+    assert pad.read() == Stick(Deflection(0.5, 0.25), deadman=True, events=1)
 
 
 def test_a_lost_gamepad_reads_as_none_and_the_next_one_drives(pad: SdlGamepad) -> None:
     first, second = VirtualGamepad(), VirtualGamepad()
     assert pad.read() == Stick(Deflection(0.0, 0.0), deadman=False, events=0)
-    second.push(1, HALF)  # another one
-    assert pad.read() == Stick(Deflection(0.0, 0.0), deadman=False, events=0)
+    assert pad.status == "2 found: hold a deadman"
     first.unplug()
     second.index -= 1
+    assert pad.read() == Stick(Deflection(0.0, 0.0), deadman=False, events=0)
+    second.press(DEADMAN)
+    second.push(1, HALF)
     stick = pad.read()
     assert stick is not None
     assert stick.push == Deflection(0.5, 0.0)
     second.unplug()
     assert pad.read() is None
     assert pad.status == "none"
+
+
+def test_the_deadman_chooses_the_device_and_media_keys_are_none(pad: SdlGamepad) -> None:
+    keys, idle, held = VirtualGamepad(0, 40), VirtualGamepad(2, 8), VirtualGamepad()
+    keys.press(DEADMAN)
+    pad.read()
+    held.press(DEADMAN)
+    held.push(1, HALF)
+    assert pad.read() == Stick(Deflection(0.5, 0.0), deadman=True, events=1)
+    idle.press(DEADMAN)  # too late, and without the axis of the angular speed
+    assert pad.read() == Stick(Deflection(0.5, 0.0), deadman=True, events=1)
+    held.press(DEADMAN, down=False)
+    assert pad.read() == Stick(Deflection(0.0, 0.0), deadman=False, events=1)
+    for one in (held, idle):
+        one.unplug()
+    assert pad.read() is None
+    assert pad.status.endswith("has no such axes or deadman")
+    keys.unplug()
+
+
+def test_a_device_without_an_event_is_found(
+    pad: SdlGamepad, virtual: VirtualGamepad, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pad._pygame.event, "get", list)
+    assert pad.read() is not None
+    other = VirtualGamepad()
+    other.press(DEADMAN)
+    for _ in range(2 * LIST_READS):
+        pad.read()
+    other.press(DEADMAN, down=False)
+    monkeypatch.undo()
+    pad.read()
+    other.press(DEADMAN)
+    stick = pad.read()
+    assert stick is not None
+    assert stick.deadman
+    other.unplug()
+
+
+def test_sdl_is_started_again_while_it_finds_no_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    pygame = fake_pygame()
+    pygame.joystick.get_count.return_value = 0
+    pad = SdlGamepad(pygame, Teleop())
+    for _ in range(2 * LIST_READS + 1):
+        assert pad.read() is None
+    assert (pygame.joystick.quit.call_count, pygame.joystick.init.call_count) == (2, 3)
 
 
 def test_a_gamepad_of_sdl_that_freezes_while_it_drives_is_released(
@@ -130,8 +176,23 @@ def test_a_gamepad_of_sdl_that_freezes_while_it_drives_is_released(
         if tick == 1:
             virtual.press(DEADMAN)
         if 1 <= tick < 40:
-            virtual.push(1, -20_000 - tick)
+            virtual.push(1, -20_000 - 100 * tick)
         request = controls.tick(pad.read(), now_ns)
         moved.append(bool(request and request.linear))
         now_ns += 50_000_000
-    assert moved == [False] * 2 + [True] * (38 + 40) + [False] * 40  # 2 s after its last event
+    assert moved == [False] * 2 + [True] * (38 + 40) + [False] * 40  # 2 s after its last change
+
+
+def test_the_deadman_alone_moves_nothing_on_a_pad_with_triggers(
+    pad: SdlGamepad, virtual: VirtualGamepad
+) -> None:
+    """Axes 3 and 4 are triggers: SDL reads 0 until the first report, then -1."""
+    controls, now_ns = Controls(Teleop()), 0
+    for tick in range(60):
+        virtual.push(3, -32_768 if tick >= 10 else 0)
+        virtual.push(4, -32_768 if tick >= 10 else 0)
+        virtual.press(DEADMAN, down=tick >= 10)
+        request = controls.tick(pad.read(), now_ns)
+        assert request is None or (request.linear, request.angular) == (0.0, 0.0)
+        now_ns += 50_000_000
+    assert pad.ignored == {3: -1.0}

@@ -163,7 +163,7 @@ def test_the_footer_has_the_keys_that_have_an_effect(
             {"motor L": "ok", "motor R": "encoder bit_9"},
         ),
         ({"requested": request(release="forward")}, {"driver": "you, release forward"}),
-        ({"gamepad": "Pad", "move_stick": True}, {"gamepad": "no event: MOVE THE STICK"}),
+        ({"gamepad": "Pad", "gamepad_notice": "MOVE THE STICK"}, {"gamepad": "MOVE THE STICK"}),
         (
             {
                 "requested": request(-0.35, 0.1),

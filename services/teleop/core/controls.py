@@ -47,11 +47,11 @@ class Deflection:
 
 @dataclass(frozen=True, slots=True)
 class Stick:
-    """State of a gamepad."""
+    """State of the gamepad that drives."""
 
     push: Deflection
     deadman: bool  # held down; without it the sticks are ignored
-    events: int = 0  # received since the gamepad was found
+    events: int = 0  # changes of its reading
 
 
 # The keypad without NumLock sends home, pageup, end and pagedown from its corners. A terminal
@@ -83,7 +83,7 @@ class Controls:
     def __init__(self, settings: Teleop) -> None:
         self.gear = 1
         self.terminal = RoundTrip(settings.round_trip)
-        self.is_gamepad_silent = False  # deflected without events; until it drives again
+        self.is_gamepad_silent = False  # deflected without a change; until its deadman is up
         self._settings = settings
         self._keys = Keys(settings.hold_first, settings.hold)
         self._deadman = Deadman(settings.gamepad_silence)
@@ -151,6 +151,7 @@ class Controls:
             self.enforce("gamepad_gone", now_ns)
         else:
             self._deadman.update(stick.deadman, stick.events, now_ns)
+        self.is_gamepad_silent = self.is_gamepad_silent and stick is not None and stick.deadman
         return self._requests.tick(self._held(stick, now_ns))
 
     def _held(self, stick: Stick | None, now_ns: int) -> Drive | None:

@@ -17,18 +17,18 @@ unfocused      the terminal lost the focus, and with it     with the next      a
 terminal_slow  ``round_trip`` refuses a key                 after a pause      not released
 unheard        no state of safety for a second              after a pause      after it was up
 overruled      another source drives for half a second      after a pause      after it was up
-gamepad_silent deflected stick, no event of the gamepad for not released       after it was up
+gamepad_silent deflected stick, reading unchanged for       not released       after it was up
                ``gamepad_silence``
 gamepad_gone   no gamepad, or a screen that hangs           not released       after it was up
 ============== ============================================ ================== ==================
 
 The pause is ``hold_first`` without any key: a key that repeats is still held, and an old request.
 
-A gamepad that freezes while its USB receiver stays enumerated keeps its last state. SDL reports
-changes only, so silence alone is no fault: a stick at rest requests zero. A thumb on a deflected
-stick is never still: at 8 to 16 bits its tremor changes one of the two axes many times a second. At
-the mechanical end one axis may be clamped, but the cross axis is not, and every axis, hat and
-button counts. The screen asks for a movement after half of the limit.
+A gamepad that freezes while its USB receiver stays enumerated keeps its last state. An unchanged
+reading alone is no fault: a stick at rest requests zero. A thumb on a deflected stick is never
+still: at 8 to 16 bits its tremor changes one of the two axes many times a second. At the mechanical
+end one axis may be clamped, but the cross axis is not, and every axis, hat and button counts. The
+screen asks for a movement after half of the limit.
 """
 
 from collections.abc import Collection
@@ -117,20 +117,20 @@ class Keys:
 
 
 class Deadman:
-    """A gamepad's button that enables motion while it is down, and the events of its stick."""
+    """A gamepad's button that enables motion while it is down, and the changes of its reading."""
 
     def __init__(self, silence_s: float) -> None:
         self.is_held = False
         # 1 equivalent mutant: None is as false as False.
         self._seen_up = False
         self._silence_s = silence_s
-        # 1 equivalent mutant: any value that is no number of events.
+        # 1 equivalent mutant: any value that is no number of changes.
         self._events: int | None = None
         # 2 equivalent mutants: the first ``update`` sets it.
-        self._event_ns = 0  # the last event
+        self._event_ns = 0  # the last change
 
     def update(self, down: bool, events: int, now_ns: int) -> None:
-        """Process the button and the number of events since the gamepad was found."""
+        """Process the button and the number of changes of the reading."""
         self._seen_up = self._seen_up or not down
         self.is_held = down and self._seen_up
         if events != self._events:
