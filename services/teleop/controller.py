@@ -28,8 +28,8 @@ from services.teleop.gamepad import Gamepad
 from services.teleop.view import LINES, EventLog, View
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
-SCREEN_TIMEOUT_S = 1.0  # without a redraw the terminal is lost: the gamepad is released
-UNHEARD_TICKS = 10  # without a fresh state of safety; with its own 0.5 s this is 1 s
+SCREEN_TIMEOUT_S = 1.0  # without a redraw the screen hangs: the gamepad is released
+UNHEARD_S = 0.5  # without a fresh state of safety; with its own 0.5 s this is 1 s
 RESET_TIMEOUT_S = 1.0  # safety refuses an older reset
 UNHEARD = "no state of safety for 1 s: controls released"
 NOT_CONFIRMED = (
@@ -68,7 +68,7 @@ class Controller:
         self._requested: Drive | None = None
         self._leaving = False
         self._reported: set[str] = set()  # rules that are broken, and in the event log
-        self._unheard: int | None = None  # ticks; None before the first state of safety
+        self._heard_ns: int | None = None  # the last tick with a fresh state of safety
         self._estop = EstopRepetition()
         self._contest = Contest(self._settings.source)
         self._overruled_by: str | None = None  # while that source drives
@@ -139,17 +139,17 @@ class Controller:
 
     def _enforce_rules(self, state: SafetyState | None, now_ns: int) -> None:
         """Release the controls by the rules of ``hold``, so that nothing old moves the vehicle."""
+        # A program that was suspended has a fresh state at once, and controls from before.
+        unheard_s = (now_ns - (self._heard_ns or now_ns)) / NS_PER_S
+        self._enforce("unheard", unheard_s > UNHEARD_S, UNHEARD, now_ns)
         if state is not None:
-            self._unheard = 0
-        elif self._unheard is not None:
-            self._unheard += 1
+            self._heard_ns = now_ns
         contest = self._contest
         contest.tick(state, requests=self._requested is not None)
         if contest.is_lost:
             self._overruled_by = contest.other
         elif contest.other is None and not self._controls.is_muted(now_ns):
             self._overruled_by = None
-        self._enforce("unheard", (self._unheard or 0) >= UNHEARD_TICKS, UNHEARD, now_ns)
         text = f"overruled by {contest.other}: controls released"
         self._enforce("overruled", contest.is_lost, text, now_ns)
         if not (reason := self.terminal.refusal(now_ns)):
@@ -187,7 +187,8 @@ class Controller:
         else:
             self._reported.discard("gamepad_silent")
         self._report_ignored(self._gamepad.ignored)
-        is_shown = now_ns - self._drawn_ns <= SCREEN_TIMEOUT_S * NS_PER_S
+        is_drawn = now_ns - self._drawn_ns <= SCREEN_TIMEOUT_S * NS_PER_S
+        is_shown = is_drawn and not self.terminal.has_stopped(now_ns)
         return stick if is_shown and not self._leaving else None
 
     def _report_ignored(self, axes: dict[int, float]) -> None:

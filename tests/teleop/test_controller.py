@@ -149,6 +149,40 @@ def test_a_lost_bus_releases_and_a_held_key_does_not_drive_again(
     assert operator.speeds(2) == [0.0, 0.2]
 
 
+def test_a_suspended_program_releases_what_it_finds_held(operator: Operator) -> None:
+    pad = FakeGamepad()
+    operator.controller.use_gamepad(pad)
+
+    def drive(deadman: bool = True) -> float | None:
+        operator.tell_safety()
+        operator.controller.screen_drawn(operator.now_ns)
+        pad.stick = stick(deadman=deadman, events=operator.now_ns)
+        return operator.speeds(1)[0]
+
+    assert [drive(deadman) for deadman in (False, True, True)] == [None, 0.0, 0.2]
+    operator.wait(0.6)
+    operator.press("w")  # the terminal kept its repeats
+    assert [drive() for _ in range(5)] == [0.0, 0.0, 0.0, None, None]
+    assert [drive(deadman) for deadman in (False, True, True)] == [None, 0.0, 0.2]
+
+
+def test_a_terminal_that_answers_no_more_releases_the_gamepad(operator: Operator) -> None:
+    pad = FakeGamepad()
+    operator.controller.use_gamepad(pad)
+
+    def drive(deadman: bool = True) -> float | None:
+        operator.controller.screen_drawn(operator.now_ns)  # it is drawn, but not shown
+        pad.stick = stick(deadman=deadman, events=operator.now_ns)
+        return operator.speeds(1)[0]
+
+    assert [drive(deadman) for deadman in (False, True, True)] == [None, 0.0, 0.2]
+    operator.near = False
+    assert [drive() for _ in range(25)][20:] == [0.2, 0.0, 0.0, 0.0, None]
+    operator.near = True
+    operator.wait(0.1)
+    assert [drive(deadman) for deadman in (True, False, True, True)] == [None, None, 0.0, 0.2]
+
+
 def test_a_gamepad_drives_while_the_screen_is_redrawn(operator: Operator) -> None:
     pad = FakeGamepad()
     operator.controller.use_gamepad(pad)

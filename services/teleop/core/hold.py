@@ -15,11 +15,13 @@ stop           space, E, quit                               with the next      a
 unfocused      the terminal lost the focus, and with it     with the next      after it was up
                the repeats                                  press
 terminal_slow  ``round_trip`` refuses a key                 after a pause      not released
-unheard        no state of safety for a second              after a pause      after it was up
+unheard        no state of safety for a second, or the      after a pause      after it was up
+               program was suspended
 overruled      another source drives for half a second      after a pause      after it was up
 gamepad_silent deflected stick, reading unchanged for       not released       after it was up
                ``gamepad_silence``
-gamepad_gone   no gamepad, or a screen that hangs           not released       after it was up
+gamepad_gone   no gamepad, or a screen or terminal that     not released       after it was up
+               hangs
 ============== ============================================ ================== ==================
 
 The pause is ``hold_first`` without any key: a key that repeats is still held, and an old request.

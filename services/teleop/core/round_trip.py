@@ -20,6 +20,9 @@ in time                       one over the limit      refused: too slow
 in time                       all within the limit    accepted
 ============================= ======================= ==================================
 
+A terminal that answered once and then not for ``STOPPED_S`` shows nothing any more, although the
+program goes on drawing: it is suspended, or its connection is cut.
+
 A terminal multiplexer (tmux, screen, mosh) answers the query itself: over ssh its answers do not
 measure the operator's terminal.
 """
@@ -31,6 +34,7 @@ from common.freshness import NS_PER_S
 
 PROBE_S = 0.1  # period of the queries
 RECOVER_S = 1.0  # that the terminal must be fast before its keys count again
+STOPPED_S = 1.0  # without an answer
 ANSWERS = 64  # stored: 6.4 s
 ADVICE = "use `t2 drive` on a machine near the robot, or the dashboard"
 UNKNOWN = "terminal delay unknown: no answer yet"
@@ -89,6 +93,11 @@ class RoundTrip:
             return ""
         round_trip_s, limit_s = round_trip_ns / NS_PER_S, self._limit_ns / NS_PER_S
         return f"terminal too slow: {round_trip_s:.2f} s, allowed {limit_s:g} s"
+
+    def has_stopped(self, now_ns: int) -> bool:
+        """Return whether the terminal answers no more; one that never answered has not."""
+        newest = self._answers[-1] if self._answers else None
+        return newest is not None and now_ns - newest.received_ns > STOPPED_S * NS_PER_S
 
     @staticmethod
     def _least_ns(newest: Answer, at_ns: int) -> int:

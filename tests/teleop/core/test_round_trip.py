@@ -11,6 +11,7 @@ from services.teleop.core.round_trip import (
     ANSWERS,
     PROBE_S,
     RECOVER_S,
+    STOPPED_S,
     UNKNOWN,
     RoundTrip,
     place,
@@ -31,6 +32,14 @@ def trip() -> RoundTrip:
 def probe(trip: RoundTrip, number: int, sent_s: float, took_s: float) -> None:
     trip.sent((number, 1), at(sent_s))
     trip.answered((number, 1), at(sent_s + took_s))
+
+
+def test_a_terminal_has_stopped_a_second_after_its_last_answer(trip: RoundTrip) -> None:
+    trip.sent((1, 1), at(1.0))
+    assert not trip.has_stopped(at(60.0))  # one that never answers
+    trip.answered((1, 1), at(2.0))
+    assert not trip.has_stopped(at(2.0 + STOPPED_S))
+    assert trip.has_stopped(at(2.001 + STOPPED_S))
 
 
 SLOW_ONCE = [(10.0, 0.5), *((10.5 + number * PROBE_S, 0.01) for number in range(2, 30))]
