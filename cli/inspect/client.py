@@ -103,12 +103,16 @@ class SafetyClient:
         """Publish an emergency stop once."""
         self.probe.put(keys.estop_key(robot), b"", codec.ENCODING, keys.ESTOP_CLASS)
 
-    def stop(self, robots: Iterable[str]) -> set[str]:
-        """Repeat an emergency stop until all have latched it; return the robots that have."""
+    def stop(self, robots: Iterable[str], seconds: float | None = None) -> set[str]:
+        """Repeat an emergency stop until all have latched it; return the robots that have.
+
+        ``seconds`` replaces the 3 s after which it counts as not confirmed.
+        """
+        ticks = None if seconds is None else max(1, round(seconds / TICK_S))
         self.states.clear()  # only a state from now on counts
         self._stops = {robot: EstopRepetition() for robot in robots}
         for stop in self._stops.values():
-            stop.start(None)
+            stop.start(None, ticks)
         while any(stop.is_pending for stop in self._stops.values()):
             if "*" in self.robot:  # for robots that are not known here
                 self.order_stop(self.robot)

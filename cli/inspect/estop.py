@@ -1,8 +1,9 @@
 """``t2 estop``: emergency stop of one robot, a site or all, latched until an operator's reset.
 
-The order is repeated until safety reports the latch: a router that drops it, by its access rules or
-on a bad link, reports nothing. Each addressed robot must confirm. Robots that the router does not
-know at this moment cannot be listed.
+The order is repeated until safety reports the latch, for ``ESTOP_WAIT_S``: a router that drops it,
+by its access rules or on a bad link, reports nothing. Without a router it is sent once one answers
+within this time. Each addressed robot must confirm. Robots that the router does not know at this
+moment cannot be listed.
 
 ``--keepalive NAME`` keeps an emergency stop alive from a terminal, as a pendant does: safety brakes
 and latches when this program ends, hangs or loses the robot.
@@ -23,12 +24,13 @@ from cli.inspect.session import add_options, open_session, services, until_inter
 from common import keys
 from common.bus.probe import Probe
 from common.cli_args import source_words
+from common.client import ESTOP_WAIT_S
 from common.errors import LinkError, RobotError
 from common.messages import EstopKeepalive, KeepaliveState, SafetyState
 from common.root_cause import WITHOUT_BRIDGE
 from common.text import printable
 
-TIMEOUT_S = 3.0  # without a router
+RETRY_S = 0.2  # without a router
 KEEPALIVE_S = 0.1
 SWITCH = "USE THE VEHICLE'S OWN SWITCH"
 BARRED = "A driver of this robot releases it (R in `t2 drive`): this program may not reset."
@@ -48,21 +50,33 @@ def run(options: argparse.Namespace) -> int:
     """Stop the robot of the options; retry while no router is reachable."""
     if options.keepalive:
         return keep_alive(options)
-    end_s = time.monotonic() + TIMEOUT_S
-    while True:
-        try:
-            with open_session(options) as session:
-                client = SafetyClient(session.probe, session.robot)
-                return stop(client, session.user, source_words(options))
-        except LinkError as error:
-            if time.monotonic() > end_s:
-                raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
+    end_s, is_reported = time.monotonic() + ESTOP_WAIT_S, False
+    try:
+        while True:
+            try:
+                with open_session(options) as session:
+                    client = SafetyClient(session.probe, session.robot)
+                    return stop(client, session.user, source_words(options), end_s)
+            except LinkError as error:
+                if time.monotonic() > end_s:
+                    raise LinkError(f"NOT SENT, {SWITCH}. {error}") from None
+                if not is_reported:
+                    is_reported = True
+                    output.warn(
+                        f"t2 estop: NOT SENT YET, {SWITCH}. It is sent if the router answers "
+                        f"within {ESTOP_WAIT_S:g} s. {error}"
+                    )
+                time.sleep(RETRY_S)
+    except KeyboardInterrupt:
+        output.warn(f"t2 estop: ended by Ctrl-C before the stop was confirmed: {SWITCH}.")
+        raise
 
 
-def stop(client: SafetyClient, user: str, settings: Sequence[str] = ()) -> int:
+def stop(client: SafetyClient, user: str, settings: Sequence[str] = (), end_s: float = 0.0) -> int:
     """Stop one robot, or several by a key expression; return 1 if one does not confirm in time.
 
-    The event names the ``user``. ``settings`` are the options that advised commands repeat.
+    The event names the ``user``. ``settings`` are the options that advised commands repeat. A robot
+    that does not confirm soon is reported, and the order is repeated until ``end_s``.
     """
     probe, robot = client.probe, client.robot
     client.order_stop(robot)  # before anything else
@@ -75,24 +89,47 @@ def stop(client: SafetyClient, user: str, settings: Sequence[str] = ()) -> int:
             client.report_stop(each, user)
     # By name, too: a driver's certificate may allow its own robots only, not an expression.
     confirmed = client.stop(expected)
-    missing = sorted(expected - confirmed)
-    if missing == [robot]:
-        with suppress(LinkError):
-            if is_elsewhere(probe, robot):
-                return 1
-    unreached = {each for each in confirmed if is_unreached(client.states[each])}
+    states = dict(client.states)
+    if missing := expected - confirmed:
+        report_missing(client, missing, settings)
+        confirmed |= insist(client, missing, end_s)
+        states |= client.states
+    unreached = {each for each in confirmed if is_unreached(states[each])}
     for each in sorted(confirmed - unreached):
         release = shlex.join(["t2", "call", "safety/reset", "--robot", each, *settings])
         may_reset = probe.has_server(keys.RESET.on(each))
         print(f"Robot {each} is stopped. {f'`{release}` releases it.' if may_reset else BARRED}")
     sys.stdout.flush()
-    trouble = dict.fromkeys(unreached, "has latched it, but does not hear the vehicle")
-    warn(trouble | dict.fromkeys(missing, "does not confirm"), settings)
-    if not confirmed and not missing:
+    warn(dict.fromkeys(unreached, "has latched it, but does not hear the vehicle"), settings)
+    if not confirmed and not expected:
         output.warn(
             f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. `t2 robots` lists ids"
         )
-    return 0 if confirmed and not missing and not unreached else 1
+    return 0 if confirmed and expected <= confirmed and not unreached else 1
+
+
+def report_missing(client: SafetyClient, missing: set[str], settings: Sequence[str]) -> None:
+    """Warn of robots that do not confirm, with the reason if it is known."""
+    if missing == {client.robot}:
+        with suppress(LinkError):
+            if is_elsewhere(client.probe, client.robot):
+                return
+    warn(dict.fromkeys(missing, "does not confirm"), settings)
+
+
+def insist(client: SafetyClient, missing: set[str], end_s: float) -> set[str]:
+    """Repeat the order until ``end_s``; return the robots that confirm it."""
+    left_s = end_s - time.monotonic()
+    if left_s <= 0:
+        return set()
+    output.warn(f"t2 estop: the order is repeated for {left_s:.0f} s.")
+    confirmed = client.stop(missing, left_s)
+    if names := ", ".join(sorted(missing - confirmed)):
+        output.warn(
+            f"t2 estop: robot {names} has not confirmed it within {ESTOP_WAIT_S:g} s: "
+            f"repeated no longer. {SWITCH}."
+        )
+    return confirmed
 
 
 def is_elsewhere(probe: Probe, robot: str) -> bool:

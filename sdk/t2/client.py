@@ -11,6 +11,7 @@ ZEROS = 3  # requests after a drive: one may be lost
 DENIED_AFTER = 10  # states of safety; a router needs a moment to announce its subscribers
 OVERRULED_TICKS = 10  # 0.5 s: the client's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
+ESTOP_WAIT_S = 30.0  # from the press; without a link it is sent on reconnect until then
 KEPT_TICKS = 10  # 0.5 s: a reset that was sent before has arrived
 
 
@@ -116,9 +117,9 @@ class EstopRepetition(Struct):
         """Whether the stop is still repeated."""
         return self.ticks > 0
 
-    def start(self, state: SafetyState | None) -> None:
+    def start(self, state: SafetyState | None, ticks: int | None = None) -> None:
         """Start, or start again, after the first stop was sent; ``state`` is the newest one."""
-        self.ticks = ESTOP_TICKS
+        self.ticks = ESTOP_TICKS if ticks is None else ticks
         self.unsure = 1 if state is not None and "estop" not in state.latched else KEPT_TICKS
 
     def tick(self, state: SafetyState | None) -> EstopStep:

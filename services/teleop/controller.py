@@ -14,20 +14,37 @@ from common import clock, keys
 from common.bus.bus import Arrival, no_answer, not_allowed
 from common.bus.session import is_viewer, operator_name
 from common.cli_args import with_options
-from common.client import Contest, EstopRepetition, EstopStep, ResetCheck, reset_request
+from common.client import (
+    ESTOP_TICKS,
+    ESTOP_WAIT_S,
+    Contest,
+    EstopRepetition,
+    EstopStep,
+    ResetCheck,
+    reset_request,
+)
 from common.freshness import NS_PER_S, Latest, fresh
 from common.messages import Drive, Event, ResetDone, SafetyState
 from common.root_cause import MAY_MOVE, TEXTS, root_cause
 from common.service import Node
 from common.source import DriveSource
 from services.teleop.config import TeleopConfig
-from services.teleop.core.controls import ESTOP, MAX_PRESS_AGE_S, Action, Controls, Stick
+from services.teleop.core.controls import (
+    ACKNOWLEDGE,
+    ESTOP,
+    MAX_PRESS_AGE_S,
+    Action,
+    Controls,
+    Stick,
+)
 from services.teleop.core.hold import Press
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import LINES, EventLog, View
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
+WAIT_TICKS = round(ESTOP_WAIT_S / PERIOD_S) + 1  # its age ends it first
+OWN_SWITCH = "use the vehicle's own switch"
 SCREEN_TIMEOUT_S = 1.0  # without a redraw the screen hangs: the gamepad is released
 UNHEARD_S = 0.5  # without a fresh state of safety; with its own 0.5 s this is 1 s
 RESET_TIMEOUT_S = 1.0  # safety refuses an older reset
@@ -72,7 +89,10 @@ class Controller:
         self._estop = EstopRepetition()
         self._contest = Contest(self._settings.source)
         self._overruled_by: str | None = None  # while that source drives
-        self._unconfirmed = False  # whether safety never showed our emergency stop
+        self._estop_ns = 0  # the last press
+        self._estop_sent = False  # whether there was a router since the press
+        self._unconfirmed = False  # whether safety has not shown our emergency stop for 3 s
+        self._lapsed = ""  # what became of an emergency stop that is repeated no longer
         self._reset: ResetCheck | None = None
         self._source = DriveSource(self._bus, self._settings.source, self._report_denied)
         self._latest: dict[str, Latest[Any]] = {}  # messages, by the names of TOPICS
@@ -96,9 +116,11 @@ class Controller:
         """Process a key press or its repeat."""
         if self._leaving and press.key != ESTOP:
             return
+        if press.key == ACKNOWLEDGE:
+            self._lapsed = ""
         action = self._controls.press(press, now_ns)
         if action is Action.ESTOP:
-            self._start_estop(self._state(now_ns))
+            self._start_estop(self._state(now_ns), now_ns)
         elif action is Action.RESET:
             self._start_reset(press.shown, self._state(now_ns))
         elif action is Action.SLOW:
@@ -115,6 +137,7 @@ class Controller:
         """Stop the loop after the final zeros, and after a pending emergency stop."""
         if not self._leaving:
             self._leaving = True
+            self._estop.ticks = min(self._estop.ticks, ESTOP_TICKS)
             self._controls.stop(clock.now_ns())
 
     # --- the loop ---------------------------------------------------------------------------
@@ -133,7 +156,7 @@ class Controller:
             self._node.event("take_over", "info", text)
         if self._requested is not None:
             self._source.put(self._requested)
-        self._repeat_estop(state)
+        self._repeat_estop(state, now_ns)
         self._check_reset(state, now_ns)
         self.view = self._make_view(now_ns)
 
@@ -204,35 +227,48 @@ class Controller:
 
     # --- emergency stop -----------------------------------------------------------------------
 
-    def _start_estop(self, state: SafetyState | None) -> None:
+    def _start_estop(self, state: SafetyState | None, now_ns: int) -> None:
         """Stop; a key that repeats, or a press during the stop, is no further event."""
         is_known = self._estop.is_pending or (state is not None and "estop" in state.latched)
         self._bus.estop()
-        self._estop.start(state)
+        self._estop.start(state, WAIT_TICKS)
+        self._estop_ns, self._estop_sent, self._lapsed = now_ns, self._bus.connected, ""
         if not is_known:
             self._node.event("estop", "warning", f"emergency stop requested by {self._operator}")
 
-    def _repeat_estop(self, state: SafetyState | None) -> None:
+    def _repeat_estop(self, state: SafetyState | None, now_ns: int) -> None:
+        """Repeat a stop until it is confirmed or too old; a suspended program sends no old one."""
+        if self._estop.is_pending and self._estop_left_s(now_ns) <= 0:
+            self._estop.ticks, self._unconfirmed = 0, False
+            what = "IS NOT CONFIRMED" if self._estop_sent else "WAS NOT SENT"
+            self._lapsed = f"YOUR E-STOP {what}: press E again; {OWN_SWITCH}"
+            self._event_log.add("teleop", "error", self._lapsed)
         step = self._estop.tick(state)
         if step is not EstopStep.NONE:
             self._bus.estop()
+            self._estop_sent = self._estop_sent or self._bus.connected
         if state is not None and "estop" in state.latched:
             self._unconfirmed = False
-        if step is EstopStep.LAST:
+        elif self._estop.ticks == WAIT_TICKS - ESTOP_TICKS or step is EstopStep.LAST:
+            self._report_unconfirmed()
+
+    def _estop_left_s(self, now_ns: int) -> float:
+        return ESTOP_WAIT_S - (now_ns - self._estop_ns) / NS_PER_S
+
+    def _report_unconfirmed(self) -> None:
+        if not self._unconfirmed:
             self._unconfirmed = True
-            denied = self._source.denied
-            self._node.event(
-                "estop_denied" if denied else "estop_unconfirmed", "error", self.unconfirmed
-            )
+            name = "estop_denied" if self._source.denied else "estop_unconfirmed"
+            self._node.event(name, "error", self.unconfirmed)
 
     @property
     def unconfirmed(self) -> str:
         """What safety has not confirmed, for the operator; empty for nothing."""
-        if not self._unconfirmed:
-            return ""
+        if self._lapsed or not self._unconfirmed:
+            return self._lapsed
         # A certificate that may not drive can rarely stop; the router reports neither.
         denied = ", probably not allowed" if self._source.denied else ""
-        return f"EMERGENCY STOP NOT CONFIRMED{denied}: use the vehicle's own switch"
+        return f"EMERGENCY STOP NOT CONFIRMED{denied}: {OWN_SWITCH}"
 
     # --- reset --------------------------------------------------------------------------------
 
@@ -297,12 +333,21 @@ class Controller:
         state: SafetyState | None = self._newest("safety", now_ns)
         return state
 
+    def _estop_alarm(self, now_ns: int) -> str:
+        left = f"{max(0, self._estop_left_s(now_ns)):.0f} s"
+        if self._lapsed:
+            return f"{self._lapsed}. Enter: understood"
+        if self._estop.is_pending and not self._bus.connected:
+            return (
+                f"EMERGENCY STOP NOT SENT YET: no router. {OWN_SWITCH.capitalize()}. "
+                f"It is sent if the router is back within {left}"
+            )
+        return f"{self.unconfirmed}; it is repeated for {left}" if self._unconfirmed else ""
+
     def _alarm(self, state: SafetyState | None, now_ns: int) -> str:
         """Return what the operator must know before anything else; empty for nothing."""
-        if self._estop.is_pending and not self._bus.connected:
-            return "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch"
-        if self._unconfirmed:
-            return f"{self.unconfirmed}; E repeats it"
+        if alarm := self._estop_alarm(now_ns):
+            return alarm
         if root_cause(self._bus.connected, state, self._newest("link", now_ns)).part in TEXTS:
             return MAY_MOVE
         if not self._may_stop:

@@ -193,6 +193,8 @@ def test_a_second_stop_starts_the_time_again() -> None:
     estop.tick(None)
     estop.start(SEEN)
     assert (estop.ticks, estop.unsure) == (ESTOP_TICKS, KEPT_TICKS) == (60, 10)
+    estop.start(SEEN, 600)  # a client whose link may be down
+    assert estop.ticks == 600
     assert len({step.value for step in EstopStep}) == len(EstopStep) == 3
 
 

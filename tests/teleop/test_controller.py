@@ -89,26 +89,83 @@ def test_an_estop_that_is_not_latched_is_reported(
     operator: Operator, monkeypatch: pytest.MonkeyPatch, denied: bool
 ) -> None:
     monkeypatch.setattr(Publisher, "passed_on", not denied)
+    monkeypatch.setattr(FakeBus, "connected", True)
     operator.press("e")
     for ticks in (ESTOP_TICKS - 1, 3):
         assert not any("NOT CONFIRMED" in line for line in operator.lines)
         for _ in range(ticks):
             operator.tell_safety()
             operator.ticks(1)
-    assert operator.node.fake.estops == ESTOP_TICKS + 1
+    assert operator.node.fake.estops == ESTOP_TICKS + 3  # and so on
     why = ", probably not allowed" if denied else ""
     alarm = f"EMERGENCY STOP NOT CONFIRMED{why}: use the vehicle's own switch"
     assert operator.lines[-1] == alarm
-    assert operator.controller.view.alarm == f"{alarm}; E repeats it"
+    assert operator.controller.view.alarm == f"{alarm}; it is repeated for 27 s"
     operator.tell_safety(latched=("estop",))
     operator.ticks(1)
     assert not operator.controller.view.alarm.startswith(alarm)
 
 
-def test_an_estop_without_a_router_is_reported_at_once(operator: Operator) -> None:
+NOT_SENT = "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch. "
+LAPSED = "YOUR E-STOP WAS NOT SENT: press E again; use the vehicle's own switch"
+
+
+def test_an_estop_without_a_router_is_sent_once_it_is_back(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch
+) -> None:
     operator.press("e")
     operator.ticks(1)
-    assert operator.controller.view.alarm.startswith("EMERGENCY STOP NOT SENT YET")
+    alarm = f"{NOT_SENT}It is sent if the router is back within 30 s"
+    assert operator.controller.view.alarm == alarm
+    operator.ticks(580)
+    assert operator.controller.view.alarm == alarm.replace("30", "1")
+    monkeypatch.setattr(FakeBus, "connected", True)
+    before = operator.node.fake.estops
+    operator.tell_safety()
+    operator.ticks(1)
+    assert operator.node.fake.estops == before + 1
+    operator.tell_safety(latched=("estop",))
+    operator.ticks(1)
+    assert operator.controller.unconfirmed == ""
+
+
+@pytest.mark.parametrize("suspended", [True, False])
+def test_an_estop_that_was_not_sent_is_shown_until_it_is_acknowledged(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch, suspended: bool
+) -> None:
+    operator.press("e")
+    if suspended:
+        operator.wait(31)
+    else:
+        operator.ticks(601)
+    monkeypatch.setattr(FakeBus, "connected", True)
+    operator.node.fake.estops = 0
+    for latched in ((), ("estop",), ()):  # of somebody else
+        operator.tell_safety(latched=latched)
+        operator.press("space")
+        operator.ticks(2)
+        assert operator.controller.view.alarm == f"{LAPSED}. Enter: understood"
+    assert operator.controller.unconfirmed == LAPSED
+    assert operator.node.fake.estops == 0
+    operator.press("enter")
+    operator.node.fake.deliver(keys.LINK, link(), operator.now_ns)
+    operator.ticks(1)
+    assert operator.controller.view.alarm == ""
+
+
+def test_an_estop_that_nobody_confirms_is_shown_until_the_next_one(
+    operator: Operator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FakeBus, "connected", True)  # a router without this robot's safety
+    operator.press("e")
+    operator.ticks(602)
+    lapsed = LAPSED.replace("WAS NOT SENT", "IS NOT CONFIRMED")
+    assert operator.controller.view.alarm == f"{lapsed}. Enter: understood"
+    operator.press("e")
+    operator.tell_safety(latched=("estop",))
+    operator.node.fake.deliver(keys.LINK, link(), operator.now_ns)
+    operator.ticks(1)
+    assert operator.controller.view.alarm == ""
 
 
 def test_without_board_the_vehicle_may_still_move(

@@ -32,7 +32,7 @@ from services.teleop.core.hold import RULES, Deadman, Keys, Press
 from services.teleop.core.round_trip import RoundTrip
 
 MAX_PRESS_AGE_S = 0.5
-ESTOP, RESET, STOP = "e", "r", "space"
+ESTOP, RESET, STOP, ACKNOWLEDGE = "e", "r", "space", "enter"
 RELEASE: dict[str, Direction] = {"f": "forward", "b": "backward"}
 GEARS = {"1": 1, "2": 2, "3": 3, "4": 4, "5": 5}
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
+from cli.inspect import estop
 from cli.inspect.client import SafetyClient
 from common import client as machine
 from common import keys
@@ -115,6 +116,7 @@ def test_t2_estop_reports_the_reason_before_the_advice(
         return capsys.readouterr().err.splitlines()
 
     monkeypatch.setattr(machine, "ESTOP_TICKS", 10)
+    monkeypatch.setattr(estop, "ESTOP_WAIT_S", 0.0)
     with site.router(site.settings("robot", "001")) as (secured, onboard):
         OnBoard(join, onboard)
         reason, advice = stopped("viewer", "hall")

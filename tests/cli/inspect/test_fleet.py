@@ -84,13 +84,45 @@ def test_unconfirmed_robots_are_named(
     pretend(join("berlin-003"), "bridge", {})  # its safety has died
     pretend(join("berlin-004"), "dashboard", {})  # a laptop
     monkeypatch.setattr(machine, "ESTOP_TICKS", 20)
+    monkeypatch.setattr(estop, "ESTOP_WAIT_S", 2.0)
     result = t2("estop", "--site", "berlin")
     assert result.code == 1
     assert "Robot berlin-001 is stopped." in result.out
     assert "berlin-002 is stopped" not in result.out
     for name in ("berlin-002", "berlin-003"):
         assert f"robot {name} does not confirm. USE THE VEHICLE'S OWN SWITCH" in result.err
+        assert name in result.err.splitlines()[-1]
+    assert "has not confirmed it within 2 s: repeated no longer. USE THE" in result.err
     assert "berlin-004" not in result.err
+
+
+def test_a_stop_is_repeated_for_a_robot_that_confirms_late(
+    join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    safety = robot(join("berlin-001"), obeys=False)
+    monkeypatch.setattr(machine, "ESTOP_TICKS", 6)
+    obeys = threading.Timer(2.0, lambda: setattr(safety, "_obeys", True))
+    obeys.start()
+    result = t2("estop", "--robot", "berlin-001")
+    obeys.join()
+    assert (result.code, "Robot berlin-001 is stopped." in result.out) == (0, True)
+    doubt, repeats = result.err.splitlines()
+    assert "does not confirm. USE THE VEHICLE'S OWN SWITCH" in doubt
+    assert repeats.startswith("t2 estop: the order is repeated for ")
+
+
+def test_an_interrupted_stop_is_not_confirmed(
+    t2: Tool, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(_: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cli.inspect.estop.time.sleep", interrupt)
+    nowhere = Tool(f"tcp/127.0.0.1:{free_port()}", "001", capsys)
+    result = nowhere("estop")
+    assert result.code not in (0, None)
+    assert "NOT SENT YET, USE THE VEHICLE'S OWN SWITCH. It is sent if" in result.err
+    assert "ended by Ctrl-C before the stop was confirmed: USE THE" in result.err
 
 
 def test_a_latched_stop_that_the_board_may_not_hear_is_no_stop(join: Join, t2: Tool) -> None:
@@ -116,7 +148,7 @@ def test_a_driver_of_some_robots_stops_them_by_name(
 
 @pytest.mark.parametrize("word", ["ls", "estop"])
 def test_without_a_router(word: str, t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(estop, "TIMEOUT_S", 0.1)
+    monkeypatch.setattr(estop, "ESTOP_WAIT_S", 0.1)
     nowhere = Tool(f"tcp/127.0.0.1:{free_port()}", "001", t2.capsys)
     result = nowhere(word)
     assert (result.code, result.out) == (EXIT_LINK, "")
@@ -127,7 +159,7 @@ def test_without_a_router(word: str, t2: Tool, monkeypatch: pytest.MonkeyPatch) 
 
 def test_a_stop_waits_for_a_restarted_router(t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "ESTOP_TICKS", 6)
-    monkeypatch.setattr(estop, "TIMEOUT_S", 30.0)  # a busy host starts a router slowly
+    monkeypatch.setattr(estop, "insist", lambda *_: set())
     where = f"tcp/127.0.0.1:{free_port()}"
     with contextlib.ExitStack() as stack:
         late = threading.Timer(1.0, lambda: stack.enter_context(router_process(where)))
