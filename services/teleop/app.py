@@ -4,15 +4,17 @@ The screen decides nothing. It exits when the controller has sent its final zero
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
 from textual import events
+from textual._xterm_parser import XTermParser
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
+from textual.drivers import linux_driver
 from textual.widgets import Static
 
 from common import clock
@@ -23,14 +25,30 @@ from services.teleop import panels
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from services.teleop.core.hold import Press
+from services.teleop.core.keystroke import key_of, without_alternates
 from services.teleop.core.round_trip import PROBE_S, place
 
 QUERY = "\x1b7\x1b[{row};{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
+ALTERNATES = "\x1b[=4;2u"  # the kitty protocol's report of a key's place; others ignore it
+QUIT = "q"
 MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
 TALL = 30  # rows of a terminal with room for more causes
 REST = 20  # rows of the other panels, and borders
 EVENTS = 3  # of them those of the events, which yield to an alarm
 REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay the keys
+
+
+class PlaceParser(XTermParser):
+    """Textual's parser, with the places of keys, and for sequences that it cannot read."""
+
+    def _sequence_to_key_events(self, sequence: str, alt: bool = False) -> Iterable[events.Key]:
+        try:
+            return list(super()._sequence_to_key_events(without_alternates(sequence), alt))
+        except ValueError:  # a garbled sequence does not end the program
+            return []
+
+
+vars(linux_driver)["XTermParser"] = PlaceParser  # Textual has no other way to choose it
 
 
 class Panel(Static):
@@ -89,7 +107,8 @@ class TeleopApp(App[None]):
         yield self._hints
 
     def on_mount(self) -> None:
-        """Start the timers."""
+        """Start the timers, and ask for the places of keys."""
+        self.query_terminal(ALTERNATES)
         self.set_interval(REFRESH_S, self.draw)
         self.set_interval(PROBE_S, self.probe)
 
@@ -140,7 +159,10 @@ class TeleopApp(App[None]):
 
     def on_key(self, event: events.Key) -> None:
         """Post a key to the controller; CapsLock and shift make no difference."""
-        key = event.key.removeprefix("shift+").lower()
+        key = key_of(event.key, event.character)
+        if key == QUIT:  # of a full-width keyboard
+            self.action_leave()
+            return
         press = Press(key, self._received_ns(event), self._view.safety)
         self._post(lambda: self._controller.press(press, self._clock()))
 

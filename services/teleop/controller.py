@@ -38,6 +38,7 @@ from services.teleop.core.controls import (
     Stick,
 )
 from services.teleop.core.hold import Press
+from services.teleop.core.keystroke import no_function
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import LINES, EventLog, View
@@ -84,6 +85,7 @@ class Controller:
         self._drawn_ns = 0  # the last redraw of the screen
         self._requested: Drive | None = None
         self._leaving = False
+        self._key_notice = ""  # of a key without a function, until the next key
         self._reported: set[str] = set()  # rules that are broken, and in the event log
         self._heard_ns: int | None = None  # the last tick with a fresh state of safety
         self._estop = EstopRepetition()
@@ -125,8 +127,14 @@ class Controller:
             self._start_reset(press.shown, self._state(now_ns))
         elif action is Action.SLOW:
             self._report_slow(self.terminal.refusal(press.at_ns))
-        elif action is Action.LATE:
-            text = f"key {press.key.upper()} ignored: it is older than {MAX_PRESS_AGE_S:g} s"
+        self._report_key(press.key, action)
+
+    def _report_key(self, key: str, action: Action) -> None:
+        self._key_notice = no_function(key) if action is Action.UNKNOWN else ""
+        text = self._key_notice
+        if action is Action.LATE:
+            text = f"key {key.upper()} ignored: it is older than {MAX_PRESS_AGE_S:g} s"
+        if text:
             self._event_log.add("teleop", "warning", text)
 
     def release_controls(self, now_ns: int) -> None:
@@ -231,7 +239,7 @@ class Controller:
         """Stop; a key that repeats, or a press during the stop, is no further event."""
         is_known = self._estop.is_pending or (state is not None and "estop" in state.latched)
         self._bus.estop()
-        self._estop.start(state, WAIT_TICKS)
+        self._estop.start(state, ESTOP_TICKS if self._leaving else WAIT_TICKS)
         self._estop_ns, self._estop_sent, self._lapsed = now_ns, self._bus.connected, ""
         if not is_known:
             self._node.event("estop", "warning", f"emergency stop requested by {self._operator}")
@@ -380,6 +388,7 @@ class Controller:
             top=controls.top(),
             requested=self._requested,
             keys_refused=self.terminal.refusal(now_ns),
+            key_notice=self._key_notice,
             keys_muted=controls.is_muted(now_ns),
             gamepad=self._gamepad.status,
             gamepad_notice=self._gamepad_notice(now_ns),

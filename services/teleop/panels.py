@@ -99,6 +99,8 @@ def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
         return row.append(f"  KEYS OFF: {view.keys_refused}\n{ADVICE.capitalize()}.", style=BAD)
     if view.keys_muted:
         return row.append(f"\nKEYS OFF: release all keys for {hold_first_s:g} s", style=BAD)
+    if view.key_notice:
+        return row.append(f"\n{view.key_notice[0].upper()}{view.key_notice[1:]}", style=BAD)
     limit = (
         f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
         f"a hold {hold_s:g} s past its last repeat"

@@ -54,6 +54,7 @@ class View:
     top: Twist  # of full deflection in this gear
     requested: Drive | None = None  # None: silent
     keys_refused: str = ""  # why keys are refused
+    key_notice: str = ""  # of a key without a function
     keys_muted: bool = False  # until they were released
     gamepad: str = ""  # its status
     gamepad_notice: str = ""  # what the operator must do with it

@@ -313,6 +313,23 @@ def test_a_press_that_waited_for_long_does_nothing(operator: Operator, key: str)
     assert operator.lines == [f"key {key.upper()} ignored: it is older than 0.5 s"]
 
 
+def test_a_key_without_a_function_is_named_until_the_next_one(operator: Operator) -> None:
+    notice = "key ц has no function: SWITCH THE KEYBOARD TO LATIN (ENGLISH)"
+    for key, shown in (
+        ("ц", notice),
+        ("ц", notice),
+        ("left_shift", ""),
+        ("t", "key T has no function"),
+    ):
+        operator.press(key)
+        assert operator.speeds(1) == [None]
+        assert operator.controller.view.key_notice == shown
+    operator.press("w")
+    operator.ticks(1)
+    assert operator.controller.view.key_notice == ""
+    assert operator.lines == [notice, "key T has no function"]
+
+
 def slow(operator: Operator) -> None:
     """Simulate a terminal that answers late from now on."""
     operator.near = False

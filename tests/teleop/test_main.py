@@ -160,6 +160,21 @@ def test_keys_that_a_stall_held_up_do_not_drive(shared_router: str, listener: Li
     assert listener.moves_after(released_ns) < 0.8  # they arrive after 0.9 s
 
 
+# --- keyboards --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("typed", ["у", "ｅ", "\x1b[1091::101;;1091u", "\x1b[1::2:3u\x1b[101u"])
+def test_an_emergency_stop_from_another_keyboard(
+    shared_router: str, listener: Listener, typed: str
+) -> None:
+    with terminal(shared_router) as it:
+        ready(it, listener)
+        it.type("ц")
+        wait_until(lambda: it.shows(b"SWITCH THE KEYBOARD TO LATIN"), "the notice")
+        it.type(typed)
+        wait_until(lambda: "estop" in listener.events, "the emergency stop")
+
+
 # --- the start ------------------------------------------------------------------------------
 
 

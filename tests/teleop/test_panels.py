@@ -134,6 +134,10 @@ def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
     [
         ({}, ["WASD drive ␣ stop 1-5 gear E ESTOP R reset FB release ZC arcs Q quit", "No key-up"]),
         ({"keys_refused": "slow"}, ["␣ stop E ESTOP Q quit  KEYS OFF: slow", "Use"]),
+        (
+            {"key_notice": "key ц has no function: SWITCH"},
+            ["WASD drive", "Key ц has no function: SWITCH"],
+        ),
         ({"keys_muted": True}, ["WASD drive", "KEYS OFF: release all keys for 0.6 s"]),
         ({"may_drive": False, "keys_refused": "slow"}, ["E ESTOP Q quit"]),
         ({"may_drive": False, "may_stop": False}, ["Q quit"]),

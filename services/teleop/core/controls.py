@@ -9,6 +9,7 @@ E, space   accepted                       accepted             accepted
 R          LATE                           SLOW, rule           RESET
 motion     LATE                           SLOW, rule           accepted
 others     LATE                           accepted             accepted
+no key     UNKNOWN                        UNKNOWN              UNKNOWN
 ========== ============================== ==================== =============
 
 ``hold`` has the rules that release controls. Keys have priority over the gamepad. ``f`` or ``b``,
@@ -67,6 +68,9 @@ DIRECTIONS = {
 }  # fmt: skip
 
 
+KEYS = {ESTOP, RESET, STOP, ACKNOWLEDGE, *DIRECTIONS, *RELEASE, *GEARS}
+
+
 class Action(Enum):
     """What a key press asks of the shell."""
 
@@ -75,6 +79,7 @@ class Action(Enum):
     RESET = "reset the causes on the screen"
     LATE = "report a press that is too old"
     SLOW = "report a slow terminal"
+    UNKNOWN = "report a key without a function"
 
 
 class Controls:
@@ -96,12 +101,14 @@ class Controls:
         return self._requests.phase is Phase.SILENT
 
     def press(self, press: Press, now_ns: int) -> Action:
-        """Process a key press or its repeat; unknown keys are ignored."""
+        """Process a key press or its repeat."""
         key = press.key
         if key in (ESTOP, STOP):
             # 1 equivalent mutant: only a pause needs the time.
             self.stop(now_ns)
             return Action.ESTOP if key == ESTOP else Action.NONE
+        if key not in KEYS:
+            return Action.UNKNOWN
         if press.age_s(now_ns) > MAX_PRESS_AGE_S:
             return Action.LATE
         moves = key in DIRECTIONS or key in RELEASE

@@ -61,6 +61,7 @@ def operator() -> Operator:
         ("w", Action.LATE, Action.SLOW, Action.NONE),
         ("b", Action.LATE, Action.SLOW, Action.NONE),
         ("5", Action.LATE, Action.NONE, Action.NONE),
+        ("t", Action.UNKNOWN, Action.UNKNOWN, Action.UNKNOWN),
     ],
 )
 def test_a_key_counts_by_its_age_and_the_round_trip(
