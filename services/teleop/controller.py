@@ -323,7 +323,7 @@ class Controller:
         event = arrival.message
         if event.boot != self._bus.boot:  # teleop's own events are in the log already
             service = arrival.key.rpartition("/")[2]
-            self._event_log.add(service, event.level, event.text, event.t_ns)
+            self._event_log.add(service, event.level, event.text, event)
 
     def _report_denied(self) -> None:
         text = "NOT ALLOWED: the router drops our requests; this certificate may only watch"

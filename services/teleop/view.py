@@ -6,14 +6,15 @@ the events of all services go to the event log.
 
 import threading
 import time
-from collections import deque
 from dataclasses import dataclass, replace
 
-from common import log
+from common import clock, log
+from common.freshness import NS_PER_S
 from common.messages import (
     Bumper,
     Drive,
     Driver,
+    Event,
     Level,
     Link,
     Odometry,
@@ -26,6 +27,7 @@ from common.settings import Log, LogLevel
 from common.text import line, printable
 
 LINES = 40  # of the event log: more than a screen has
+HISTORY_NS = 2 * NS_PER_S  # in which all services send theirs
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,9 @@ class Line:
     service: str
     level: Level
     text: str
+    host: int = 0  # of its sender; 0: unknown
+    mono_ns: int = 0  # monotonic clock of this host
+    received_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,26 +74,46 @@ class View:
     lines: tuple[Line, ...] = ()  # the newest last
 
 
+def said(one: Line) -> tuple[str, ...]:
+    """Return what a line says, without its time."""
+    return one.service, one.level, one.text
+
+
+def is_later(one: Line, other: Line) -> bool:
+    """Return whether a line of the same history as the other is later."""
+    is_old = other.received_ns - one.received_ns > HISTORY_NS
+    return not is_old and one.host == other.host and one.mono_ns > other.mono_ns
+
+
 class EventLog:
-    """The newest lines; any thread may add one."""
+    """The newest lines in the order of their arrival; any thread may add one.
+
+    Services send their history to a new reader at once, one service after the other. Events of such
+    a burst are ordered by their host's monotonic clock, which all its processes share.
+    """
 
     def __init__(self) -> None:
-        self._lines: deque[Line] = deque(maxlen=LINES)
+        self._lines: list[Line] = []
         self._lock = threading.Lock()
 
-    def add(self, service: str, level: Level, text: str, t_ns: int | None = None) -> None:
-        """Append a line with its wall clock time, by default now; a repeat replaces the last.
+    def add(self, service: str, level: Level, text: str, event: Event | None = None) -> None:
+        """Append a line, by default with the time of now; a repeat replaces the last.
 
         An answer of safety comes twice, to the call and as an event.
         """
-        t_ns = time.time_ns() if t_ns is None else t_ns
-        added = Line(t_ns, printable(service), level, line(text))
+        t_ns = event.t_ns if event else time.time_ns()
+        added = Line(t_ns, printable(service), level, line(text), received_ns=clock.now_ns())
+        if event:
+            added = replace(added, host=event.host, mono_ns=event.mono_ns)
         with self._lock:
-            if self._lines and replace(self._lines[-1], t_ns=t_ns) == added:
+            at = len(self._lines)
+            if at and said(self._lines[-1]) == said(added):
                 self._lines.pop()
-            self._lines.append(added)
-            if len(self._lines) > 1 and self._lines[-2].t_ns > t_ns:  # history of another service
-                self._lines = deque(sorted(self._lines, key=lambda each: each.t_ns), LINES)
+                at -= 1
+            while at and added.host and is_later(self._lines[at - 1], added):
+                at -= 1
+            self._lines.insert(at, added)
+            del self._lines[:-LINES]
 
     def lines(self) -> tuple[Line, ...]:
         """Return the lines, the newest last."""
