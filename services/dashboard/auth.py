@@ -4,33 +4,37 @@ Any web page that is open in the same browser can send requests to ``localhost``
 forge its origin, so the origin must be the dashboard's. Without a token the host name must be a
 name of this host: DNS rebinding, which points another name to 127.0.0.1, is refused.
 
+The cookie is sent when a link of another page opens the dashboard (``SameSite=Lax``), so that such
+a link works; nothing acts on a GET.
+
 Every response carries the headers that exclude other pages and scripts. It ends its connection: the
 next request comes on a new one, which the listener always accepts.
 """
 
-import asyncio
 import base64
 import hashlib
 import hmac
 import html
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, urlencode, urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from common import clock
 from services.dashboard.config import Dashboard
+from services.dashboard.guess_limit import GuessLimit
 from services.dashboard.i18n import TEXTS
 
 COOKIE = "t2_dashboard"
 TOKEN_MIN = 8
 LOCAL_NAMES = ("localhost", "127.0.0.1", "::1")
-WRONG_TOKEN_DELAY_S = 1.0
 BODY_MAX = 1024  # bytes of a form with a token
 SAFE_METHODS = ("GET", "HEAD")
 TOKEN_PAGE = (Path(__file__).parent / "static" / "token.html").read_text(encoding="utf-8")
@@ -49,9 +53,14 @@ HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """The rules for a request; an empty token admits all programs of this host."""
+    """The rules for a request; an empty token admits all programs of this host.
+
+    Wrong cookies are not limited, so that a guesser cannot delay who is logged in. ``salt``, which
+    nobody on the network knows, keeps a cookie from being a way to guess the token.
+    """
 
     token: str = ""
+    salt: str = ""
 
     def is_token(self, token: str) -> bool:
         """Return whether this is the token; compared in constant time."""
@@ -59,8 +68,8 @@ class Credentials:
 
     @property
     def cookie(self) -> str:
-        """The value of the cookie: a hash of the token."""
-        return hashlib.sha256(f"t2 dashboard {self.token}".encode()).hexdigest()
+        """The value of the cookie: a hash of token and salt."""
+        return hashlib.sha256(f"t2 dashboard {self.salt} {self.token}".encode()).hexdigest()
 
     def may_view(self, headers: Mapping[str, str]) -> bool:
         """Return whether a request may view the page, by its cookie or by its host."""
@@ -92,6 +101,7 @@ class AuthMiddleware:
         self._policy = content_policy(settings.camera)
         self._credentials = credentials
         self._secure = bool(settings.certificate)
+        self._guesses = GuessLimit()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request or WebSocket."""
@@ -119,22 +129,25 @@ class AuthMiddleware:
         if not self._credentials.token:
             name = f"{request.url.scheme}://localhost:{request.scope['server'][1]}"
             return PlainTextResponse(f"Open the dashboard as {name}\n", status_code=403)
-        token = await self._submitted(request)
-        if self._credentials.is_token(token):
-            answer = RedirectResponse("/", status_code=303)
+        token, page = await self._submitted(request), page_of(request)
+        host, now_ns = client_host(request.scope), clock.now_ns()
+        wait_s = self._guesses.wait_s(host, token, now_ns) if token else 0.0
+        if wait_s:
+            return _token_page("token_wait", page, wait_s)
+        is_right = bool(token) and self._credentials.is_token(token)
+        if token:
+            self._guesses.compared(host, token, now_ns, is_right=is_right)
+        if is_right:
+            answer = RedirectResponse(page, status_code=303)
             answer.set_cookie(
                 COOKIE,
                 self._credentials.cookie,
                 httponly=True,
-                samesite="strict",
+                samesite="lax",
                 secure=self._secure,
             )
             return answer
-        if token:
-            await asyncio.sleep(WRONG_TOKEN_DELAY_S)
-        lines = map(html.escape, TEXTS["token_wrong" if token else "token_ask"])
-        page = Template(TOKEN_PAGE).substitute(text="<br>".join(lines))
-        return HTMLResponse(page, status_code=401)
+        return _token_page("token_wrong" if token else "token_ask", page)
 
     async def _submitted(self, request: Request) -> str:
         if request.method != "POST":
@@ -145,6 +158,26 @@ class AuthMiddleware:
             if len(body) > BODY_MAX:
                 return ""
         return parse_qs(body.decode("latin1")).get("token", [""])[0].strip()
+
+
+def client_host(scope: Scope) -> str:
+    """Return the address of the client."""
+    client = scope.get("client")
+    return client[0] if client else ""
+
+
+def page_of(request: Request) -> str:
+    """Return the page that a login leads to: this one, with its query but without a token."""
+    pairs = [pair for pair in request.query_params.multi_items() if pair[0] != "token"]
+    return "/?" + urlencode(pairs) if pairs else "/"
+
+
+def _token_page(text: str, page: str, wait_s: float = 0.0) -> Response:
+    lines = (html.escape(line.replace("{}", str(math.ceil(wait_s)))) for line in TEXTS[text])
+    content = Template(TOKEN_PAGE).substitute(text="<br>".join(lines), page=html.escape(page))
+    if not wait_s:
+        return HTMLResponse(content, status_code=401)
+    return HTMLResponse(content, 429, headers={"retry-after": str(math.ceil(wait_s))})
 
 
 def content_policy(camera: str) -> str:

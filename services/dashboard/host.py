@@ -31,7 +31,7 @@ class Host:
     def __init__(self, loaded: Loaded[DashboardConfig], words: Sequence[str]) -> None:
         """``words`` are the options that name sources of settings, for hints."""
         settings = loaded.config.dashboard
-        self._credentials = Credentials(token(settings))
+        self._credentials = credentials(settings)
         check_certificate(settings)
         # The server's thread counts, the node's reads: all names exist from the start.
         counters = Counter({"requests_displaced": 0, "connections_aborted": 0})
@@ -96,6 +96,18 @@ class Host:
         self._node.log.info("started", robot=self._node.config.robot.id, open=url)
         if sys.stderr.isatty():
             sys.stderr.write(f"\n    {url}\n\n")  # alone, so that a terminal makes it a link
+
+
+def credentials(settings: Dashboard) -> Credentials:
+    """Return the required token, with a salt that lasts as long as its file: so do the logins.
+
+    The time when the file was written, in ns, and its inode are known to nobody on the network.
+    """
+    required = token(settings)
+    if not settings.token_file:
+        return Credentials(required)
+    file = Path(settings.token_file).stat()
+    return Credentials(required, f"{file.st_mtime_ns} {file.st_ino}")
 
 
 def token(settings: Dashboard) -> str:

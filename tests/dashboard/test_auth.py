@@ -1,9 +1,14 @@
 """Authentication of the dashboard's web server."""
 
+import html
+import itertools
 import json
+import os
 import urllib.error
 import urllib.parse
 import urllib.request
+from collections.abc import Iterator
+from email.message import Message
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -13,8 +18,12 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from services.dashboard.auth import COOKIE, Credentials, content_policy
+from services.dashboard.config import Dashboard
+from services.dashboard.guess_limit import BURST
+from services.dashboard.host import credentials
 from tests.dashboard.bus_fixture import Peer
 from verification.harness.dashboard import Server, dashboard
+from verification.harness.waiting import wait_until
 
 LOCAL, WITH_TOKEN = Credentials(), Credentials("a long token")
 COOKIE_HEADER = {"cookie": f"other=1; {COOKIE}={WITH_TOKEN.cookie}"}
@@ -126,6 +135,89 @@ def test_from_the_network_a_token_is_required(endpoint: str, tmp_path: Path) -> 
         with one.open(f"{server.url}t2/dashboard.js") as answer:
             assert answer.status == 200
         assert "open sesame" not in server.log.read_text()
+
+
+PAGES = [
+    ("?robot=007", "/?robot=007"),
+    ("?token=wrong&robot=007&x=%22%3E%3Cscript%3E", "/?robot=007&x=%22%3E%3Cscript%3E"),
+    ("/evil.example/?robot=007", "/?robot=007"),
+    ("t2/dashboard.js?robot=%2F%2Fevil.example", "/?robot=%2F%2Fevil.example"),
+    ("", "/"),
+]
+
+
+class NoRedirect(urllib.request.HTTPRedirectHandler):
+    def redirect_request(self, *_: object) -> None:
+        return None
+
+
+def answer_of(url: str, form: bytes | None = None) -> tuple[int, Message, str]:
+    """Return status, headers and body of a client without cookies."""
+    try:
+        answer = urllib.request.build_opener(NoRedirect).open(url, form)
+    except urllib.error.HTTPError as error:
+        answer = error
+    with answer:
+        return answer.status, answer.headers, answer.read().decode()
+
+
+@pytest.fixture(scope="module")
+def with_token(endpoint: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A dashboard with the token "open sesame"."""
+    folder = tmp_path_factory.mktemp("token")
+    (folder / "token").write_text("open sesame\n", encoding="utf-8")
+    with dashboard(endpoint, folder, f"dashboard.token_file={folder / 'token'}") as server:
+        yield server
+
+
+@pytest.mark.parametrize(("path", "page"), PAGES)
+def test_every_way_to_log_in_keeps_the_query(with_token: Server, path: str, page: str) -> None:
+    code, _, body = answer_of(with_token.url + path)
+    assert code == 401
+    assert f'<form method=post action="{html.escape(page)}">' in body
+    form = urllib.parse.urlencode({"token": "open sesame"}).encode()
+    query = f"{path.replace('token=wrong&', '')}{'&' if '?' in path else '?'}token=open+sesame"
+    for url, content in ((path, form), (query, None)):
+        code, headers, _ = answer_of(with_token.url + url, content)
+        assert (code, headers["location"]) == (303, page)
+        assert "samesite=lax" in headers["set-cookie"].lower()
+
+
+def test_wrong_tokens_are_limited_and_a_login_that_exists_goes_on(with_token: Server) -> None:
+    one = browser()
+    with one.open(f"{with_token.url}?token=open+sesame") as answer:
+        assert answer.status == 200
+    guesses = itertools.count()
+
+    def right_is_refused() -> bool:
+        codes = [answer_of(f"{with_token.url}?token={next(guesses)}")[0] for _ in range(BURST + 1)]
+        assert set(codes) <= {401, 429}
+        code, headers, body = answer_of(f"{with_token.url}?token=open+sesame")
+        if code != 429:
+            return False  # the host has stalled: there is another guess
+        assert int(headers["retry-after"]) >= 1
+        assert "Too many wrong tokens" in body
+        return True
+
+    wait_until(right_is_refused, "a refusal")
+    stop = urllib.request.Request(
+        f"{with_token.url}estop/001",
+        method="POST",
+        headers={"Origin": with_token.url.rstrip("/")},
+    )
+    with one.open(stop) as answer:
+        assert answer.status == 200
+
+
+def test_the_cookie_lasts_as_long_as_the_file_and_is_no_guess_of_the_token(tmp_path: Path) -> None:
+    file = tmp_path / "token"
+    file.write_text("open sesame", encoding="utf-8")
+    settings = Dashboard(token_file=str(file))
+    first = credentials(settings)
+    assert credentials(settings).cookie == first.cookie
+    assert first.cookie != Credentials("open sesame").cookie
+    os.utime(file, ns=(1, 1))
+    assert credentials(settings).cookie != first.cookie
 
 
 def test_a_new_token_is_logged(endpoint: str, tmp_path: Path) -> None:

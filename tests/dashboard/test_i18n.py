@@ -32,6 +32,7 @@ def used_keys() -> set[str]:
         found |= set(re.findall(r'\bt\("([\w.]+)"[,)]', text))
         found |= set(re.findall(r'toast\("(\w+)"', text))
         found |= set(re.findall(r'"(release_\w+)"', text))
+        found |= set(re.findall(r'\btext\((?:it\.sent \? )?"(\w+)"', text))
     for name in ("fleet.py", "robot_page.py", "robot.py"):
         code = (CODE / name).read_text(encoding="utf-8")
         found |= set(re.findall(r'"(?:error|info|warning)", "(\w+)"', code))
@@ -51,7 +52,7 @@ def test_every_used_key_has_a_text() -> None:
         ("text", ["none", "lost", "no_router"]),
         ("link", [*get_args(LinkState), "none", "missing"]),
         ("fault", [*get_args(FaultName), "reserved"]),
-        ("hold", list(HoldState)),
+        ("hold", [*HoldState, "waiting", "slow", "still", "frozen"]),
         ("bumper", ["true", "false", "none"]),
     ],
 )
