@@ -58,13 +58,16 @@ class Gear(ClientMessage, frozen=True):
 
 
 class Alive(ClientMessage, frozen=True):
-    """The page is visible: it keeps the emergency stop alive."""
+    """The page is visible: it keeps the emergency stop alive, and gets the delay of the link."""
 
     echo: int
+    at: Number = 0.0  # the page's clock; the answer repeats it
 
 
 class Estop(Named, frozen=True):
     """Emergency stop, latched, from any viewer."""
+
+    age: Number = 0.0  # s since it was pressed
 
 
 class Reset(Named, frozen=True):

@@ -54,11 +54,11 @@ class Fleet:
         if page and viewer in page.viewers and not self._leaving:
             page.handle(viewer, message)
 
-    def estop(self, robot: str, requested_by: str) -> None:
+    def estop(self, robot: str, requested_by: str, age_s: float = 0.0) -> None:
         """Stop a robot that ``knows`` accepts; needs no viewer."""
         if robot == self._node.config.robot.id:
             self._node.bus.estop()  # at once: this session is always open
-        self._open(robot).robot.estop(requested_by)
+        self._open(robot).robot.estop(requested_by, age_s)
 
     # --- called by the server in its own thread -------------------------------------------------
 

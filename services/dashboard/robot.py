@@ -20,13 +20,14 @@ from common.client import (
     request,
     reset_request,
 )
+from common.freshness import NS_PER_S
 from common.keys import Topic
 from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
 from services.dashboard.snapshot import DriverState
-from services.dashboard.telemetry_cache import TelemetryCache, path_of
+from services.dashboard.telemetry_cache import EVENTS_DEPTH, TelemetryCache, path_of
 
 # Takes the level, the text or its key in ``i18n``, and the key of the result that it explains.
 Notify = Callable[[m.Level, str, str], None]
@@ -36,6 +37,9 @@ FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.ODOMETRY, keys.SAFETY, keys.MOTION,
 )  # fmt: skip
 WILDCARD_DEPTH = 16  # of a key with many publishers
+# How long an emergency stop is repeated without a confirmation, as on the page: the link to the
+# robot may be cut.
+ESTOP_KEPT_S = 30.0
 
 
 class Robot:
@@ -58,6 +62,7 @@ class Robot:
         if settings.estop_keepalive:
             self._keepalives = KeepalivePublisher(bus, settings.estop_keepalive)
         self._requests_path = path_of(keys.DRIVE.on(bus.robot, source=settings.source))
+        self._estop_until_ns = 0
         self._stopped_by = ""  # who requested the last emergency stop
         self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
         self._log = Logger(robot=bus.robot)
@@ -68,7 +73,7 @@ class Robot:
             bus.subscribe(keys.DRIVER, self._on_message, side=side)
         bus.subscribe(keys.DRIVE, self._on_message, depth=WILDCARD_DEPTH, source="*")
         bus.subscribe(keys.HEALTH, self._on_message, depth=WILDCARD_DEPTH, service="*")
-        bus.subscribe(keys.EVENTS, self._on_event, depth=WILDCARD_DEPTH, service="*")
+        bus.subscribe(keys.EVENTS, self._on_event, depth=EVENTS_DEPTH, service="*")
         bus.watch_live(keys.live_key(bus.robot, "*", "*"), self.telemetry.update_liveliness)
 
     # --- the loop -----------------------------------------------------------------------------
@@ -76,7 +81,7 @@ class Robot:
     def tick(self, now_ns: int) -> None:
         """Send the requests of this tick and repeat what is not confirmed."""
         safety = self.telemetry.newest(keys.SAFETY, now_ns)
-        self._repeat_estop(safety)
+        self._repeat_estop(safety, now_ns)
         self._yield(safety)
         push = self.driver_lock.held(now_ns)
         drive = self._requests.tick(self._requested(push) if push else None)
@@ -123,12 +128,18 @@ class Robot:
         self._events.put(m.Event(name=name, level=level, text=text))
         getattr(self._log, level)(text, event_name=name)
 
-    def estop(self, requested_by: str) -> None:
-        """Stop the robot; the stop is repeated until safety has latched it."""
+    def estop(self, requested_by: str, age_s: float = 0.0) -> None:
+        """Stop the robot; the stop is repeated until safety has latched it.
+
+        ``age_s``: since it was pressed.
+        """
+        now_ns = clock.now_ns()
+        left_s = min(max(ESTOP_KEPT_S - age_s, 0.0), ESTOP_KEPT_S)
+        self._estop_until_ns = max(self._estop_until_ns, now_ns + round(left_s * NS_PER_S))
         self.driver_lock.lapse()
         self._requests.stop()
         self.bus.estop()
-        state = self.telemetry.newest(keys.SAFETY, clock.now_ns())
+        state = self.telemetry.newest(keys.SAFETY, now_ns)
         # A page sends its request twice, and repeats it.
         is_stopped = self._estop.is_pending or (state is not None and "estop" in state.latched)
         if not is_stopped or requested_by != self._stopped_by:
@@ -185,12 +196,14 @@ class Robot:
         linear, angular = self._settings.gears_linear[gear], self._settings.gears_angular[gear]
         return request(push.linear * linear, push.angular * angular)
 
-    def _repeat_estop(self, safety: m.SafetyState | None) -> None:
+    def _repeat_estop(self, safety: m.SafetyState | None, now_ns: int) -> None:
         step = self._estop.tick(safety)
         if step is not EstopStep.NONE:
             self.bus.estop()
         if step is EstopStep.LAST:
             self._broadcast("error", "estop_unconfirmed" if self.may_drive else "estop_denied", "")
+            if self.may_drive and now_ns < self._estop_until_ns:
+                self._estop.start(safety)
 
     def _check_resets(self, state: m.SafetyState | None, now_ns: int) -> None:
         """Report the resets that safety's state confirms, or does not confirm in time."""

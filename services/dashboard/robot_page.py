@@ -13,7 +13,7 @@ from common.bus.bus import Bus
 from common.messages import Level
 from services.dashboard import client_messages as client
 from services.dashboard.config import DashboardConfig
-from services.dashboard.driver_lock import Push
+from services.dashboard.driver_lock import HOLD_S, Push
 from services.dashboard.robot import Robot
 from services.dashboard.snapshot import fast_snapshot, slow_snapshot
 
@@ -48,10 +48,11 @@ class RobotPage:
             "id": viewer,
             "vehicle": self._config.vehicle,
             "gears": self._config.dashboard.gears_linear,
+            "hold_s": HOLD_S,
             "keepalive": bool(self._config.dashboard.estop_keepalive),
         }
         self._send([viewer], hello)
-        self._send([viewer], {"k": "events", "lines": list(self.robot.telemetry.events)})
+        self._send([viewer], {"k": "events", "lines": self.robot.telemetry.events, "all": True})
 
     def leave(self, viewer: str) -> None:
         """Remove a browser and free its driver lock."""
@@ -62,8 +63,8 @@ class RobotPage:
     def handle(self, viewer: str, message: client.AnyMessage) -> None:
         """Handle a viewer's message."""
         match message:
-            case client.Alive(echo):
-                self.robot.keep_alive(viewer, echo, clock.now_ns())
+            case client.Alive():
+                self._alive(viewer, message)
             case client.Take():
                 self._take(viewer, message)
             case _ if self.robot.driver_lock.driver == viewer:
@@ -91,6 +92,14 @@ class RobotPage:
             self._send(self.viewers, slow, replaces=True)
         if self._ticks % SLOW_TICKS == 1:
             self._send_events()
+
+    def _alive(self, viewer: str, message: client.Alive) -> None:
+        """Answer with the age of the state that the page answers: the delay of its link."""
+        now_ns = clock.now_ns()
+        self.robot.keep_alive(viewer, message.echo, now_ns)
+        shown = self.robot.telemetry.shown(message.echo)
+        age_s = shown.age_s(now_ns) if shown else None
+        self._send([viewer], {"k": "alive", "at": message.at, "age": age_s})
 
     def _take(self, viewer: str, message: client.Take) -> None:
         lock = self.robot.driver_lock
@@ -127,10 +136,9 @@ class RobotPage:
             self._notify(viewer, level, text, about)
 
     def _send_events(self) -> None:
-        new = self.robot.telemetry.new_events
-        if new:
-            self._send(self.viewers, {"k": "events", "lines": list(new)})
-            new.clear()
+        lines, are_all = self.robot.telemetry.take_new()
+        if lines:
+            self._send(self.viewers, {"k": "events", "lines": lines, "all": are_all})
 
     def _send(self, viewers: Collection[str], message: object, replaces: bool = False) -> None:
         self._send_text(list(viewers), msgspec.json.encode(message), replaces)

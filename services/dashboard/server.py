@@ -2,6 +2,7 @@
 
 import html
 import json
+import math
 import re
 import shlex
 import socket
@@ -92,7 +93,7 @@ def _application(template: str, robot: str, hub: WebSocketHub, listener: Listene
         host = request.client.host if request.client else "unknown"
         name = request.query_params.get("name", "")[:NAME_MAX] or host
         robot = request.path_params["robot"]
-        if not hub.estop(robot, name):
+        if not hub.estop(robot, name, seconds(request.query_params.get("age", ""))):
             return PlainTextResponse(
                 f"robot {robot!r} is unknown; no stop was sent\n", status_code=404
             )
@@ -110,6 +111,14 @@ def _application(template: str, robot: str, hub: WebSocketHub, listener: Listene
             WebSocketRoute("/live", live),
         ]
     )
+
+
+def seconds(text: str) -> float:
+    """Return a time of a query; 0 if it is none: an emergency stop is never refused for it."""
+    try:
+        return float(text) if math.isfinite(float(text)) else 0.0
+    except ValueError:
+        return 0.0
 
 
 def _script(content: object) -> str:

@@ -3,9 +3,9 @@
 A message that is too old is not shown: a frozen display must not look alive.
 """
 
-from collections import deque
+from collections import defaultdict, deque
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from msgspec import Struct
 
@@ -17,7 +17,9 @@ from common.text import line
 
 M = TypeVar("M", bound=Message)
 
-EVENTS_MAX = 80
+EVENTS_MAX = 200  # that the page lists
+EVENTS_DEPTH = keys.EVENT.history * (len(keys.SERVICES) + 2)  # the history of all, at once
+HISTORY_TURNS = 4  # of ``take_new``, from the first event: the histories arrive by service
 STATES_MAX = 64  # of safety: 3 s, more than any limit on an answer to one
 MISSED = 4.0  # samples that may be missing before the last one is too old to show
 # Names of sources and services come from the bus, where any client can invent them.
@@ -28,11 +30,19 @@ MIN_AGE_S, MAX_AGE_S = 0.5, 3.0
 class EventLine(Struct, frozen=True):
     """An event as the browsers show it."""
 
-    t: float  # s, the sender's wall clock
+    t: float  # s, the sender's wall clock, which may be wrong: it orders nothing
     service: str
     name: str
     level: str
     text: str
+
+
+class Received(NamedTuple):
+    """An event with the place on its host's own clock, which only rises; 0 is no known host."""
+
+    host: int
+    mono_ns: int
+    line: EventLine
 
 
 def max_age_s(topic: Topic[M]) -> float:
@@ -45,8 +55,10 @@ class TelemetryCache:
     """The newest message of each stream, the events and the live services."""
 
     alive: dict[str, set[str]] = field(default_factory=dict)  # instances by service
-    events: deque[EventLine] = field(default_factory=lambda: deque(maxlen=EVENTS_MAX))
-    new_events: deque[EventLine] = field(default_factory=lambda: deque(maxlen=EVENTS_MAX))
+    _events: deque[Received] = field(default_factory=lambda: deque(maxlen=EVENTS_DEPTH))
+    _new: int = 0  # events that ``take_new`` has not returned
+    _history_turns: int = HISTORY_TURNS  # left
+    _last: dict[str, tuple[int, int]] = field(default_factory=dict)  # boot and seq, by service
     _states: deque[Latest[SafetyState]] = field(default_factory=lambda: deque(maxlen=STATES_MAX))
     _latest: dict[str, Latest[Message]] = field(default_factory=dict)
 
@@ -70,14 +82,43 @@ class TelemetryCache:
             return None
         return latest.value if isinstance(latest.value, topic.message) else None
 
+    @property
+    def events(self) -> list[EventLine]:
+        """The newest events, in the order of their arrival."""
+        return [one.line for one in self._events][-EVENTS_MAX:]
+
     def add_event(self, service: str, event: Event) -> None:
-        """Store an event, sorted by the sender's time."""
+        """Store an event, and a mark where events of its service are missing before it."""
         t = event.t_ns / 1e9
-        added = EventLine(t, service, event.name, event.level, line(event.text))
-        self.new_events.append(added)
-        ordered = sorted([*self.events, added], key=lambda each: each.t)
-        self.events.clear()
-        self.events.extend(ordered)
+        if missing := self._missing(service, event):
+            mark = EventLine(t, service, "gap", "warning", f"{missing} events are missing here.")
+            self._add(event, mark)
+        self._add(event, EventLine(t, service, event.name, event.level, line(event.text)))
+
+    def take_new(self) -> tuple[list[EventLine], bool]:
+        """Return the new events, and whether they replace all earlier ones.
+
+        At first the histories of the services arrive, each at once: they are merged.
+        """
+        count, self._new = min(self._new, EVENTS_MAX), 0
+        if count and self._history_turns:
+            self._history_turns -= 1
+            before = list(self._events)
+            self._events = deque(merged(before), EVENTS_DEPTH)
+            if list(self._events) != before:
+                return self.events, True
+        return self.events[-count:] if count else [], False
+
+    def _add(self, event: Event, shown: EventLine) -> None:
+        self._events.append(Received(event.host, event.mono_ns, shown))
+        self._new += 1
+
+    def _missing(self, service: str, event: Event) -> int:
+        """Return how many events of this start of a service were lost before this one."""
+        boot, seq = self._last.get(service, (event.boot, event.seq))
+        if service in self._last or len(self._last) < INVENTED_MAX:
+            self._last[service] = event.boot, event.seq
+        return max(0, event.seq - seq - 1) if boot == event.boot else 0
 
     def update_liveliness(self, key: str, alive: bool) -> None:
         """Handle a liveliness token that appeared or disappeared."""
@@ -89,6 +130,18 @@ class TelemetryCache:
         """Return the names of all services with a token or a health message so far."""
         healthy = {path.split("/")[1] for path in self._latest if path.endswith("/health")}
         return sorted(healthy | set(self.alive))
+
+
+def merged(events: list[Received]) -> list[Received]:
+    """Return the events with those of each host in the order of its clock, on the same places."""
+    of_host: dict[int, list[Received]] = defaultdict(list)
+    for one in events:
+        of_host[one.host].append(one)
+    ordered = {
+        host: iter(sorted(them, key=lambda it: it.mono_ns) if host else them)
+        for host, them in of_host.items()
+    }
+    return [next(ordered[one.host]) for one in events]
 
 
 def path_of(key: str) -> str:

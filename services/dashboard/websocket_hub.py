@@ -96,11 +96,11 @@ class WebSocketHub:
             with contextlib.suppress(RuntimeError):  # the server has just ended
                 self._loop.call_soon_threadsafe(self._put, viewers, text, replaces)
 
-    def estop(self, robot: str, requested_by: str) -> bool:
+    def estop(self, robot: str, requested_by: str, age_s: float = 0.0) -> bool:
         """Stop a robot before all waiting calls; return whether the robot is known."""
         if not self._fleet.knows(robot):
             return False
-        self._inbox.stop(robot, partial(self._fleet.estop, robot, requested_by))
+        self._inbox.stop(robot, partial(self._fleet.estop, robot, requested_by, age_s))
         return True
 
     async def serve(self, socket: WebSocket) -> None:
@@ -130,7 +130,7 @@ class WebSocketHub:
                     await socket.close(code=1003, reason="invalid message")
                     return
                 if isinstance(message, Estop):
-                    self.estop(robot, message.name or f"viewer {viewer}")
+                    self.estop(robot, message.name or f"viewer {viewer}", message.age)
                 else:
                     self._inbox.put(partial(self._fleet.handle, robot, viewer, message))
 

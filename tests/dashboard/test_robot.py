@@ -1,14 +1,17 @@
 """The driver of one robot on the dashboard: overruled by another source, or without permission."""
 
+import math
+
 import pytest
 
 from common import clock, keys
 from common.bus.publisher import Publisher
 from common.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
+from common.freshness import NS_PER_S
 from common.messages import Direction, Drive, Event, ResetDone, ResetRequest
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
-from services.dashboard.robot import Robot
+from services.dashboard.robot import ESTOP_KEPT_S, Robot
 from tests.dashboard.servers import CONTACT, NEWER
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
@@ -117,7 +120,7 @@ def test_a_repeated_estop_is_one_event(fixture: RobotFixture) -> None:
 def test_an_unconfirmed_estop_is_reported_and_a_viewer_has_no_driver(
     fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fixture.robot.estop("a test")
+    fixture.robot.estop("a test", ESTOP_KEPT_S)
     fixture.ticks(ESTOP_TICKS, None)
     assert fixture.notices == [("error", "estop_unconfirmed", "")]
     monkeypatch.setattr(Publisher, "passed_on", False)
@@ -127,6 +130,20 @@ def test_an_unconfirmed_estop_is_reported_and_a_viewer_has_no_driver(
     fixture.robot.estop("a test")
     fixture.ticks(ESTOP_TICKS, None)
     assert fixture.notices[1:] == [("error", "barred", ""), ("error", "estop_denied", "")]
+
+
+@pytest.mark.parametrize(("age_s", "kept_s"), [(0.0, 30.0), (20.0, 10.0), (1e9, 0.0), (-9.0, 30.0)])
+def test_an_estop_is_repeated_while_the_robot_is_cut_off_and_the_stop_is_young(
+    fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch, age_s: float, kept_s: float
+) -> None:
+    monkeypatch.setattr(clock, "now_ns", lambda: fixture.now_ns)
+    fixture.robot.estop("a test", age_s)
+    rounds = math.ceil(kept_s * NS_PER_S / TICK_NS / ESTOP_TICKS)
+    for _ in range(ESTOP_TICKS * (rounds + 2)):  # no state of safety
+        fixture.now_ns += TICK_NS
+        fixture.robot.tick(fixture.now_ns)
+    assert fixture.bus.estops == 1 + ESTOP_TICKS * max(1, rounds)
+    assert set(fixture.notices) == {("error", "estop_unconfirmed", "")}
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from common.messages import Bumper, Drive, Driver, Event, Velocity
 from services.dashboard.telemetry_cache import (
     EVENTS_MAX,
     FIXED,
+    HISTORY_TURNS,
     INVENTED_MAX,
     STATES_MAX,
     TelemetryCache,
@@ -46,16 +47,52 @@ def test_a_message_of_another_type_is_not_returned() -> None:
     assert telemetry.newest(keys.BUMPER, 0) is None
 
 
-def test_events_are_sorted_by_the_senders_time_and_bounded() -> None:
+def test_events_are_in_the_order_of_their_arrival_and_bounded() -> None:
     telemetry = TelemetryCache()
-    for number in (2, 1, 3):
+    for number in (*range(8 * 3600, 8 * 3600 + EVENTS_MAX), 100):  # a clock 8 h ahead, corrected
         telemetry.add_event("safety", event(number))
-    assert [line.text for line in telemetry.events] == ["1", "2", "3"]
-    for number in range(4, 4 + EVENTS_MAX):
-        telemetry.add_event("bridge", event(number))
     assert len(telemetry.events) == EVENTS_MAX
-    assert telemetry.events[0].text == "4"
-    assert len(telemetry.new_events) == EVENTS_MAX
+    assert [telemetry.events[at].text for at in (0, -1)] == [str(8 * 3600 + 1), "100"]
+    assert telemetry.take_new() == (telemetry.events, False)
+    assert telemetry.take_new() == ([], False)
+    telemetry.add_event("bridge", event(1))
+    assert telemetry.take_new() == (telemetry.events[-1:], False)
+
+
+def test_the_histories_of_a_host_are_merged_by_its_own_clock() -> None:
+    telemetry = TelemetryCache()
+    ahead = 8 * 3600  # of the wall clock, before a correction
+    for service, monos in (("safety", (1, 4, 5)), ("bridge", (2, 3, 6))):
+        for mono in monos:
+            t = mono if mono > 3 else mono + ahead
+            telemetry.add_event(service, replace(event(t), mono_ns=mono, host=7, text=str(mono)))
+    telemetry.add_event("teleop", replace(event(9), mono_ns=0, host=8, text="another host"))
+    lines, are_all = telemetry.take_new()
+    assert [line.text for line in lines] == [*"123456", "another host"]
+    assert are_all
+    for _ in range(HISTORY_TURNS):  # later ones come when they come
+        telemetry.add_event("safety", replace(event(9), mono_ns=9, host=7))
+        telemetry.take_new()
+    telemetry.add_event("bridge", replace(event(1), mono_ns=8, host=7, text="last"))
+    assert telemetry.take_new()[1] is False
+    assert telemetry.events[-1].text == "last"
+
+
+def test_a_history_of_all_services_fits_and_lost_events_are_marked() -> None:
+    telemetry = TelemetryCache()
+    for service in keys.SERVICES:
+        for seq in range(1, keys.EVENT.history + 1):
+            telemetry.add_event(service, replace(event(seq), seq=seq, boot=1))
+    assert len(telemetry._events) == keys.EVENT.history * len(keys.SERVICES)
+    last = keys.EVENT.history
+    for seq, boot in ((last + 4, 1), (last + 5, 1), (1, 2), (3, 2)):
+        telemetry.add_event("safety", replace(event(seq), seq=seq, boot=boot))
+    shown = [(line.name, line.text) for line in telemetry.events[-6:]]
+    assert [text for name, text in shown if name == "gap"] == [
+        "3 events are missing here.",
+        "1 events are missing here.",
+    ]
+    assert [name for name, _ in shown] == ["gap", "n", "n", "n", "gap", "n"]
 
 
 def test_an_event_of_any_length_costs_little() -> None:
