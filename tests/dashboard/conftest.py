@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 from common.loop import Loop
 from tests.dashboard.bus_fixture import Peer
-from tests.dashboard.page import CHROMIUM
+from tests.dashboard.page import CHROMIUM, wait_for_text
 from tests.dashboard.servers import CallServers, serving
 from verification.harness.bus import bus_on, router_process, running
 from verification.harness.dashboard import Server, dashboard
@@ -47,3 +47,17 @@ def browser() -> Iterator[Browser]:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def page_of_peer(browser: Browser, server: Server, peer: Peer) -> Iterator[Page]:
+    """The page at the simulated safety, with a state of it."""
+    peer.safe, peer.latched = True, ()
+    page = browser.new_page(viewport={"width": 1280, "height": 800}, locale="en-GB")
+    problems: list[str] = []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.goto(server.url)
+    wait_for_text(page, "#delay-value", " s")
+    yield page
+    page.close()
+    assert problems == []

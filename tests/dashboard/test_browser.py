@@ -151,7 +151,7 @@ def test_driving_by_touch_and_a_second_finger_stops(
 PAD = """() => {
   const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
   window.pad = {
-    connected: true, mapping: 'standard', index: 1, id: 'A pad', buttons, axes: [0, -1, 0, 0],
+    connected: true, mapping: 'standard', index: 1, id: 'A pad', buttons, axes: [0, 0, 0, 0],
   };
   window.pad.buttons[4].pressed = true;
   // Its triggers are axes that rest at -1, where the standard mapping has a stick.
@@ -171,6 +171,10 @@ def test_driving_by_gamepad(page: Page, stack: RunningStack) -> None:
     page.wait_for_timeout(200)
     assert text(page, "#hold") == "Released"  # it was down when it was found
     deadman(False)
+    tremor = (
+        "() => { setInterval(() => { window.pad.axes[1] = -0.99 - Math.random() / 200; }, 50); }"
+    )
+    page.evaluate(tremor)
     drive_until_moving(stack, lambda: deadman(True), lambda: deadman(False))
     page.evaluate("() => { window.pad.mapping = ''; }")
     wait_for_standstill(stack)
@@ -210,8 +214,12 @@ def test_the_server_is_lost_and_comes_back(page: Page, server: Server, stack: Ru
     wait_for_text(page, "#sentence", "use its own switch")
     wait_for_text(page, "#detail", "Next: t2 doctor --robot 001 --set bus.connect=")
     page.click("#estop")
-    wait_for_text(page, "#toasts", "NOT SENT YET")
+    wait_for_text(page, "#unsent", "NOT SENT YET: no connection. It is sent if")
     server.start()
     wait_for_text(page, "#link", "Board: up")
+    wait_for_text(page, "#causes", "Emergency stop.")
+    page.wait_for_function("() => !document.querySelector('#unsent').textContent")
     wait_for_standstill(stack)
     page.keyboard.up("w")
+    take_control(page)
+    reset_all(page)

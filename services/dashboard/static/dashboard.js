@@ -1,13 +1,14 @@
 // The page: WebSocket, messages from the server, commands, and language.
 import * as charts from "./charts.js";
+import * as delay from "./delay.js";
 import * as driving from "./driving.js";
-import * as estop from "./estop.js";
 import * as notices from "./notices.js";
 import * as phrases from "./phrases.js";
 import * as panels from "./panels.js";
 import * as sonarView from "./sonar_view.js";
 import * as stateBar from "./state_bar.js";
 import * as trail from "./trail.js";
+import * as wakeLock from "./wake_lock.js";
 
 const { toast, confirm } = notices;
 
@@ -15,18 +16,31 @@ const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
 const CONGESTED = 2048; // bytes that wait in the browser
 const $ = (id) => document.getElementById(id);
-const stored = (key, otherwise) => localStorage.getItem(`t2.${key}`) ?? otherwise;
+const estop = window.T2Estop;
+// A browser may forbid storage: then a reload forgets.
+const stored = (key, otherwise, from = "localStorage") => {
+  try {
+    return window[from].getItem(`t2.${key}`) ?? otherwise;
+  } catch {
+    return otherwise;
+  }
+};
+const store = (key, value, to = "localStorage") => {
+  try {
+    window[to].setItem(`t2.${key}`, value);
+  } catch { /* it is forbidden */ }
+};
 
 let texts = {};
 let language = stored("language", navigator.language.startsWith("zh") ? "zh" : "en");
 let socket = null;
 let fast = null; // the newest snapshots
 let fastAt = -Infinity;
-let aliveEcho = -2; // the heartbeat that was last answered with a sign of life
 let slow = null;
-const EVENTS_MAX = 80;
+const EVENTS_MAX = 200;
 let events = [];
 let hello = null;
+let showChange = () => {}; // that this page shows another robot than before
 let drawn; // the drawn snapshot; null without a connection
 
 // A text of the catalogue; values take the places of its `{}`.
@@ -60,15 +74,18 @@ function connect() {
 
 // A restarted dashboard may require a new token: a reload opens its token page.
 async function reconnect() {
-  const response = await fetch("/t2/dashboard.css", { cache: "no-store", signal: AbortSignal.timeout(LOST_MS) })
-    .catch(() => null);
-  if (response?.status === 401) location.reload();
+  const control = new AbortController();
+  const timer = setTimeout(() => control.abort(), LOST_MS);
+  const response = await fetch("/t2/dashboard.css", { cache: "no-store", signal: control.signal }).catch(() => null);
+  clearTimeout(timer);
+  if (response?.status === 401 && !estop.isOpen()) location.reload(); // a stop that is open offers it
   else connect();
 }
 
 const HANDLERS = {
   hello(message) {
     hello = message;
+    delay.begin();
     events = [];
     sonarView.build(message.vehicle);
     trail.size(message.vehicle);
@@ -77,23 +94,23 @@ const HANDLERS = {
     if (!hello) return;
     fast = message;
     fastAt = performance.now();
-    // At most 10 a second. A hidden page, or one without a socket, is not alive.
-    if (hello.keepalive && !document.hidden && Math.abs(echoOf(fast) - aliveEcho) >= 2) {
-      aliveEcho = echoOf(fast);
-      send({ k: "alive", echo: aliveEcho });
+    if (!document.hidden) { // a hidden page, or one without a socket, is not alive
+      const at = delay.ask(fastAt);
+      if (at !== null) send({ k: "alive", echo: echoOf(fast), at });
     }
     driving.answer(echoOf(fast), isDriver(), message.driver.hold, message.safety);
     estop.update(message.safety);
     charts.add(message, fastAt);
     trail.add(message);
   },
+  alive: (message) => delay.answered(message, performance.now()),
   slow(message) {
     slow = message;
     panels.showSlow(message, t);
     showRobots();
   },
   events(message) {
-    events = [...events, ...message.lines].sort((a, b) => a.t - b.t).slice(-EVENTS_MAX);
+    events = [...(message.all ? [] : events), ...message.lines].slice(-EVENTS_MAX); // in the order of their arrival
     panels.showEvents(events, t, language);
   },
   notice: (message) => toast(message.text, message.level, message.about),
@@ -104,12 +121,13 @@ const handle = (message) => HANDLERS[message.k]?.(message);
 
 // --- drawing ----------------------------------------------------------------------------------
 
+const delayNow = () => ({ delay: delay.now(performance.now()), limit: hello?.hold_s ?? 0 });
 const newest = () => (lost() ? null : fast);
 
 /** What the state bar and the header show; `fast` is null without a connection. */
 const view = () => ({
   fast: newest(), t, language, robot, router, doctor, isDriver: isDriver(), viewer: hello?.id,
-  keepsAlive: !!hello?.keepalive, viewers: slow?.viewers ?? 0,
+  ...delayNow(), keepsAlive: !!hello?.keepalive, viewers: slow?.viewers ?? 0,
 });
 
 function draw() {
@@ -120,6 +138,7 @@ function draw() {
   stateBar.show(view());
   driving.show(isDriver(), newest());
   notices.place();
+  $("awake").hidden = !wakeLock.update(isDriver() || (!!hello?.keepalive && newest()?.keeper === hello.id));
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
   sonarView.draw(fast, t);
@@ -146,20 +165,29 @@ function showRobots() {
 function showTexts() {
   document.documentElement.lang = language;
   for (const it of document.querySelectorAll("[data-t]")) it.textContent = t(it.dataset.t);
+  showChange();
   if (slow) panels.showSlow(slow, t);
   panels.showEvents(events, t, language);
   drawn = undefined;
-}
-
-function stop() {
-  driving.letGo();
-  estop.request();
 }
 
 function reset() {
   if (!isDriver()) toast(driving.viewOnly(fast) || "take_first");
   else if (stateBar.resetRefusal(newest())) toast(stateBar.resetRefusal(newest()), "warning");
   else send({ k: "reset", echo: echoOf(drawn), name: name() });
+}
+
+// The robot belongs to this page: a reload keeps it, and a change is never silent.
+function showRobot() {
+  const before = stored("robot", robot, "sessionStorage");
+  store("robot", robot, "sessionStorage");
+  const address = new URL(location.href);
+  address.searchParams.set("robot", robot);
+  history.replaceState(null, "", address);
+  if (before === robot) return;
+  $("robot-changed").hidden = false;
+  $("robot-changed").onclick = () => { $("robot-changed").hidden = true; };
+  showChange = () => { $("robot-changed-text").textContent = t("robot_changed", robot, before); };
 }
 
 function showCamera(url) {
@@ -174,22 +202,22 @@ function begin() {
   texts = JSON.parse($("texts").textContent);
   phrases.begin(JSON.parse($("phrases").textContent));
   const on = (id, call) => { $(id).onclick = call; };
-  on("estop", stop);
   $("name").value = stored("name", "");
-  $("name").onchange = () => localStorage.setItem("t2.name", name());
+  $("name").onchange = () => store("name", name());
   on("take", () => send({ k: "take", force: false, name: name() }));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
   $("language").onclick = () => {
     language = language === "en" ? "zh" : "en";
-    localStorage.setItem("t2.language", language);
+    store("language", language);
     showTexts();
   };
   notices.begin({ t, language: () => language });
-  driving.begin({ send, estop: stop, reset, toast, t, language: () => language, gears: () => hello?.gears ?? [] });
-  estop.begin({ send, off, toast, robot, name, barred: () => driving.viewOnly(fast) });
-  showCamera($("page").dataset.camera.replaceAll("{robot}", robot));
+  driving.begin({ send, reset, toast, isStopKey: estop.isKey, delay: delayNow, t, language: () => language, gears: () => hello?.gears ?? [] });
+  estop.begin({ send, off, toast, name, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
+  showCamera($("page").dataset.camera.split("{robot}").join(robot));
   trail.begin();
+  showRobot();
   showTexts();
   connect();
   draw();

@@ -1,21 +1,19 @@
 // Input of the driver: stick, keys, gamepad, release. Only held controls drive. Every loss of input
 // releases them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
 // as the answer to a snapshot, with its heartbeat of safety, which bounds the age of the hold.
+import * as gamepads from "./gamepad.js";
 import { gap, translated } from "./phrases.js";
 import { duration } from "./panels.js";
 import { isUsedUp, nextStep, resetRefusal } from "./state_bar.js";
 
-const DEADZONE = 0.12; // of the stick's range
-const DEADMAN = 4; // left shoulder, in the browser's standard mapping
-const STICKS = { linear: 1, angular: 2 }; // left stick up and down, right stick left and right
 const KEYS = {
   KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
   KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
 };
 const RELEASE_KEYS = { KeyF: "forward", KeyB: "backward" };
+const REPEATS_MS = 1000; // without a repeat of a key that repeated: the system has lost the key-up
 const $ = (id) => document.getElementById(id);
 const down = new Set();
-const seenUp = new Set(); // gamepads whose deadman was seen up
 let page = null;
 let stick = null; // { pointer, push }
 let releasing = null; // "forward" or "backward": off a pressed bumper
@@ -25,39 +23,27 @@ let driving = false; // whether this viewer has the driver lock
 let another = null; // another source that drives
 let barred = ""; // why this page may not drive
 let refused = null; // { code, key }: a key that is held, and why it is refused
+let pad = { push: null, state: "" }; // what the gamepads say
+let repeats = null; // { code, at }: the held key that repeats, and its last repeat
 let sent = false; // whether the server has a hold from here
 
-const shaped = (raw) => {
-  if (Math.abs(raw) <= DEADZONE) return 0;
-  return Math.sign(raw) * Math.min(1, (Math.abs(raw) - DEADZONE) / (1 - DEADZONE));
-};
 const clamped = (value) => Math.max(-1, Math.min(1, value));
 
 function held() {
+  if (document.hidden) return null; // a gamepad sends to hidden pages, too
   if (releasing) return { x: 0, y: 0, release: releasing };
   if (stick) return { x: stick.push[0], y: stick.push[1] };
   if (down.size) {
     const pushes = [...down].map((code) => KEYS[code]);
     return { x: clamped(pushes.reduce((sum, it) => sum + it[0], 0)), y: clamped(pushes.reduce((sum, it) => sum + it[1], 0)) };
   }
-  return gamepad();
+  return pad.push;
 }
 
-// Only the browser's standard mapping defines the axes: on another gamepad a trigger at rest may be
-// a full turn. The gamepad whose deadman is pressed counts, if several are connected.
-function gamepad() {
-  const pads = [...(navigator.getGamepads?.() ?? [])].filter((it) => it?.connected);
-  const usable = pads.filter((it) => it.mapping === "standard");
-  const pressed = usable.filter((it) => it.buttons[DEADMAN]?.pressed);
-  // A deadman that is down when the gamepad is found, or after a release, must be released first.
-  for (const it of usable) if (!pressed.includes(it)) seenUp.add(it.index);
-  for (const index of seenUp) if (!usable.some((it) => it.index === index)) seenUp.delete(index);
-  const pad = pressed.find((it) => seenUp.has(it.index));
-  const named = pad ?? usable[0] ?? pads[0];
-  const key = usable.length ? "gamepad" : "gamepad_unusable";
-  $("gamepad").textContent = named ? page.t(key, named.id) : "";
-  if (!pad) return null;
-  return { x: shaped(-(pad.axes[STICKS.linear] ?? 0)), y: shaped(-(pad.axes[STICKS.angular] ?? 0)) };
+function readGamepads() {
+  if (!driving) gamepads.drop();
+  pad = gamepads.read(gamepads.connected(), performance.now());
+  write("gamepad", pad.name && page.t(pad.isUsable ? "gamepad" : "gamepad_unusable", pad.name));
 }
 
 export function answer(echo, isDriver, hold, safety) {
@@ -66,7 +52,9 @@ export function answer(echo, isDriver, hold, safety) {
   // The bumper was pressed during the release: this direction is forbidden.
   if ((driving && !isDriver) || (releasing && refusal(releasing))) letGo();
   driving = isDriver;
+  readGamepads();
   if (!driving) return;
+  if (repeats && performance.now() - repeats.at > REPEATS_MS) letGo(); // its key-up was lost
   const controls = held();
   if (controls) sent = page.send({ k: "hold", echo, ...controls });
   // After a lapse the server requires a release before the next hold.
@@ -81,8 +69,8 @@ function free() {
 export function letGo() {
   down.clear();
   stick = null;
-  releasing = refused = null;
-  seenUp.clear();
+  releasing = refused = repeats = null;
+  gamepads.drop();
   if (driving) free();
   knob(0, 0);
 }
@@ -112,8 +100,8 @@ export function show(isDriver, fast) {
   write("view-only", barred && page.t(barred));
   $("estop").classList.toggle("unable", barred === "view_only_stop");
   panel.dataset.hold = hold;
-  const isLost = isDriver && (driver.overruled || hold === "expired");
-  write("hold", refused && !isLost ? page.t(refused.key) : !isDriver ? "" : driver.overruled ? page.t("hold.overruled") : page.t(`hold.${hold}`));
+  panel.dataset.pad = isDriver ? pad.state : "";
+  write("hold", holdText(isDriver, driver));
   disable($("leave"), !isDriver);
   const off = !fast || !!fast.root.part; // nothing can drive
   disable($("take"), isDriver || off);
@@ -123,6 +111,18 @@ export function show(isDriver, fast) {
   $("reset").classList.toggle("due", next === "reset");
   $("release").classList.toggle("due", next === "release" || next === "by_hand");
   showRelease(isDriver, releasing ? fast?.safety?.release_refusal : "");
+}
+
+function holdText(isDriver, driver) {
+  const { t } = page;
+  if (isDriver && driver.overruled) return t("hold.overruled");
+  if (refused) return t(refused.key);
+  if (!isDriver) return "";
+  const { delay, limit } = page.delay();
+  const isSlow = driver.hold !== "held" && (sent || driver.hold === "lapsed") && delay > limit;
+  if (isSlow) return t("hold.slow", delay.toFixed(2), limit.toFixed(2));
+  if (pad.state) return t(`hold.${pad.state}`);
+  return t(driver.hold === "free" && sent ? "hold.waiting" : `hold.${driver.hold}`);
 }
 
 // Why safety refuses a release in this direction now, as a key; empty if it does not.
@@ -199,7 +199,7 @@ function listenToStick() {
     const length = Math.hypot(x, y);
     if (length > 1) [x, y] = [x / length, y / length];
     knob(x, y);
-    return [shaped(x), shaped(y)];
+    return [gamepads.shaped(x), gamepads.shaped(y)];
   };
   it.addEventListener("pointerdown", (event) => {
     event.preventDefault();
@@ -208,7 +208,9 @@ function listenToStick() {
     stick = { pointer: event.pointerId, push: pushed(event) };
   });
   it.addEventListener("pointermove", (event) => {
-    if (stick?.pointer === event.pointerId) stick.push = pushed(event);
+    if (stick?.pointer !== event.pointerId) return;
+    if (event.buttons) stick.push = pushed(event);
+    else letGo(); // the end of the press was lost
   });
   for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
     it.addEventListener(end, (event) => { if (stick?.pointer === event.pointerId) letGo(); });
@@ -243,52 +245,72 @@ const MODIFIERS = ["Meta", "Control", "Alt"];
 const modified = (event) =>
   event.ctrlKey || event.altKey || event.metaKey || MODIFIERS.includes(event.key);
 const typing = (event) => event.target.matches?.("input");
-const spacing = (event) => event.code === "Space" && !typing(event);
+
+// The place of a key, whatever the layout; by its letter where no place is reported.
+function placeOf(event) {
+  const key = event.key.normalize("NFKC");
+  if (event.code) return event.code;
+  if (key === " ") return "Space";
+  if (/^[a-z]$/i.test(key)) return `Key${key.toUpperCase()}`;
+  return /^[1-5]$/.test(key) ? `Digit${key}` : key;
+}
+
+// A key of another script, or of an input method, that means nothing here; any other one is left alone.
+const isForeign = (event) => ["Process", "Unidentified", "Dead"].includes(event.key)
+  || (event.key.length === 1 && !/[ -~]/.test(event.key.normalize("NFKC")));
+
+function refuseKey(event) {
+  if (event.repeat) return;
+  if (isForeign(event)) page.toast("key_foreign", "warning");
+  else if (event.key.length === 1) page.toast(page.t("key_unknown", event.key), "warning");
+}
 
 function keyDown(event) {
-  if (spacing(event)) {
+  const place = placeOf(event);
+  if (place === "Space" && !typing(event)) {
     event.preventDefault(); // it would press the focused button, too
     event.stopPropagation();
     letGo();
     if ((!driving || another) && !event.repeat) page.toast("estop_key", "warning");
+    return;
   }
-  if (typing(event) && ["Enter", "Escape"].includes(event.code)) event.target.blur();
+  if (typing(event) && ["Enter", "Escape"].includes(event.code) && !event.isComposing) event.target.blur();
   if (modified(event)) letGo();
-  if (typing(event) || modified(event)) return;
-  if (event.code === "KeyE" && !event.repeat) page.estop();
-  else if (event.code === "KeyR" && !event.repeat) page.reset();
-  else if (KEYS[event.code]) {
+  if (typing(event) || modified(event) || page.isStopKey(event)) return;
+  repeats = event.repeat && down.has(place) ? { code: place, at: performance.now() } : null;
+  if (place === "KeyR") {
+    if (!event.repeat) page.reset();
+  } else if (KEYS[place]) {
     event.preventDefault();
     // A repeat is no press: after a release the key must come up first.
-    if (!event.repeat && ready(event.code)) down.add(event.code);
-  } else if (RELEASE_KEYS[event.code] && !event.repeat) holdRelease(RELEASE_KEYS[event.code], event.code);
-  else if (/^Digit[1-5]$/.test(event.code)) page.send({ k: "gear", gear: Number(event.code.at(-1)) });
+    if (!event.repeat && ready(place)) down.add(place);
+  } else if (RELEASE_KEYS[place]) {
+    if (!event.repeat) holdRelease(RELEASE_KEYS[place], place);
+  } else if (/^Digit[1-5]$/.test(place)) page.send({ k: "gear", gear: Number(place.slice(-1)) });
+  else refuseKey(event);
 }
 
 function keyUp(event) {
-  if (spacing(event)) {
+  const place = placeOf(event);
+  if (place === "Space" && !typing(event)) {
     event.preventDefault();
     event.stopPropagation();
   }
   if (modified(event)) letGo();
-  if (refused?.code === event.code) refused = null;
-  if (releasing && RELEASE_KEYS[event.code] === releasing) letGo();
-  if (down.delete(event.code) && !down.size) letGo();
-}
-
-// On pointerdown: while a finger is on the stick, the tap of another finger makes no click.
-function listenToStop() {
-  addEventListener("pointerdown", (event) => { if (event.target.closest?.("#estop")) page.estop(); }, true);
+  repeats = null;
+  if (refused?.code === place) refused = null;
+  if (releasing && RELEASE_KEYS[place] === releasing) letGo();
+  if (down.delete(place) && !down.size) letGo();
 }
 
 export function begin(given) {
   page = given;
-  listenToStop();
   listenToStick();
   for (const direction of Object.values(RELEASE_KEYS)) listenToRelease(direction);
   addEventListener("keydown", keyDown, true);
   addEventListener("keyup", keyUp, true);
   for (const name of ["blur", "pagehide", "gamepaddisconnected", "dragstart"]) addEventListener(name, letGo);
+  document.addEventListener("freeze", letGo);
   // An open menu swallows the key-up; the stick opens none.
   addEventListener("contextmenu", (event) => { if (!event.defaultPrevented) letGo(); });
   document.addEventListener("visibilitychange", () => { if (document.hidden) letGo(); });

@@ -1,47 +1,261 @@
-// The emergency stop: sent by WebSocket and by POST, and repeated until a snapshot shows it latched.
-// The WebSocket may be broken without an error, and a POST may hang.
-const REPEAT_MS = 400;
-const TIMEOUT_MS = 3000;
-const POST_MS = 1000;
-const MIN_AGE_MS = 300; // an earlier snapshot may be older than the request
-let page = null;
-let pending = null; // { since, barred }
+// The emergency stop. It needs only what every browser has: a classic script in ECMAScript 5, loaded
+// first, which works without the rest of the page.
+//
+// A stop is sent by WebSocket and by POST, and repeated until a snapshot shows it latched: a
+// WebSocket may be broken without an error, and a POST may hang. What is not confirmed within KEPT_MS
+// is never sent later: the page says so until somebody acknowledges it, also after a reload.
+//
+// state      leads to                                             shown
+// pending    confirmed: removed; KEPT_MS: late                    not sent yet; not confirmed
+// late       acknowledged: removed; pressed again: pending        was not sent; was not confirmed
+// handed     acknowledged: removed                                sent for a robot of another page
+(function () {
+  "use strict";
+  var REPEAT_MS = 400;
+  var POST_MS = 1000;
+  var MIN_AGE_MS = 300; // an earlier snapshot may be older than the request
+  var UNCONFIRMED_MS = 3000;
+  var KEPT_MS = 30000;
+  var STORE = "t2.estop.";
+  // A letter that looks like E is E, wherever it is: Cyrillic, Greek.
+  var LETTERS_E = "e\u0435\u03b5";
+  var stops = {}; // by robot: { since, wall, state, sent, status, barred }
+  var viaXhr = false;
+  var press = { type: "", at: -Infinity };
+  var page = null; // what dashboard.js offers
 
-export function begin(given) {
-  page = given;
-  setInterval(repeat, REPEAT_MS);
-}
-
-export function request() {
-  const barred = page.barred(); // why this page may not drive, and perhaps not stop
-  if (!pending && barred === "view_only_stop") page.toast(barred, "error");
-  else if (page.off()) page.toast("estop_not_sent", "error");
-  else if (!pending) page.toast("estop_asked", "warning");
-  pending = { since: performance.now(), barred };
-  sendStop();
-}
-
-export function update(safety) {
-  const isEarly = !pending || performance.now() - pending.since < MIN_AGE_MS;
-  if (!isEarly && safety?.latched.includes("estop")) pending = null;
-}
-
-function repeat() {
-  if (!pending) return;
-  if (performance.now() - pending.since < TIMEOUT_MS) sendStop();
-  else {
-    page.toast(pending.barred ? "estop_denied" : "estop_unconfirmed", "error");
-    pending = null;
+  function now() {
+    return window.performance && performance.now ? performance.now() : new Date().getTime();
   }
-}
 
-function sendStop() {
-  page.send({ k: "estop", name: page.name() });
-  const failed = () => { if (page.off()) page.toast("estop_not_sent", "error"); };
-  // With keepalive it is sent even if the page is being closed.
-  fetch(`/estop/${page.robot}?name=${encodeURIComponent(page.name())}`, { method: "POST", keepalive: true, signal: AbortSignal.timeout(POST_MS) })
-    .then((response) => {
-      if (response.status === 404) page.toast("estop_unknown", "error");
-      else if (!response.ok) failed();
-    }, failed);
-}
+  function element(id) {
+    return document.getElementById(id);
+  }
+
+  function robotShown() {
+    return element("page").getAttribute("data-robot");
+  }
+
+  // --- texts ------------------------------------------------------------------------------------
+
+  function text(key) {
+    if (page) return page.t.apply(null, arguments);
+    var language = /^zh/.test(navigator.language || "") ? "zh" : "en";
+    var found = JSON.parse(element("texts").textContent)[language][key] || key;
+    for (var i = 1; i < arguments.length; i += 1) found = found.replace("{}", arguments[i]);
+    return found;
+  }
+
+  function name() {
+    return page ? page.name() : "";
+  }
+
+  // --- storage: it may be blocked -----------------------------------------------------------------
+
+  function store(robot) {
+    var it = stops[robot];
+    try {
+      if (it) localStorage.setItem(STORE + robot, JSON.stringify([it.wall, it.state, it.sent]));
+      else localStorage.removeItem(STORE + robot);
+    } catch (error) { /* then a reload forgets it */ }
+  }
+
+  function restore() {
+    try {
+      for (var i = 0; i < localStorage.length; i += 1) {
+        var key = localStorage.key(i);
+        if (key.indexOf(STORE) === 0) restoreOne(key.slice(STORE.length), JSON.parse(localStorage.getItem(key)));
+      }
+    } catch (error) { /* nothing is stored */ }
+  }
+
+  function restoreOne(robot, values) {
+    var age = new Date().getTime() - values[0];
+    var young = values[1] === "pending" && age >= 0 && age < KEPT_MS;
+    stops[robot] = { since: now() - age, wall: values[0], state: young ? "pending" : "late", sent: !!values[2] };
+  }
+
+  // --- sending ----------------------------------------------------------------------------------
+
+  function request() {
+    var robot = robotShown();
+    var barred = page ? page.barred() : ""; // why this page may not drive, and perhaps not stop
+    var first = !stops[robot] || stops[robot].state !== "pending";
+    stops[robot] = { since: now(), wall: new Date().getTime(), state: "pending", sent: false, barred: barred };
+    if (!barred) store(robot);
+    send(robot);
+    if (page) {
+      page.pressed();
+      if (barred === "view_only_stop") page.toast(barred, "error");
+      else if (first && !page.off()) page.toast("estop_asked", "warning");
+    }
+    show();
+  }
+
+  function remove(robot) {
+    delete stops[robot];
+    store(robot);
+    show();
+  }
+
+  function send(robot) {
+    var it = stops[robot];
+    var age = Math.round((now() - it.since) / 100) / 10;
+    if (page && robot === robotShown()) page.send({ k: "estop", name: name(), age: age });
+    var query = "?name=" + encodeURIComponent(name()) + "&age=" + age;
+    post("/estop/" + encodeURIComponent(robot) + query, function (status) {
+      if (stops[robot] !== it || it.state !== "pending") return;
+      it.status = status;
+      if (status !== 200) return show();
+      if (!isOff()) it.sent = true;
+      if (robot !== robotShown() || !page) it.state = "handed"; // no snapshot of it comes here
+      store(robot);
+      show();
+    });
+  }
+
+  // With keepalive it is sent even if the page is being closed. After a failure the other way is tried.
+  function post(url, done) {
+    var failed = function () { viaXhr = !viaXhr; done(0); };
+    if (!viaXhr && window.fetch && window.AbortController) {
+      try {
+        var control = new AbortController();
+        var timer = setTimeout(function () { control.abort(); }, POST_MS);
+        var options = { method: "POST", credentials: "same-origin", keepalive: true, signal: control.signal };
+        fetch(url, options).then(function (response) {
+          clearTimeout(timer);
+          done(response.status);
+        }, failed);
+        return;
+      } catch (error) { /* a browser with a part of it */ }
+    }
+    var xhr = new XMLHttpRequest();
+    xhr.open("POST", url, true);
+    xhr.timeout = POST_MS;
+    xhr.onload = function () { done(xhr.status); };
+    xhr.onerror = xhr.ontimeout = failed;
+    xhr.send();
+  }
+
+  function repeat() {
+    for (var robot in stops) {
+      var it = stops[robot];
+      if (it.state !== "pending") continue;
+      var age = now() - it.since;
+      if (it.barred && age >= UNCONFIRMED_MS) {
+        remove(robot);
+        page.toast("estop_denied", "error");
+      } else if (age >= KEPT_MS) {
+        it.state = "late";
+        store(robot);
+      } else send(robot);
+    }
+    show();
+  }
+
+  function update(safety) {
+    var it = stops[robotShown()];
+    var isEarly = !it || it.state !== "pending" || now() - it.since < MIN_AGE_MS;
+    if (!isEarly && safety && safety.latched.indexOf("estop") >= 0) remove(robotShown());
+  }
+
+  // --- what the screen shows ----------------------------------------------------------------------
+
+  function isOff() {
+    return !!page && page.off();
+  }
+
+  function message(robot, it) {
+    var at = new Date(it.wall).toTimeString().slice(0, 8);
+    if (it.state === "handed") return text("estop_handed", robot);
+    if (it.state === "late") return text(it.sent ? "estop_late_unconfirmed" : "estop_late", at, robot);
+    var age = now() - it.since;
+    if (it.status === 401) return text("estop_login");
+    if (it.status === 404) return text("estop_unknown");
+    var cut = it.status === 200 ? isOff() : it.status !== undefined;
+    if (cut) return text("estop_not_sent", Math.ceil((KEPT_MS - age) / 1000));
+    return age > UNCONFIRMED_MS ? text("estop_unconfirmed") : "";
+  }
+
+  function show() {
+    var box = element("unsent");
+    if (!box) return; // the document is still loading
+    var lines = [];
+    for (var robot in stops) {
+      var it = stops[robot];
+      var line = message(robot, it);
+      if (line) lines.push({ text: line, button: button(robot, it) });
+    }
+    if (page === false) lines.push({ text: text("page_incomplete"), button: null });
+    var stamp = JSON.stringify(lines.map(function (each) { return [each.text, each.button && each.button.label]; }));
+    if (box.getAttribute("data-stamp") === stamp) return;
+    box.setAttribute("data-stamp", stamp);
+    while (box.firstChild) box.removeChild(box.firstChild);
+    for (var i = 0; i < lines.length; i += 1) draw(box, lines[i]);
+  }
+
+  function button(robot, it) {
+    if (it.state !== "pending") return { label: text("acknowledge"), act: function () { remove(robot); } };
+    if (it.status === 401) return { label: text("log_in"), act: function () { location.reload(); } };
+    return null;
+  }
+
+  function draw(box, line) {
+    var row = document.createElement("p");
+    row.appendChild(document.createTextNode(line.text));
+    if (line.button) {
+      var it = document.createElement("button");
+      it.appendChild(document.createTextNode(line.button.label));
+      it.onclick = line.button.act;
+      row.appendChild(it);
+    }
+    box.appendChild(row);
+  }
+
+  // --- input ------------------------------------------------------------------------------------
+
+  function isTyping(event) {
+    return /^(INPUT|TEXTAREA|SELECT)$/.test((event.target && event.target.tagName) || "");
+  }
+
+  function isKey(event) {
+    if (isTyping(event) || event.ctrlKey || event.altKey || event.metaKey) return false;
+    var letter = String(event.key || "");
+    if (letter.normalize) letter = letter.normalize("NFKC"); // full width
+    letter = letter.toLowerCase();
+    if (letter.length === 1 && LETTERS_E.indexOf(letter) >= 0) return true;
+    // Its place, whatever the layout or an input method makes of it; without one Cyrillic has it at U.
+    return event.code ? event.code === "KeyE" : letter === "\u0443" || (!event.key && event.keyCode === 69);
+  }
+
+  // At the first event of a press: while a finger is on the stick, the tap of another makes no click.
+  function pressed(event) {
+    var it = event.target;
+    while (it && it.id !== "estop") it = it.parentNode;
+    var isSame = event.type !== press.type && now() - press.at < 1000;
+    if (!it || isSame) return;
+    press = { type: event.type, at: now() };
+    request();
+  }
+
+  ["pointerdown", "touchstart", "mousedown", "click"].forEach(function (type) {
+    document.addEventListener(type, pressed, true);
+  });
+  document.addEventListener("keydown", function (event) {
+    if (isKey(event) && !event.repeat) request();
+  }, true);
+  // A script that this browser cannot run, or that did not arrive, leaves the page without its rest.
+  window.addEventListener("load", function () {
+    if (!page) page = false;
+    show();
+  });
+  restore();
+  setInterval(repeat, REPEAT_MS);
+
+  window.T2Estop = {
+    isKey: isKey,
+    update: update,
+    isOpen: function () { return !!stops[robotShown()]; },
+    begin: function (given) { page = given; show(); },
+  };
+})();

@@ -51,7 +51,7 @@ export function place() {
 export function confirm(title, text, yes) {
   $("question-title").textContent = page.t(title);
   $("question-text").textContent = text;
-  $("question").show();
-  $("question-yes").onclick = () => { $("question").close(); yes(); };
-  $("question-no").onclick = () => $("question").close();
+  $("question").setAttribute("open", ""); // as show() of newer browsers
+  $("question-yes").onclick = () => { $("question").removeAttribute("open"); yes(); };
+  $("question-no").onclick = () => $("question").removeAttribute("open");
 }

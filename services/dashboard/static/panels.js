@@ -129,7 +129,7 @@ const bits = (all) => [...Array(32).keys()].filter((bit) => Math.floor(all / 2 *
 function eventTexts({ service, name, text }, t, language) {
   const keys = [`event.${service}.${name}`, `event.${name}`];
   const key = keys.find((it) => t(it) !== it); // a newer service may have other events
-  const kind = language === "en" ? name.replaceAll("_", " ").replace("estop", "emergency stop") : t(key ?? "");
+  const kind = language === "en" ? name.split("_").join(" ").replace("estop", "emergency stop") : t(key ?? "");
   const [title, details] = combined(kind, translated(text, language));
   return [capital(title) + (details && language === "en" ? ": " : ""), details];
 }

@@ -76,11 +76,14 @@ function sentence({ fast, t, language, isDriver }) {
 }
 
 function showHead(view) {
-  const { fast, t, isDriver, viewer, keepsAlive } = view;
+  const { fast, t, isDriver, viewer, keepsAlive, delay, limit } = view;
   const off = !fast?.connected; // without a router all values are old
   chip("link", off ? "" : t(`link.${fast.root.part === "bridge" ? "missing" : fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
   chip("bumper", off || rootText(fast, t) ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
   chip("driver", off ? "" : driver(view), isDriver && !fast.driver.other ? "clear" : "slow");
+  $("delay").hidden = !fast;
+  set("delay-value", `${delay.toFixed(2)} s`);
+  $("delay").dataset.tone = delay > limit ? "stop" : "";
   const keeper = off || !keepsAlive ? "" : fast.keeper === viewer ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
   chip("watching", off || !view.viewers ? "" : t("watching", view.viewers));
