@@ -49,6 +49,7 @@ const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
 const name = () => $("name").value.trim();
 const off = () => lost() || !fast.connected;
+const cut = () => !lost() && !fast.connected; // the dashboard is there, without a router
 const { robot, router, doctor } = $("page").dataset;
 // The heartbeat of safety in a snapshot: its age is the age of what the operator saw.
 const echoOf = (snapshot) => snapshot?.safety?.heartbeat ?? 0;
@@ -214,7 +215,8 @@ function begin() {
   };
   notices.begin({ t, language: () => language });
   driving.begin({ send, reset, toast, isStopKey: estop.isKey, delay: delayNow, t, language: () => language, gears: () => hello?.gears ?? [] });
-  estop.begin({ send, off, toast, name, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
+  const stopToast = (text) => toast(text, text === "estop_asked" ? "warning" : "error");
+  estop.begin({ send, off, cut, toast: stopToast, name, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
   showCamera($("page").dataset.camera.split("{robot}").join(robot));
   trail.begin();
   showRobot();

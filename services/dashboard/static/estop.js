@@ -41,13 +41,30 @@
   function text(key) {
     if (page) return page.t.apply(null, arguments);
     var language = /^zh/.test(navigator.language || "") ? "zh" : "en";
-    var found = JSON.parse(element("texts").textContent)[language][key] || key;
+    var found = texts()[language][key] || key;
     for (var i = 1; i < arguments.length; i += 1) found = found.replace("{}", arguments[i]);
     return found;
   }
 
+  function texts() {
+    try {
+      return JSON.parse(element("texts").textContent);
+    } catch (error) {
+      return { en: {}, zh: {} };
+    }
+  }
+
+  // The rest of the page may fail in an old browser; a stop must not.
+  function ask(method, argument, otherwise) {
+    try {
+      return page ? page[method](argument) : otherwise;
+    } catch (error) {
+      return otherwise;
+    }
+  }
+
   function name() {
-    return page ? page.name() : "";
+    return ask("name", null, "");
   }
 
   // --- storage: it may be blocked -----------------------------------------------------------------
@@ -79,16 +96,14 @@
 
   function request() {
     var robot = robotShown();
-    var barred = page ? page.barred() : ""; // why this page may not drive, and perhaps not stop
+    var barred = ask("barred", null, ""); // why this page may not drive, and perhaps not stop
     var first = !stops[robot] || stops[robot].state !== "pending";
     stops[robot] = { since: now(), wall: new Date().getTime(), state: "pending", sent: false, barred: barred };
     if (!barred) store(robot);
     send(robot);
-    if (page) {
-      page.pressed();
-      if (barred === "view_only_stop") page.toast(barred, "error");
-      else if (first && !page.off()) page.toast("estop_asked", "warning");
-    }
+    ask("pressed");
+    if (barred === "view_only_stop") ask("toast", barred);
+    else if (first && !ask("off", null, true)) ask("toast", "estop_asked");
     show();
   }
 
@@ -101,13 +116,13 @@
   function send(robot) {
     var it = stops[robot];
     var age = Math.round((now() - it.since) / 100) / 10;
-    if (page && robot === robotShown()) page.send({ k: "estop", name: name(), age: age });
+    if (robot === robotShown()) ask("send", { k: "estop", name: name(), age: age });
     var query = "?name=" + encodeURIComponent(name()) + "&age=" + age;
     post("/estop/" + encodeURIComponent(robot) + query, function (status) {
       if (stops[robot] !== it || it.state !== "pending") return;
       it.status = status;
       if (status !== 200) return show();
-      if (!isOff()) it.sent = true;
+      if (!isCut()) it.sent = true;
       if (robot !== robotShown() || !page) it.state = "handed"; // no snapshot of it comes here
       store(robot);
       show();
@@ -144,7 +159,7 @@
       var age = now() - it.since;
       if (it.barred && age >= UNCONFIRMED_MS) {
         remove(robot);
-        page.toast("estop_denied", "error");
+        ask("toast", "estop_denied");
       } else if (age >= KEPT_MS) {
         it.state = "late";
         store(robot);
@@ -161,8 +176,9 @@
 
   // --- what the screen shows ----------------------------------------------------------------------
 
-  function isOff() {
-    return !!page && page.off();
+  // Whether the dashboard has no connection to the robot.
+  function isCut() {
+    return ask("cut", null, false);
   }
 
   function message(robot, it) {
@@ -172,7 +188,7 @@
     var age = now() - it.since;
     if (it.status === 401) return text("estop_login");
     if (it.status === 404) return text("estop_unknown");
-    var cut = it.status === 200 ? isOff() : it.status !== undefined;
+    var cut = it.status === 200 ? isCut() : it.status !== undefined;
     if (cut) return text("estop_not_sent", Math.ceil((KEPT_MS - age) / 1000));
     return age > UNCONFIRMED_MS ? text("estop_unconfirmed") : "";
   }
