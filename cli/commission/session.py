@@ -48,6 +48,7 @@ class CheckoutSession(SafetyClient):
 
     def mark(self) -> int:
         """Discard everything received until now, queued messages too; return the time."""
+        self.forget()
         self._marked_ns = clock.now_ns()
         for log in self._log.values():
             log.clear()
@@ -101,11 +102,13 @@ class CheckoutSession(SafetyClient):
     def drive(self, requested: Twist, seconds: float) -> int | None:
         """Request a motion, then zero until the vehicle stands.
 
-        Return the time at which zero was first requested; None if safety did not grant motion.
+        Return the time at which zero was first requested; None if safety did not grant motion, or
+        has latched before.
         """
         try:
             self.requested = request()
-            if not self.until(self._is_granted, READY_S):
+            self.until(lambda: self.latched() or self._is_granted(), READY_S)
+            if self.latched() or not self._is_granted():
                 return None
             self.requested = request(requested.linear, requested.angular)
             self.until(lambda: self._must_stop(requested), seconds)

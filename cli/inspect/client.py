@@ -1,7 +1,8 @@
 """Client of safety for a tool: the state machines of ``common.client`` on a probe.
 
 Everything runs in the tool's own thread: messages are taken and the drive request of each tick is
-sent only inside ``until``. While a tool waits for its user nothing is sent, which is a release.
+sent only inside ``until``. While a tool waits for its user nothing is sent, which is a release, and
+messages queue up: ``until`` takes all of them before it judges, and ``fresh_state`` none.
 """
 
 import secrets
@@ -22,6 +23,7 @@ from common.bus.publisher import host_id
 from common.client import DriveRequests, EstopRepetition, EstopStep, ResetCheck
 from common.codec import Sample
 from common.errors import RobotError
+from common.freshness import NS_PER_S
 from common.keys import Call, Topic
 from common.messages import Drive, Event, ResetDone, SafetyState, SourceMessage
 
@@ -37,6 +39,7 @@ class SafetyClient:
         self.probe = probe
         self.robot = robot
         self.states: dict[str, SafetyState] = {}  # the newest by robot
+        self._received_ns: dict[str, int] = {}
         self.requested: Drive | None = None  # sent on each tick, with its neutral requests
         self._source = source
         self._drive = DriveRequests()
@@ -51,14 +54,24 @@ class SafetyClient:
         """The newest state of the robot."""
         return self.states.get(self.robot)
 
+    def is_silent(self, seconds: float) -> bool:
+        """Return whether no state of the robot has arrived for so long, or none at all."""
+        received_ns = self._received_ns.get(self.robot)
+        return received_ns is None or clock.now_ns() - received_ns > seconds * NS_PER_S
+
     def until(self, condition: Callable[[], object], timeout_s: float) -> bool:
-        """Receive and tick until the condition holds or the timeout expires; return which."""
+        """Receive and tick until the condition holds or the timeout expires; return which.
+
+        The condition sees what has arrived, not what was queued first.
+        """
         end_s = time.monotonic() + timeout_s
         while True:
             now_s = time.monotonic()
             if now_s >= self._due_s:
                 self._due_s = now_s + TICK_S
                 self.tick()
+            for queued in self.probe.queued():
+                self.receive(queued)
             if condition():
                 return True
             if now_s >= end_s:
@@ -71,7 +84,7 @@ class SafetyClient:
         robot, path = chunks(sample.key)
         if path == keys.SAFETY.path:
             for state in decoded([sample], SafetyState):
-                self.states[robot] = state
+                self.states[robot], self._received_ns[robot] = state, sample.received_ns
 
     def tick(self) -> None:
         """Send what is due."""
@@ -109,7 +122,7 @@ class SafetyClient:
         ``seconds`` replaces the 3 s after which it counts as not confirmed.
         """
         ticks = None if seconds is None else max(1, round(seconds / TICK_S))
-        self.states.clear()  # only a state from now on counts
+        self.forget()
         self._stops = {robot: EstopRepetition() for robot in robots}
         for stop in self._stops.values():
             stop.start(None, ticks)
@@ -119,9 +132,14 @@ class SafetyClient:
             self.until(lambda: False, TICK_S)
         return {robot for robot, state in self.states.items() if "estop" in state.latched}
 
+    def forget(self) -> None:
+        """Discard what has arrived: only states that arrive from now on count."""
+        self.probe.discard()
+        self.states.clear()
+
     def fresh_state(self) -> SafetyState:
         """Return a state that arrives from now on; raise ``RobotError`` without one."""
-        self.states.clear()
+        self.forget()
         if not self.until(lambda: self.state, STATE_S) or self.state is None:
             raise RobotError(
                 f"no state of safety within {STATE_S:g} s: is safety running? run `t2 doctor`"

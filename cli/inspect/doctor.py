@@ -164,6 +164,8 @@ def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Obse
         seen.may_call = opened.has_server(keys.RESET.on(robot))
         is_fleet = common_name(bus).startswith("fleet.")  # it may stop, and nothing else
         seen.may_stop = is_fleet or seen.may_drive or not is_barred(opened, robot)
+    for sample in opened.queued():  # the queries take seconds: judge what has arrived meanwhile
+        add_sample(sample, seen)
     return seen
 
 

@@ -45,9 +45,6 @@ def run(options: argparse.Namespace) -> int:
                 show(sample, session.robot, options)
                 if options.once:
                     break
-        left_out = session.probe.left_out
-    if left_out:
-        output.warn(f"t2 echo: {left_out} messages dropped: output too slow")
     if not shown:
         within = f" within {duration_s:g} s" if duration_s else ""
         raise RobotError(f"no message on {wanted}{within}; `t2 ls` lists the active keys")

@@ -33,6 +33,8 @@ from common.text import printable
 RETRY_S = 0.2  # without a router
 KEEPALIVE_S = 0.1
 SWITCH = "USE THE VEHICLE'S OWN SWITCH"
+SILENT_S = 2.5  # without a state of safety, which over a thin uplink may have 1 Hz
+SILENT = f"NOT KNOWN  no state of safety for {SILENT_S:g} s: {SWITCH} if the robot moves"
 BARRED = "A driver of this robot releases it (R in `t2 drive`): this program may not reset."
 MOVES = ("bridge", "safety")  # a robot without these services cannot move
 
@@ -202,7 +204,8 @@ def follow(client: SafetyClient, name: str, user: str) -> None:
     watched: list[TextIO] = [sys.stdin] if sys.stdin else []  # closed in some supervisors
     while True:
         client.put(keys.ESTOP_KEEPALIVE, EstopKeepalive(echo=0))
-        if client.state and (line := described(client.state, name)) != shown:
+        state = None if client.is_silent(SILENT_S) else client.state
+        if (line := described(state, name) if state else SILENT) != shown:
             print(line, flush=True)
             shown = line
         if select.select(watched, [], [], 0)[0]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
+from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT, chunks, parse_site
 from common import codec, keys
 from common.bus.probe import Answer, Probe, probe
@@ -86,12 +87,17 @@ def settings(options: argparse.Namespace) -> Shared:
 
 @contextmanager
 def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
-    """Open a bus session for the context; raise ``LinkError`` without a router."""
+    """Open a bus session for the context; raise ``LinkError`` without a router.
+
+    Warn of messages that were dropped because the command read too slowly.
+    """
     config = settings(options)
     several = options.robot and "*" in options.robot
     with probe(config.bus) as opened:
         robot = options.robot if several else config.robot.id
         yield BusSession(opened, robot, operator_name(config.bus))
+        if opened.left_out:
+            output.warn(f"t2: {opened.left_out} messages dropped, the oldest: read too slowly")
 
 
 def services(opened: Probe, robot: str, service: str = "*") -> list[tuple[str, str]]:

@@ -24,7 +24,7 @@ from common.keys import ClassOfService
 from common.settings import BusSettings
 
 MATCH_TIMEOUT_S = 1.0  # until the router has reported matching declarations
-QUEUE_MAX = 20_000  # samples queued for a slow reader; newer ones are dropped
+QUEUE_MAX = 20_000  # samples queued for a slow reader; the oldest ones are dropped
 POLL_PERIOD_S = 0.02
 
 
@@ -43,7 +43,7 @@ class Probe:
 
     def __init__(self, session: zenoh.Session) -> None:
         self.zid = str(session.zid())
-        self.left_out = 0
+        self.left_out = 0  # samples dropped from the full queue
         self._session = session
         self._samples: queue.SimpleQueue[Sample] = queue.SimpleQueue()
         self._declared: list[Any] = []  # references keep them alive
@@ -65,6 +65,17 @@ class Probe:
             return self._samples.get(timeout=max(0.0, wait_s))
         except queue.Empty:
             return None
+
+    def queued(self) -> Iterator[Sample]:
+        """Yield the samples that are queued now, without those that arrive meanwhile."""
+        for _ in range(self._samples.qsize()):
+            if sample := self.take(0.0):
+                yield sample
+
+    def discard(self) -> None:
+        """Drop the samples that are queued now: what is taken next was received after this."""
+        for _ in self.queued():
+            pass
 
     def samples(self, seconds: float | None = None) -> Iterator[Sample]:
         """Yield samples, for ``seconds`` or without end."""
@@ -115,9 +126,8 @@ class Probe:
 
     def _queue(self, sample: zenoh.Sample) -> None:
         received_ns, wall_ns = clock.now_ns(), time.time_ns()
-        if self._samples.qsize() >= QUEUE_MAX:
+        if self._samples.qsize() >= QUEUE_MAX and self.take(0.0):
             self.left_out += 1
-            return
         self._samples.put(copied(sample, received_ns, wall_ns))
 
 

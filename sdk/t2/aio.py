@@ -133,6 +133,11 @@ class AsyncStream(Generic[M]):
         """The number of messages that do not have the topic's type."""
         return self.twin.invalid
 
+    @property
+    def dropped(self) -> int:
+        """The number of messages that slow readers have not read in time."""
+        return self.twin.dropped
+
     async def latest(self, timeout: float = 1.0) -> M:
         """Return the newest message as ``Stream.latest`` does."""
         return await asyncio.to_thread(self.twin.latest, timeout)

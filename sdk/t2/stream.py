@@ -40,7 +40,8 @@ class Stream(Generic[M]):
     """The messages of a topic; subscribed on first use.
 
     ``for`` yields each new message until the robot is closed; ``depth`` messages wait for a slow
-    reader, older ones are dropped. ``invalid`` counts messages that do not have the topic's type.
+    reader, older ones are dropped and counted in ``dropped``. ``invalid`` counts messages that do
+    not have the topic's type.
 
     >>> robot.odometry.latest(timeout=1.0).epoch >= 0
     True
@@ -57,6 +58,7 @@ class Stream(Generic[M]):
     ) -> None:
         self.key: str = key
         self.invalid: int = 0
+        self.dropped: int = 0
         self._session = session
         self._decoder: msgspec.msgpack.Decoder[M] = msgspec.msgpack.Decoder(kind)
         self._what = what
@@ -161,6 +163,7 @@ class Stream(Generic[M]):
         with self._changed:
             self._newest, self._received_s = message, time.monotonic()
             for queue in self._queues:
+                self.dropped += len(queue) == self.depth
                 queue.append(message)
             self._changed.notify_all()
 

@@ -76,6 +76,7 @@ def test_a_slow_reader_gets_the_newest_only_whatever_others_read(robot: Robot) -
         newest = robot.stream.after(kept, 20.0)
         assert newest is not None
         assert newest.linear == 19.0
+        assert robot.stream.dropped >= 19
 
 
 def test_a_handler_that_fails_is_called_again_until_the_robot_closes(
