@@ -27,7 +27,7 @@ class Recording:
     ``is_cut`` tells after an iteration that the file ends within a message, because its writer was
     killed or still writes, or is damaged there.
 
-    >>> for entry in t2.Recording("recordings/001-20260315-081530.mcap"):  # doctest: +SKIP
+    >>> for entry in t2.Recording("recordings/001-000042-20260315-081530.mcap"):  # doctest: +SKIP
     ...     if isinstance(entry.message, t2.messages.Odometry):
     ...         print(entry.time, entry.message.x)
     """

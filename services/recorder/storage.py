@@ -1,5 +1,9 @@
 """The recordings folder: file names, free space, and removal of old recordings.
 
+A name has robot, number, UTC and reason: ``001-000042-20260315-081530-latch-contact.mcap``. The
+number rises with each file, whatever the clock shows: it orders the files. Names of earlier
+versions have none, and come before all that have one.
+
 Continuous recordings are removed first, then incidents, the oldest of each first. The newest
 recording of each kind is kept, and so are the recorder's latest files and those that are marked.
 Files that the recorder did not name itself are never removed.
@@ -21,7 +25,9 @@ MB = 1_000_000
 HYSTERESIS = 1.1  # factor on the free space that is required before recording continues
 RETRY_NS = 10 * NS_PER_S  # after a disk error
 KEEP = ".keep"  # FILE.mcap.keep beside FILE.mcap marks it as kept
-NAME = re.compile(r"(\d{8}-\d{6})(-latch-.+?)?(?:-(\d+))?\.mcap")
+STAMP = r"\d{8}-\d{6}"
+NAME = re.compile(rf"(\d{{6,9}})-{STAMP}(-latch-.+)?\.mcap")
+UNNUMBERED = re.compile(rf"({STAMP})(-latch-.+?)?(?:-(\d+))?\.mcap")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,20 +37,27 @@ class StoredFile:
     name: str
     size: int  # bytes
     kept: bool = False  # marked, or the recorder's latest
+    written_ns: int = 0  # last time, on the wall clock: orders files without a number
 
 
 def removable(files: Iterable[StoredFile], robot: str) -> list[StoredFile]:
     """Return the files that may be removed, in the order of their removal."""
-    dated = []
-    for file in files:
-        prefix, name = file.name[: len(robot) + 1], file.name[len(robot) + 1 :]
-        match = NAME.fullmatch(name) if prefix == f"{robot}-" else None
-        if match:
-            stamp, latch, number = match.groups()
-            dated.append((bool(latch), stamp, int(number or 0), file.name, file))
-    dated.sort(key=lambda each: each[:4])
-    kinds = [[each[-1] for each in dated if each[0] is incident] for incident in (False, True)]
+    found = [(order, file) for file in files if (order := _order(file, robot))]
+    found.sort(key=lambda each: each[0])
+    kinds = [[file for order, file in found if order[0] is incident] for incident in (False, True)]
     return [file for kind in kinds for file in kind[:-1] if not file.kept]
+
+
+def _order(file: StoredFile, robot: str) -> tuple[bool, int, int, str, int, str] | None:
+    """Return whether it is an incident, and its place in time; None for a foreign name."""
+    name = file.name.removeprefix(f"{robot}-")
+    if name == file.name:
+        return None
+    if match := NAME.fullmatch(name):
+        return bool(match[2]), int(match[1]), 0, "", 0, name
+    if match := UNNUMBERED.fullmatch(name):
+        return bool(match[2]), -1, file.written_ns, match[1], int(match[3] or 0), name
+    return None
 
 
 def to_remove(
@@ -91,6 +104,7 @@ class Storage:
         self._free = free
         self._refused_ns: int | None = None
         self._robot = robot
+        self._number = 0  # of the newest file of this process
         self._latest: dict[bool, Path] = {}  # of this process: continuous, and incident
 
     def check(self, now_ns: int) -> list[StoredFile]:
@@ -125,12 +139,13 @@ class Storage:
         self.problem = f"{self.folder}: {error.strerror or error}"
 
     def new_path(self, robot: str, wall_ns: int, reason: str = "") -> Path:
-        """Return an unused path, named by robot, UTC and reason."""
+        """Return an unused path, named by robot, number, UTC and reason."""
         stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(wall_ns / NS_PER_S))
-        stem = "-".join(part for part in (robot, stamp, reason) if part)
-        names = (f"{stem}{f'-{n}' if n else ''}.mcap" for n in range(1_000_000))
-        path = next(path for path in (self.folder / name for name in names) if not path.exists())
-        self._latest[bool(reason)] = path
+        names = (path.name.removeprefix(f"{robot}-") for path in self.folder.glob("*.mcap"))
+        taken = [int(match[1]) for match in map(NAME.fullmatch, names) if match]
+        self._number = max((*taken, self._number)) + 1
+        stem = "-".join(part for part in (robot, f"{self._number:06d}", stamp, reason) if part)
+        path = self._latest[bool(reason)] = self.folder / f"{stem}.mcap"
         return path
 
     def _make_room(self, robot: str, left: float) -> list[StoredFile]:
@@ -148,4 +163,5 @@ class Storage:
             with contextlib.suppress(OSError):  # removed meanwhile, or not readable
                 marked = path.with_name(path.name + KEEP).exists()
                 kept = marked or path in self._latest.values() or in_use(path)
-                yield StoredFile(path.name, path.stat().st_size, kept)
+                about = path.stat()
+                yield StoredFile(path.name, about.st_size, kept, about.st_mtime_ns)

@@ -16,7 +16,8 @@ from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, MONO_NS, sample
 
 SPAN_NS, TAIL_NS = 10 * NS_PER_S, 2 * NS_PER_S  # of the black box
-OLD, MIDDLE, NEW = "001-20260101-000000", "001-20260201-000000", "001-20260301-000000"
+OLD, MIDDLE, NEW = (f"001-00000{n}-2026010{4 - n}-000000" for n in (1, 2, 3))  # the clock fell back
+UNNUMBERED = "001-20260101-000000"  # a name of an earlier version
 CONTINUOUS = [f"{stamp}.mcap" for stamp in (OLD, MIDDLE, NEW)]
 INCIDENTS = [f"{stamp}-latch-contact.mcap" for stamp in (OLD, MIDDLE, NEW)]
 
