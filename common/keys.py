@@ -130,6 +130,10 @@ ESTOP_KEEPALIVE = Topic(
 )
 MOTION = Topic("@cmd/motion", m.Motion, 50, COMMAND, "safety", "the motion that safety allows")
 
+# The services that make a robot, in the order of a request: others run on laptops, too, under the
+# name of any robot.
+ON_BOARD = ("safety", "bridge", "odom")
+
 # Any PUT or DELETE on it, with any payload or none, stops the robot and latches.
 ESTOP_PATH = "estop"
 

@@ -77,6 +77,7 @@ def _keys() -> str:
     ]
     return (
         f'\n\n# --- keys {"-" * 83}\n\nROOT = "{keys.ROOT}"\n\n'
-        "# By name: the path below the robot, and the type of the message.\n"
+        f"# The services that make a robot.\nON_BOARD = {keys.ON_BOARD!r}\n\n".replace("'", '"')
+        + "# By name: the path below the robot, and the type of the message.\n"
         "TOPICS: dict[str, tuple[str, type[Message]]] = {\n" + "".join(rows) + "}\n"
     )

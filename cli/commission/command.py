@@ -11,7 +11,6 @@ from cli.commission import stop_command
 from cli.commission.report import Report, Row, Verdict, render
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
-from cli.inspect.diagnosis import NEEDED
 from cli.inspect.session import one_robot, robot_sources
 from cli.settings import Everything
 from common import keys
@@ -134,7 +133,7 @@ def now() -> str:
 def versions(session: CheckoutSession) -> list[Row]:
     """Return the version of each service that publishes health."""
     health = session.of(keys.HEALTH)
-    session.until(lambda: {one.value.service for one in health} >= set(NEEDED), HEALTH_S)
+    session.until(lambda: {one.value.service for one in health} >= set(keys.ON_BOARD), HEALTH_S)
     found = {one.value.service: one.value.version for one in health}
     return [(f"T2 of {service}", version) for service, version in sorted(found.items())]
 

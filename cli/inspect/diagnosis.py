@@ -15,7 +15,6 @@ from common.root_cause import FROM_LINK
 
 Level = Literal["ok", "note", "wrong", "unknown"]
 
-NEEDED = ("safety", "bridge", "odom")  # in the order of a request
 STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOMETRY)
 # Safety's causes that follow from a stream that is not sent.
 ANY_STREAM = ("starting", "silent")
@@ -157,17 +156,17 @@ def diagnose(seen: Observation, name: str) -> Iterator[Finding]:
 
 def services(seen: Observation) -> Iterator[Finding]:
     """Report services that are missing, duplicate or hang."""
-    absent = [name for name in NEEDED if name not in seen.instances]
+    absent = [name for name in keys.ON_BOARD if name not in seen.instances]
     names = f"{', '.join(absent)} {'is' if len(absent) == 1 else 'are'}"
     if absent and seen.listed:
         yield Finding("services", "wrong", f"{names} not running", START)
     elif absent:
         text = f"{names} perhaps running: the router did not list the services in time"
         yield Finding("services", "unknown", text)
-    present = [name for name in NEEDED if name in seen.instances]
-    for name in (*present, *sorted(seen.instances.keys() - NEEDED)):
+    present = [name for name in keys.ON_BOARD if name in seen.instances]
+    for name in (*present, *sorted(seen.instances.keys() - keys.ON_BOARD)):
         count, health = seen.instances[name], seen.healths.get(name)
-        if count > 1 and name in NEEDED:
+        if count > 1 and name in keys.ON_BOARD:
             todo = "stop one of them: a robot has one of each; look for a second `t2 up`"
             yield Finding("services", "wrong", f"{name} is running {count} times", todo)
         elif not health and seen.rates:  # without any message see the rights

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
-from cli.inspect.diagnosis import NEEDED, Finding, Observation, diagnose
+from cli.inspect.diagnosis import Finding, Observation, diagnose
 from cli.inspect.estop import is_barred
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
 from common import keys
@@ -154,7 +154,7 @@ def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Obse
     except LinkError:
         seen.listed = False
         seen.instances = dict.fromkeys(seen.healths, 1)
-    on_board = {name for name, service in running if service in NEEDED}
+    on_board = {name for name, service in running if service in keys.ON_BOARD}
     seen.others = sorted(on_board - {robot})
     if seen.listed and not running and not seen.rates:
         # The rules allow all members to query the admin space, and nothing to anybody else.

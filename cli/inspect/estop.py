@@ -136,7 +136,8 @@ def insist(client: SafetyClient, missing: set[str], end_s: float) -> set[str]:
 
 def is_elsewhere(probe: Probe, robot: str) -> bool:
     """Return whether the robot is not at this router; warn of it, or of a missing right."""
-    present = sorted({name for name, _ in services(probe, "*")})
+    running = services(probe, "*")
+    present = sorted({name for name, service in running if service in keys.ON_BOARD})
     if present and robot not in present:
         seen = ", ".join(present)
         output.warn(

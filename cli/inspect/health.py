@@ -11,7 +11,6 @@ import msgspec
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks, decode
-from cli.inspect.diagnosis import NEEDED
 from cli.inspect.session import BusSession, add_options, open_session, services
 from common import keys
 from common.errors import MessageError
@@ -71,8 +70,11 @@ def listen(session: BusSession, service: str | None) -> list[Row]:
         if (session.robot, service) in newest:
             break
     alive = {*services(session.probe, session.robot, service or "*")}
-    robots = {robot for robot, _ in newest.keys() | alive} or {session.robot}
-    needed = {(robot, name) for robot in robots for name in ([service] if service else NEEDED)}
+    found = {robot for robot, name in newest.keys() | alive if name in keys.ON_BOARD}
+    robots = found or {session.robot}
+    needed = {
+        (robot, name) for robot in robots for name in ([service] if service else keys.ON_BOARD)
+    }
     return [
         {
             "robot": each[0],

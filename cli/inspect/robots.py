@@ -1,6 +1,6 @@
 """``t2 robots``: robots on the bus with services, safety verdict and driving source.
 
-Liveliness tokens list the robots; safety's newest state gives the verdict.
+Tokens of a robot's own services list the robots; safety's newest state gives the verdict.
 """
 
 import argparse
@@ -10,8 +10,8 @@ from typing import Any
 from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT
 from cli.inspect.client import SafetyClient
-from cli.inspect.estop import MOVES
 from cli.inspect.session import add_options, open_session, services
+from common import keys
 from common.errors import RobotError
 from common.messages import SafetyState
 
@@ -26,11 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """List the robots; return 1 if one that moves has no safety state."""
     options.robot = options.robot or EVERY_ROBOT
-    found: defaultdict[str, set[str]] = defaultdict(set)
+    running: defaultdict[str, set[str]] = defaultdict(set)
     with open_session(options) as session:
         client = SafetyClient(session.probe, session.robot)
         for name, service in services(session.probe, session.robot):
-            found[name].add(service)
+            running[name].add(service)
+        found = {name: has for name, has in running.items() if not has.isdisjoint(keys.ON_BOARD)}
         supervised = {name for name, has in found.items() if "safety" in has}
         client.until(lambda: client.states.keys() >= supervised, LISTEN_S)
     if not found:
@@ -46,8 +47,8 @@ def row(name: str, services: set[str], state: SafetyState | None) -> dict[str, A
         verdict: str = state.verdict
     elif "safety" in services:
         verdict = "silent"
-    else:  # a laptop's service under a robot's name cannot move
-        verdict = "-" if services.isdisjoint(MOVES) else "no safety"
+    else:
+        verdict = "no safety"
     return {
         "robot": name,
         "services": sorted(services),

@@ -381,6 +381,9 @@ class ResetDone(Done, frozen=True, kw_only=True):
 
 ROOT = "t2/v1"
 
+# The services that make a robot.
+ON_BOARD = ("safety", "bridge", "odom")
+
 # By name: the path below the robot, and the type of the message.
 TOPICS: dict[str, tuple[str, type[Message]]] = {
     "velocity": ("tel/bridge/velocity", Velocity),

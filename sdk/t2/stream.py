@@ -13,7 +13,7 @@ import msgspec
 import zenoh
 
 from t2.errors import LinkError, NoData
-from t2.messages import ROOT, Message
+from t2.messages import ON_BOARD, ROOT, Message
 
 M = TypeVar("M", bound=Message)
 
@@ -25,9 +25,10 @@ CONNECTED = set[int]()  # this process, or the one that it was forked from, once
 
 
 def robots_of(session: zenoh.Session) -> list[str]:
-    """Return the ids of the robots with a running service."""
-    tokens = session.liveliness().get(f"{ROOT}/*/live/**", timeout=LIVE_S)
-    return sorted({str(it.ok.key_expr).split("/")[2] for it in tokens if it.ok is not None})
+    """Return the ids of the robots of which a service on board runs; laptops have some, too."""
+    tokens = session.liveliness().get(f"{ROOT}/*/live/*/*", timeout=LIVE_S)
+    keys = [str(it.ok.key_expr).split("/") for it in tokens if it.ok is not None]
+    return sorted({key[2] for key in keys if key[4] in ON_BOARD})
 
 
 def check_process() -> None:

@@ -109,9 +109,9 @@ class Fleet:
         threading.Thread(target=page.robot.bus.close, name=f"close {name}").start()
 
     def _note_alive(self, key: str, alive: bool) -> None:
-        robot = key.split("/")[2]
-        if not re.match(ROBOT, robot):
-            return  # it can have no page
+        robot, _, service = key.split("/")[2:5]
+        if service not in keys.ON_BOARD or not re.match(ROBOT, robot):
+            return  # a laptop's service, or a robot that can have no page
         tokens = self._alive.setdefault(robot, set())
         (tokens.add if alive else tokens.discard)(key)
         if not tokens and len(self._alive) > KNOWN_MAX and robot != self._node.config.robot.id:

@@ -14,7 +14,6 @@ from common.messages import Event
 
 FRESH_S = 3.0  # a value is exported for so long: the slowest streams have 1 Hz
 EXPIRY_S = 24 * 3600.0  # until an absent robot is removed: fleets change
-EXPECTED = ("bridge", "safety", "odom")  # needed to drive: exported even if never seen
 EVENT_NAMES_MAX = 500  # further names count as "other": this bounds the memory
 
 
@@ -23,8 +22,8 @@ class RobotState:
     """Everything received from one robot; paths are those below it, as ``tel/bridge/link``."""
 
     messages: dict[str, Latest[Any]] = field(default_factory=dict)  # by path
-    instances: dict[str, set[str]] = field(  # by liveliness, of each service
-        default_factory=lambda: {name: set() for name in EXPECTED}
+    instances: dict[str, set[str]] = field(  # by liveliness, of each service, seen or not
+        default_factory=lambda: {name: set() for name in keys.ON_BOARD}
     )
     events: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     is_robot: bool = False  # a robot's own service was seen, not only a laptop with its id
@@ -57,7 +56,7 @@ class RobotState:
 
     def is_up(self, now_ns: int) -> bool:
         """Return whether the robot itself is alive; a laptop with its id does not count."""
-        own = (path for path in self.messages if path.split("/")[1] in EXPECTED)
+        own = (path for path in self.messages if path.split("/")[1] in keys.ON_BOARD)
         return any(self.fresh(path, now_ns) for path in own)
 
     def is_healthy(self, service: str, now_ns: int) -> bool:
@@ -71,7 +70,7 @@ class RobotState:
 
     def _seen(self, service: str, now_ns: int) -> None:
         self.seen_ns = now_ns
-        self.is_robot = self.is_robot or service in EXPECTED
+        self.is_robot = self.is_robot or service in keys.ON_BOARD
 
 
 def prune(robots: dict[str, RobotState], own: str, now_ns: int) -> None:

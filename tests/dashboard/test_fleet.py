@@ -52,9 +52,9 @@ def fleet(sent: list[Sent]) -> Fleet:
     return fleet
 
 
-def note_alive(fleet: Fleet, robot: str, alive: bool) -> None:
+def note_alive(fleet: Fleet, robot: str, alive: bool, service: str = "safety") -> None:
     _, note = fleet._node.bus.watch_live.call_args.args  # type: ignore[attr-defined]
-    note(keys.live_key(robot, "safety", "1"), alive)
+    note(keys.live_key(robot, service, "1"), alive)
 
 
 def subscriptions(bus: Mock) -> dict[str, Callable[[Arrival[Any]], None]]:
@@ -70,8 +70,10 @@ def test_a_robot_is_known_by_the_settings_alive_before_or_shown(
     for alive in (True, False):
         note_alive(fleet, "002", alive)
         note_alive(fleet, "two words", alive)
+        note_alive(fleet, "999", alive, "dashboard")
     assert fleet.knows("002")
     assert not fleet.knows("two words")
+    assert not fleet.knows("999")  # a laptop's dashboard for it
     fleet.join("003", "1")
     assert fleet.knows("003")
     fleet.leave("003", "1")

@@ -144,7 +144,10 @@ def test_an_id_may_be_left_out_with_one_robot(endpoint: str) -> None:
     with zenoh.open(client_config(at(endpoint))) as session:
         with pytest.raises(t2.LinkError, match="has no robot: name one"):
             t2.connect(endpoint=endpoint)
-        tokens = [session.liveliness().declare_token("t2/v1/007/live/bridge/1")]
+        others = ("999/live/dashboard/1", "998/live/teleop/1", "997/live/recorder/1", "996/live/x")
+        tokens = [session.liveliness().declare_token(f"t2/v1/{each}") for each in others]
+        assert t2.robots(endpoint) == []
+        tokens.append(session.liveliness().declare_token("t2/v1/007/live/bridge/1"))
         wait_until(lambda: t2.robots(endpoint) == ["007"], "the robot")
         with t2.connect(endpoint=endpoint) as robot:
             assert robot.name == "007"

@@ -38,8 +38,9 @@ def state(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
 def seen(**given: Any) -> Observation:
     """Return the observation of a healthy robot, with the given differences."""
     healthy: dict[str, Any] = {
-        "t2": "0.1.0", "instances": dict.fromkeys(d.NEEDED, 1), "may_drive": True, "may_call": True,
-        "healths": {name: health(name) for name in d.NEEDED}, "links": [link()],
+        "t2": "0.1.0", "instances": dict.fromkeys(keys.ON_BOARD, 1),
+        "may_drive": True, "may_call": True,
+        "healths": {name: health(name) for name in keys.ON_BOARD}, "links": [link()],
         "state": state("no_request"), "delays_s": [0.01, 0.02], "rates": RATES,
     }  # fmt: skip
     return Observation(**(healthy | given))
@@ -131,7 +132,7 @@ def test_problems(given: dict[str, Any], expected: list[tuple[str, str, str]]) -
 
 def without(*services: str) -> dict[str, Any]:
     """Return instances and healths without these services."""
-    names = [name for name in d.NEEDED if name not in services]
+    names = [name for name in keys.ON_BOARD if name not in services]
     return {"instances": dict.fromkeys(names, 1), "healths": {n: health(n) for n in names}}
 
 
@@ -142,7 +143,7 @@ STOPPED = {"rates": {"tel/bridge/link": 10.0}, "state": state("no_request", *FRO
     ("given", "problem", "remedy"),
     [
         (without("bridge") | STOPPED | {"links": []}, "bridge is not running", d.START),
-        ({"instances": dict.fromkeys(d.NEEDED, 1), "healths": without("bridge")["healths"],
+        ({"instances": dict.fromkeys(keys.ON_BOARD, 1), "healths": without("bridge")["healths"],
           "links": [], **STOPPED}, "bridge is running and publishes no health: it hangs", None),
         (STOPPED | {"links": [link("lost")]}, "the board at 10.7.5.224:4002 is", d.BOARD_LOST),
         (STOPPED | {"links": [link("never")]}, "no frame received from the board", None),
@@ -182,7 +183,7 @@ def test_services_that_the_router_did_not_list_are_unknown() -> None:
 
 
 def test_without_messages_the_rest_is_unknown() -> None:
-    nothing = Observation(t2="1", instances=dict.fromkeys(d.NEEDED, 1), rates={"x": 1.0})
+    nothing = Observation(t2="1", instances=dict.fromkeys(keys.ON_BOARD, 1), rates={"x": 1.0})
     levels = {each.where: each.level for each in diagnose(nothing, "001")}
     assert (levels["link"], levels["safety"]) == ("unknown", "unknown")
 

@@ -207,13 +207,17 @@ def test_list_of_robots(join: Join, t2: Tool) -> None:
 
 def test_silent_robots_are_listed(join: Join, t2: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(robots, "LISTEN_S", 0.3)
-    for name, service in (("a", "safety"), ("b", "bridge"), ("c", "dashboard")):
+    for name, service in (("a", "safety"), ("b", "bridge"), ("c", "odom"), ("d", "dashboard")):
         pretend(join(name), service, {})
     result = t2("robots")
     assert result.code == 1
     verdicts = {line["robot"]: line["verdict"] for line in result.lines}
-    assert verdicts == {"a": "silent", "b": "no safety", "c": "-"}
-    for command in ("robots", "estop"):
-        result = t2(command, "--site", "nowhere")
+    assert verdicts == {"a": "silent", "b": "no safety", "c": "no safety"}
+    for command, words in (
+        ("robots", ("--site", "nowhere")),
+        ("estop", ("--site", "nowhere")),
+        ("robots", ("--robot", "d")),
+    ):
+        result = t2(command, *words)
         assert (result.code, result.out) == (1, "")
         assert "no robot found" in result.err
