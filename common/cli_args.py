@@ -13,6 +13,7 @@ from pathlib import Path
 from common.config import DEFAULT_FILE, Sources
 from common.errors import ConfigError, LinkError, RobotError
 from common.text import printable
+from common.text_file import expanded
 
 # As in `pyproject.toml`; reading it from the installed package's metadata takes 20 ms.
 VERSION = "0.1.0"
@@ -36,10 +37,15 @@ def arguments(name: str) -> argparse.ArgumentParser:
     return parser
 
 
+def file_path(text: str) -> Path:
+    """Parse a path; a shell does not expand ``~`` in ``--config=~/FILE``."""
+    return Path(expanded(text))
+
+
 def add_sources(parser: argparse.ArgumentParser) -> None:
     """Add the options that name sources of settings."""
     parser.add_argument(
-        "--config", action="append", type=Path, metavar="FILE", default=None,
+        "--config", action="append", type=file_path, metavar="FILE", default=None,
         help="TOML file on top of config/t2.toml and of those in T2_CONFIG (FILE:FILE...); may be "
         "repeated, the last one wins",
     )  # fmt: skip
@@ -51,7 +57,11 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 
 def sources(options: argparse.Namespace) -> Sources:
     """Return the sources of settings named by the environment and the options."""
-    named = map(Path, filter(None, os.environ.get(FILES_ENV, "").split(os.pathsep)))
+    try:
+        words = filter(None, os.environ.get(FILES_ENV, "").split(os.pathsep))
+        named = list(map(file_path, words))
+    except ValueError as error:
+        raise ConfigError(f"environment {FILES_ENV}: {error}") from None
     return Sources(files=(DEFAULT_FILE, *named, *(options.config or ())), sets=options.sets)
 
 

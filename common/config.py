@@ -4,7 +4,7 @@ A setting is named by its path, ``board.port``. Sources in order of precedence, 
 files, environment (``T2__BOARD__PORT``, in any case), ``--set board.port=4002``. Tables are merged
 across sources. Sections of other services are ignored; unknown sections and fields are refused,
 because a misspelt setting would be lost silently. A certificate's file name is relative to the
-settings file that contains it.
+settings file that contains it. ``~`` in a path is the home folder, in every source.
 """
 
 import difflib
@@ -20,6 +20,7 @@ from msgspec import Struct
 
 from common.errors import ConfigError
 from common.removed_settings import REMOVED
+from common.text_file import expanded, read_text, typographic
 
 C = TypeVar("C", bound=Struct)
 
@@ -29,6 +30,12 @@ DEFAULT = "default"  # the origin of a setting that no source names
 
 # File names that are relative to the settings file: a folder with certificates can be moved.
 FILE_SETTINGS = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
+
+PATHS = (*FILE_SETTINGS, "dashboard.token_file", "dashboard.certificate", "dashboard.private_key",
+         "recorder.folder", "sim.world")  # fmt: skip
+ENDPOINTS = ("bus.listen", "bus.connect", "bus.uplink", "bus.drive")
+SOCKET = "unixsock-stream/"  # before the path in an endpoint
+QUOTES = tuple("\"'\u2018\u2019\u201c\u201d\u201e\u00ab")
 
 # Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
@@ -100,11 +107,16 @@ def flatten(value: Any, path: str = "") -> Iterable[tuple[str, Any]]:
 def read_toml(file: Path, shown: str) -> dict[str, Any]:
     """Read a file; raise ``ConfigError`` that calls it ``shown``."""
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        text = read_text(file)
     except OSError as error:
         raise ConfigError(f"{shown}: cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # TOML, UTF-8, or a number of too many digits
-        raise ConfigError(f"{shown}: is no TOML: {error}") from None
+    except ValueError as error:
+        raise ConfigError(f"{shown}: {error}") from None
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # TOML, or a number of too many digits
+        hint = f"; {found}" if (found := typographic(text)) else ""
+        raise ConfigError(f"{shown}: is no TOML: {error}{hint}") from None
 
 
 # --- sources ------------------------------------------------------------------------------------
@@ -154,6 +166,8 @@ def _from_text(root: type[Struct], path: str, text: str, origin: str) -> Given:
         value = [_toml(part.strip()) for part in text.split(",")] if text else []
     elif wanted is not str:
         value = _toml(text)
+    elif text.startswith(QUOTES):
+        value = _unquoted(text, origin)
     return _leaves(path, value, origin)
 
 
@@ -164,12 +178,35 @@ def _toml(text: str) -> Any:
         return text
 
 
+def _unquoted(text: str, origin: str) -> str:
+    """Return the text of a quoted value, which the shell has passed with its quotes."""
+    value = _toml(text)
+    if not isinstance(value, str) or value == text:
+        raise ConfigError(f"{origin}: the quotes do not enclose the value: write it without quotes")
+    return value
+
+
 def _leaves(path: str, value: Any, origin: str) -> Given:
     """Return every setting in a value; an empty table sets nothing."""
     try:
-        return {at: Setting(leaf, origin) for at, leaf in flatten(value, path) if leaf != {}}
+        leaves = [(at, leaf) for at, leaf in flatten(value, path) if leaf != {}]
     except RecursionError:
         raise ConfigError(f"{origin}: tables are nested too deep") from None
+    return {at: Setting(_with_home(at, leaf, origin), origin) for at, leaf in leaves}
+
+
+def _with_home(path: str, value: Any, origin: str) -> Any:
+    """Return a setting's value with ``~`` replaced in paths, and in paths of endpoints."""
+    if isinstance(value, list) and path in ENDPOINTS:
+        return [_with_home(path, each, origin) for each in value]
+    if not isinstance(value, str):
+        return value
+    try:
+        if path in ENDPOINTS and value.startswith(f"{SOCKET}~"):
+            return SOCKET + expanded(value.removeprefix(SOCKET))
+        return expanded(value) if path in PATHS else value
+    except ValueError as error:
+        raise ConfigError(f"{origin}: {path}: {error}") from None
 
 
 def _nest(settings: Given) -> dict[str, Any]:

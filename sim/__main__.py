@@ -12,7 +12,7 @@ from typing import BinaryIO
 import msgspec
 
 from common import clock, log, realtime
-from common.cli_args import add_sources, run_program, sources
+from common.cli_args import add_sources, file_path, run_program, sources
 from common.config import load
 from common.errors import ConfigError
 from common.freshness import NS_PER_S
@@ -89,7 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_profiles(parser)
     parser.add_argument("--list-profiles", action="store_true", help="list the profiles and end")
     parser.add_argument(
-        "--trace", type=Path, default=os.devnull, metavar="FILE", help="write a trace file"
+        "--trace", type=file_path, default=os.devnull, metavar="FILE", help="write a trace file"
     )
     add_sources(parser)
 

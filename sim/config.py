@@ -15,6 +15,7 @@ from msgspec import Meta, Struct
 from common.config import DEFAULT, Setting, build, flatten, read_toml
 from common.errors import ConfigError
 from common.settings import Board, Section, Shared, Vehicle, Wire
+from common.text_file import expanded
 from sim.geometry import Rectangle
 from sim.model import Model
 from sim.world import Plan, World
@@ -122,7 +123,10 @@ def _stems(folder: Path) -> list[str]:
 
 
 def _named(name: str, folder: Path) -> Path:
-    return Path(name) if name.endswith(".toml") else folder / f"{name}.toml"
+    try:
+        return Path(expanded(name)) if name.endswith(".toml") else folder / f"{name}.toml"
+    except ValueError as error:
+        raise ConfigError(str(error)) from None
 
 
 def _convert(table: dict[str, Any], kind: type[F], file: Path) -> F:

@@ -6,7 +6,7 @@ import textwrap
 from pathlib import Path
 from types import ModuleType
 
-from common import client, keys, messages
+from common import client, keys, messages, text_file
 from services.safety.core.causes import RULES
 
 ROOT = Path(__file__).parent.parent
@@ -33,6 +33,14 @@ from msgspec import Struct
 from t2.messages import Drive, ReleaseRequest, ResetDone, ResetRequest, SafetyState
 
 '''
+TEXT_HEAD = '''"""Files that people wrote; generated from ``common/text_file.py``, do not edit."""
+
+import codecs
+import re
+import unicodedata
+from pathlib import Path
+
+'''
 
 
 def generated() -> dict[Path, str]:
@@ -40,6 +48,7 @@ def generated() -> dict[Path, str]:
     return {
         SDK / "messages.py": f"{HEAD}\n{_named(_body(messages))}{_keys()}",
         SDK / "client.py": CLIENT_HEAD + _body(client),
+        SDK / "text_file.py": TEXT_HEAD + _body(text_file),
     }
 
 

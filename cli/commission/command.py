@@ -14,7 +14,7 @@ from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
 from cli.inspect.session import one_robot, robot_sources
 from cli.settings import Everything
 from common import keys
-from common.cli_args import VERSION, add_sources
+from common.cli_args import VERSION, add_sources, file_path
 from common.config import Loaded, load
 from common.errors import ConfigError, RobotError
 
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "files",
         metavar="RECORDING",
-        type=Path,
+        type=file_path,
         nargs="*",
         help="recordings (.mcap), directly after `stop`",
     )
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"run this step only; may be repeated: {', '.join(NAMES)}",
     )  # fmt: skip
     parser.add_argument(
-        "--report", type=Path, metavar="FILE", help="out/checkout-ROBOT-DATE.md by default"
+        "--report", type=file_path, metavar="FILE", help="out/checkout-ROBOT-DATE.md by default"
     )
     parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
     add_sources(parser)

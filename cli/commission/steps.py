@@ -54,10 +54,13 @@ def prompt(question: str) -> str:
         with suppress(termios.error):
             termios.tcflush(sys.stdin, termios.TCIFLUSH)
     print(question, end=" ", flush=True)
-    line = sys.stdin.readline()
+    try:
+        line = sys.stdin.readline()
+    except UnicodeDecodeError:
+        raise RobotError("standard input is no UTF-8: save the answers as UTF-8") from None
     if not line:
         raise RobotError("standard input has ended before all questions were answered")
-    return line.strip()
+    return line.removeprefix("\ufeff").strip()  # a file of answers may begin with a mark
 
 
 def confirm(fact: str, phrase: str) -> bool:

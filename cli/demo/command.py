@@ -17,7 +17,7 @@ from cli.run.supervisor import Supervisor
 from cli.run.up import commands
 from cli.settings import Everything
 from common import log
-from common.cli_args import add_sources, source_words, sources
+from common.cli_args import add_sources, file_path, source_words, sources
 from common.config import load
 from common.errors import ConfigError, LinkError, RobotError
 from sim.config import add_profiles, load_model, load_plan
@@ -34,7 +34,7 @@ SLOW = 0.5  # on a host with scheduling stalls: measurements are old when the pr
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "--out", type=Path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
+        "--out", type=file_path, default=Path("out"), metavar="DIR", help="for plot, trace and log"
     )
     add_profiles(parser)
     add_sources(parser)

@@ -29,6 +29,7 @@ from common.freshness import NS_PER_S
 from common.messages import Health, Link, SafetyState
 from common.settings import BusSettings, Shared
 from common.text import printable
+from common.text_file import pem_problem
 
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
 CONNECT_S = 2.0
@@ -124,6 +125,9 @@ def explain(error: OSError, host: str, protocol: str) -> tuple[str, str]:
 def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
     """Do a TLS handshake; return the problem, empty if both certificates are valid."""
     try:
+        for name in ("ca", "certificate", "private_key"):
+            if problem := pem_problem(Path(getattr(bus, name)).read_bytes()):
+                return f"bus.{name} {problem}"
         context = ssl.create_default_context(cafile=bus.ca)
         context.load_cert_chain(bus.certificate, bus.private_key)
     except OSError as error:  # the base class of SSLError

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from cli.keys import instructions, member_list
 from cli.keys.member_list import BOUND, CA_DAYS, DAY_S, DAYS, EARLY_S
 from cli.keys.members import OPERATORS_SOURCES, ROLES, Members, Profile
-from common.cli_args import needs_extra
+from common.cli_args import file_path, needs_extra
 from common.errors import ConfigError, RobotError
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def _verb(
 ) -> argparse.ArgumentParser:
     parser = verbs.add_parser(name, help=text, description=text)
     parser.add_argument(
-        "--folder", type=Path, default=FOLDER, help="folder of the CA; keys by default"
+        "--folder", type=file_path, default=FOLDER, help="folder of the CA; keys by default"
     )
     return parser
 

@@ -13,6 +13,7 @@ from msgspec import Struct
 
 from common.errors import ConfigError
 from common.settings import Name, SourceName
+from common.text_file import read_text
 
 Role = Literal["robot", "driver", "device", "viewer", "fleet", "site", "ros"]
 ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site", "ros")
@@ -63,8 +64,8 @@ class Members(Struct, frozen=True, kw_only=True):
 def read(file: Path) -> Members:
     """Read the list; raise ``ConfigError`` naming the file and the error."""
     try:
-        return msgspec.json.decode(file.read_bytes(), type=Members)
+        return msgspec.json.decode(read_text(file), type=Members)
     except OSError as error:
         raise ConfigError(f"{file}: cannot be read: {error.strerror}; `t2 keys` makes it") from None
-    except msgspec.DecodeError as error:  # a ValidationError is one, too
+    except ValueError as error:  # of the text, or of its JSON
         raise ConfigError(f"{file}: is no list of members: {error}") from None

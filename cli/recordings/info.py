@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from cli.inspect import output
 from cli.inspect.addressing import chunks
 from cli.recordings.timeline import Timeline
-from common.cli_args import needs_extra
+from common.cli_args import file_path, needs_extra
 from common.freshness import NS_PER_S
 from common.keys import ROOT
 from common.text import printable
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("files", metavar="FILE", type=Path, nargs="+")
+    parser.add_argument("files", metavar="FILE", type=file_path, nargs="+")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Collection
 from functools import cache
-from pathlib import Path
 
 from cli.inspect.addressing import EVERY_ROBOT, chunks, expression, parse_key, topic_of
 from cli.inspect.estop import MOVES
@@ -24,6 +23,7 @@ from cli.inspect.session import (
 from cli.recordings.info import open_recording
 from common import keys
 from common.bus.probe import intersects
+from common.cli_args import file_path
 from common.codec import Sample
 from common.errors import RobotError
 from common.freshness import NS_PER_S
@@ -33,7 +33,7 @@ CHECK_S = 1.0  # between two checks of the running services
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("file", metavar="FILE", type=Path)
+    parser.add_argument("file", metavar="FILE", type=file_path)
     parser.add_argument(
         "--only", metavar="KEY", action="append", default=[], type=parse_key,
         help="these keys, such as odometry or 'tel/**'; may be repeated",

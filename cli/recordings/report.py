@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from cli.inspect.addressing import chunks
 from cli.recordings.info import clock, open_recording, summary, timeline_of, warnings
 from cli.recordings.timeline import Timeline
-from common.cli_args import needs_extra
+from common.cli_args import file_path, needs_extra
 from common.errors import RobotError
 from common.text import printable
 
@@ -23,10 +23,12 @@ TEMPLATE = Path(__file__).with_name("report.html")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
-    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="recordings (.mcap)")
+    parser.add_argument(
+        "files", type=file_path, nargs="+", metavar="FILE", help="recordings (.mcap)"
+    )
     parser.add_argument(
         "--out",
-        type=Path,
+        type=file_path,
         metavar="HTML",
         help="output file, for one FILE; by default FILE with the suffix .html",
     )

@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from cli.settings import Everything
+from common.cli_args import file_path
 from common.config import DEFAULT_FILE, Sources, load
 from common.errors import RobotError
 
@@ -48,7 +49,7 @@ class Host:
     def write(self, path: Path, text: str) -> None:
         """Write a file atomically, unless it is unchanged."""
         file = self.at(path)
-        if file.exists() and file.read_text(encoding="utf-8") == text:
+        if file.exists() and file.read_bytes() == text.encode():
             print(f"same    {path}")
             return
         print(f"replace {path}" if file.exists() else f"write   {path}")
@@ -70,11 +71,11 @@ class Host:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "--prefix", type=Path, default=here(), metavar="DIR",
+        "--prefix", type=file_path, default=here(), metavar="DIR",
         help="the Python environment with T2; this one by default",
     )  # fmt: skip
     parser.add_argument(
-        "--root", type=Path, default=Path("/"), metavar="DIR",
+        "--root", type=file_path, default=Path("/"), metavar="DIR",
         help="write into this folder instead of /",
     )  # fmt: skip
     parser.add_argument(

@@ -22,6 +22,7 @@ from common.keys import FAST, MOTION, TOPICS
 from common.log import Logger
 from common.loop import Post
 from common.settings import BusSettings, is_encrypted
+from common.text_file import pem_problem
 
 RETRY_PERIOD_S = 0.5  # between two attempts to connect
 WARN_PERIOD_S = 5.0  # between two warnings
@@ -241,15 +242,17 @@ def operator_name(where: BusSettings) -> str:
 
 
 def check_files(where: BusSettings, endpoints: Iterable[str]) -> None:
-    """Raise ``ConfigError`` for an unreadable certificate file of these endpoints."""
+    """Raise ``ConfigError`` for an unusable certificate file of these endpoints."""
     if not any(map(is_encrypted, endpoints)):
         return
     for name in ("ca", "certificate", "private_key"):
         file = Path(getattr(where, name))
         try:
-            file.read_bytes()
+            problem = pem_problem(file.read_bytes())
         except OSError as error:
             raise ConfigError(f"bus.{name}: {file}: cannot be read: {error.strerror}") from None
+        if problem:
+            raise ConfigError(f"bus.{name}: {file}: {problem}")
 
 
 # --- configurations -----------------------------------------------------------------------------

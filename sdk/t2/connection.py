@@ -12,6 +12,7 @@ import zenoh
 from t2.errors import LinkError
 from t2.robot import Robot
 from t2.stream import CONNECTED, check_process, robots_of
+from t2.text_file import expanded, pem_problem, read_text
 
 LOCAL = "tcp/127.0.0.1:7447"
 SOURCE_PLACE = re.compile(r" at /\S+\.rs:\d+\.?")  # in Zenoh's errors
@@ -90,10 +91,16 @@ def read(file: Path) -> dict[str, Any]:
     except ModuleNotFoundError:
         raise LinkError("config= needs Python 3.11 or newer; pass endpoint= instead") from None
     try:
-        bus: dict[str, Any] = toml.loads(file.read_text(encoding="utf-8")).get("bus", {})
+        file = Path(expanded(str(file)))
+        bus: dict[str, Any] = toml.loads(read_text(file)).get("bus", {})
+        files = {name: file.parent / expanded(str(bus[name])) for name in FILES if bus.get(name)}
+        for name, each in files.items():
+            if problem := pem_problem(each.read_bytes()):
+                raise LinkError(f"{file}: bus.{name} {each}: {problem}")
     except (OSError, ValueError) as error:
-        raise LinkError(f"{file}: {getattr(error, 'strerror', error)}") from None
-    return bus | {name: str(file.parent / bus[name]) for name in FILES if bus.get(name)}
+        place = getattr(error, "filename", None) or file
+        raise LinkError(f"{place}: {getattr(error, 'strerror', error)}") from None
+    return bus | {name: str(each) for name, each in files.items()}
 
 
 def settings(endpoints: list[str], bus: dict[str, Any]) -> dict[str, Any]:

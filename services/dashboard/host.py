@@ -18,6 +18,7 @@ from common.config import Loaded
 from common.errors import ConfigError
 from common.service import STOP_TIMEOUT_S, Node
 from common.systemd import Systemd
+from common.text_file import pem_problem, read_text
 from services.dashboard.auth import TOKEN_MIN, Credentials
 from services.dashboard.config import Dashboard, DashboardConfig
 from services.dashboard.fleet import Fleet
@@ -115,9 +116,19 @@ def token(settings: Dashboard) -> str:
     if not settings.token_file:
         return "" if settings.is_local else secrets.token_urlsafe(12)
     try:
-        given = Path(settings.token_file).read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeError) as error:
+        given = read_text(Path(settings.token_file)).strip()
+    except OSError as error:
+        reason = error.strerror
+        raise ConfigError(
+            f"dashboard.token_file {settings.token_file}: cannot be read: {reason}"
+        ) from None
+    except ValueError as error:
         raise ConfigError(f"dashboard.token_file {settings.token_file}: {error}") from None
+    if not given.isprintable():
+        raise ConfigError(
+            f"dashboard.token_file {settings.token_file}: the token has a second line or an "
+            "invisible character: write one line"
+        )
     if len(given) < TOKEN_MIN:
         raise ConfigError(
             f"dashboard.token_file {settings.token_file}: the token has {len(given)} characters, "
@@ -131,6 +142,10 @@ def check_certificate(settings: Dashboard) -> None:
     if not settings.certificate:
         return
     try:
+        for name in ("certificate", "private_key"):
+            file = Path(getattr(settings, name))
+            if problem := pem_problem(file.read_bytes()):
+                raise ConfigError(f"dashboard.{name} {file}: {problem}")
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         context.load_cert_chain(settings.certificate, settings.private_key)
     except OSError as error:

@@ -234,7 +234,7 @@ def test_a_wrong_set_or_environment_is_refused(
     ("text", "sentence"),
     [
         (b"a = ", "over.toml: is no TOML: "),
-        (b"a = '\xff'", "over.toml: is no TOML: "),
+        (b"a = '\xff'", "over.toml: line 1 is no UTF-8: save the file as UTF-8"),
         (f"[board]\nport = {MANY_DIGITS}".encode(), "over.toml: is no TOML: "),
         (f"[board]\n{DEEP} = 1".encode(), "over.toml: tables are nested too deep"),
         (None, "over.toml: cannot be read: No such file"),
@@ -248,3 +248,51 @@ def test_an_unreadable_file_is_refused(
         (settings_dir.folder / "over.toml").write_bytes(text)
     with pytest.raises(ConfigError, match=f"^{re.escape(sentence)}"):
         load(Shared, Sources((Path("over.toml"),), {}))
+
+
+# --- files and values of other people's editors and shells ---------------------------------------
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_file_with_a_byte_order_mark_and_crlf(
+    settings_dir: SettingsFixture, encoding: str
+) -> None:
+    file = settings_dir.folder / "windows.toml"
+    file.write_bytes('[log]\r\nlevel = "debug"\r\n'.encode(encoding))
+    assert load(Everything, Sources((file,), {})).config.log.level == "debug"
+
+
+def test_a_typographic_quote_is_named(settings_dir: SettingsFixture) -> None:
+    said = settings_dir.refused("[log]\nlevel = \u201cdebug\u201d\n")
+    assert "line 2 has LEFT DOUBLE QUOTATION MARK" in said
+
+
+def test_the_home_folder_in_each_source(
+    settings_dir: SettingsFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", "/home/ada")
+    config = settings_dir.load(
+        '[bus]\nca = "~/ca.pem"\nlisten = ["unixsock-stream/~/bus.sock"]\n',
+        environ={"T2__DASHBOARD__TOKEN_FILE": "~/token"},
+        sets=["recorder.folder=~/recordings", "sim.world='~/world.toml'"],
+    ).config
+    assert config.bus.ca == "/home/ada/ca.pem"
+    assert config.bus.listen == ("unixsock-stream//home/ada/bus.sock",)
+    assert config.dashboard.token_file == "/home/ada/token"
+    assert config.recorder.folder == "/home/ada/recordings"
+    assert config.sim.world == "/home/ada/world.toml"
+    said = settings_dir.refused(sets=["recorder.folder=~nobody-here/x"])
+    assert "recorder.folder: ~nobody-here/x: no home folder is known" in said
+
+
+@pytest.mark.parametrize("value", ['"/my disk"', "'/my disk'", "/my disk", "\u00a0/my disk "])
+def test_quotes_around_a_path(settings_dir: SettingsFixture, value: str) -> None:
+    assert settings_dir.load(sets=[f"recorder.folder={value}"]).config.recorder.folder == "/my disk"
+    environ = {"T2__RECORDER__FOLDER": value.strip()}
+    assert settings_dir.load(environ=environ).config.recorder.folder == "/my disk"
+
+
+@pytest.mark.parametrize("value", ['"', '"/my disk', "'/a'b", "\u201c/my disk\u201d", '"""'])
+def test_quotes_that_do_not_enclose_a_path(settings_dir: SettingsFixture, value: str) -> None:
+    said = settings_dir.refused(sets=[f"recorder.folder={value}"])
+    assert "the quotes do not enclose the value" in said
