@@ -10,6 +10,7 @@ from t2.drive import Drive
 from t2.errors import (
     Blocked,
     Latched,
+    Late,
     LinkError,
     NoData,
     NotAllowed,
@@ -34,6 +35,7 @@ __all__ = [
     "Drive",
     "Keepalive",
     "Latched",
+    "Late",
     "LinkError",
     "NoData",
     "NotAllowed",

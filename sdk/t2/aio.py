@@ -4,12 +4,13 @@ import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
+from contextvars import copy_context
 from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
 
 from t2.connection import connect
-from t2.drive import Drive
+from t2.drive import ATTENTION, Attention, Drive
 from t2.messages import (
     Bumper,
     Direction,
@@ -31,6 +32,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 POLL_S = 0.01  # shorter than the period of each stream
+RENEW_S = 0.1  # the sign of life of the event loop
 
 
 @asynccontextmanager
@@ -95,11 +97,31 @@ def at_once(method: Method[P, R]) -> Callable[[object], Method[P, R]]:
     return decorate
 
 
-async def until_done(task: "asyncio.Task[Any]") -> None:
-    """Wait for the end of a task, however often this one is cancelled."""
-    while not task.done():
+async def until_done(future: "asyncio.Future[Any]") -> None:
+    """Wait for the end of a future, however often this task is cancelled."""
+    while not future.done():
         with suppress(Exception, asyncio.CancelledError):
-            await asyncio.shield(task)
+            await asyncio.shield(future)
+
+
+async def attended(call: Callable[[], R], end: Callable[[], None]) -> R:
+    """Wait for a motion that a thread runs; ``end`` it when this task is cancelled.
+
+    While the event loop is blocked, the motion requests zero.
+    """
+    attention, context = Attention(), copy_context()
+    context.run(ATTENTION.set, attention)
+    # No task: the end of asyncio.run would cancel that, and the thread would go on.
+    thread = asyncio.get_running_loop().run_in_executor(None, context.run, call)
+    try:
+        while not thread.done():
+            attention.renew()
+            await asyncio.wait([thread], timeout=RENEW_S)
+    except asyncio.CancelledError:
+        end()
+        await until_done(thread)
+        raise
+    return thread.result()
 
 
 class AsyncStream(Generic[M]):
@@ -223,12 +245,9 @@ class AsyncDrive:
 
     async def run(self, motion: Callable[[], R]) -> R:
         """Wait for a motion of the twin, and end it when this task is cancelled."""
-        task = asyncio.create_task(asyncio.to_thread(motion))
         try:
-            return await asyncio.shield(task)
+            return await attended(motion, self.twin.cancel)
         except asyncio.CancelledError:
-            self.twin.cancel()
-            await until_done(task)
             self.twin.uncancel()  # the motion had ended by itself
             raise
 
@@ -278,13 +297,7 @@ class AsyncRobot:
         """Move off a pressed bumper as ``Robot.release`` does; a cancelled task ends it."""
         ended = threading.Event()
         call = partial(self.twin.release, direction, source, timeout, ended)
-        task = asyncio.create_task(asyncio.to_thread(call))
-        try:
-            await asyncio.shield(task)
-        except asyncio.CancelledError:
-            ended.set()
-            await until_done(task)
-            raise
+        await attended(call, ended.set)
 
     @awaited(Robot.set_pose)
     def set_pose(self) -> None: ...  # noqa: D102

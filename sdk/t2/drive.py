@@ -4,12 +4,13 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterable
+from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 import zenoh
 
 from t2.client import Contest, request
-from t2.errors import Blocked, Latched, NoData, NotAllowed, Overruled, Stopped, T2Error
+from t2.errors import Blocked, Latched, Late, NoData, NotAllowed, Overruled, Stopped, T2Error
 from t2.messages import Odometry, SafetyState
 from t2.motion import (
     NEAR_TURN,
@@ -35,6 +36,8 @@ NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the fi
 READY_S = 2.0  # from the first neutral request until we are in control
 PATIENCE_S = 3.0  # without progress
 STEP_S = 0.3  # a motion's velocity is valid; odometry renews it every 0.04 s
+BLOCKED_S = 1.0  # of the event loop that waits for a motion: ends it
+VALID_S, LONGEST_S = 0.5, 10.0  # a velocity of the program is valid, by default and at most
 WAIT_S = 60.0  # for the end of a stop; a vehicle that stood for longer must not surprise anybody
 SPEED, TURN_SPEED = 0.3, 0.5  # m/s, rad/s, of motions
 STANDING = 0.02  # m/s and rad/s
@@ -45,13 +48,39 @@ PASSING = {"no_request", "blocked"}  # stops that end without a neutral request
 OPEN = set[tuple[int, str]]()  # boots and keys of the open drives of this program
 
 
+class Attention:
+    """The sign of life of the event loop that waits for a motion in a thread."""
+
+    def __init__(self) -> None:
+        self.renew()
+
+    def renew(self) -> None:
+        """Note that the loop runs."""
+        self.renewed_s = time.monotonic()
+
+
+ATTENTION: ContextVar[Attention | None] = ContextVar("ATTENTION", default=None)
+
+
+def attended_s() -> float:
+    """Return for how many s from now a motion may request a velocity; raise ``Late``."""
+    attention = ATTENTION.get()
+    silent_s = time.monotonic() - attention.renewed_s if attention else 0.0
+    if silent_s > BLOCKED_S:
+        raise Late(
+            f"the event loop was blocked for {silent_s:.1f} s during a motion: await what takes "
+            "long, or use asyncio.to_thread"
+        )
+    return max(0.0, STEP_S - silent_s)
+
+
 class Drive:
     """Drives as one source while it is open; each method raises what stopped the vehicle.
 
     In ``with`` it sends neutral requests until safety lets the source drive, and zeros at the end.
-    A thread repeats the requests: a program that waits keeps its last velocity. When the program
-    dies, safety stops the vehicle within its lease. After an error the drive requests zero for
-    good, and each method raises it: open another one.
+    Each velocity has an end: a thread repeats it until then, and zero afterwards. The end of the
+    main thread closes the drive. When the process dies, safety stops the vehicle within its lease.
+    After an error the drive requests zero for good, and each method raises it: open another one.
 
     A motion ends with the pose and its covariance, and waits for standstill. It raises ``Blocked``
     after ``patience`` s without progress. While its thread is held up or odometry is silent, the
@@ -172,17 +201,21 @@ class Drive:
         linear: float,
         angular: float = 0.0,
         *,
-        seconds: float | None = None,
+        seconds: float = VALID_S,
         on_stop: OnStop = "raise",
     ) -> None:
-        """Request m/s and rad/s until changed, or for some seconds; return at once.
+        """Request m/s and rad/s for some seconds from now, 10 at most; return at once.
 
-        Open loop: a program that waits for something else keeps driving.
+        Open loop. Call it again before its end to go on; a program that hangs, sleeps or waits for
+        something else does not drive on.
         """
         check_word(on_stop, OnStop)
-        end_s = math.inf
-        if seconds is not None:
-            end_s = time.monotonic() + not_negative(seconds, "seconds")
+        if seconds > LONGEST_S:
+            raise ValueError(
+                f"a velocity is valid for {LONGEST_S:g} s at most, not {seconds}: call it again "
+                "before its end to go on"
+            )
+        end_s = time.monotonic() + not_negative(seconds, "seconds")
         target = Target(finite(linear), finite(angular), end_s, on_stop)
         self.check()
         self._end_cancelled()
@@ -284,7 +317,7 @@ class Drive:
                 least_turning, progress_s = motion.turning, time.monotonic()
             elif time.monotonic() - progress_s > patience:
                 raise Blocked(f"the vehicle does not get on: {state.text}", state.causes)
-            self.velocity(linear, angular, seconds=STEP_S, on_stop=on_stop)
+            self.velocity(linear, angular, seconds=attended_s(), on_stop=on_stop)
             return False
 
         if not self._motion.acquire(blocking=False):
@@ -340,7 +373,7 @@ class Drive:
 
     def _run(self) -> None:
         try:
-            while not self._ended.wait(PERIOD_S):
+            while not self._ended.wait(self._pause_s()):
                 self._tick()
             self._publisher.stop()
         except Exception as error:  # the session was closed, for example
@@ -349,6 +382,11 @@ class Drive:
         self._ended.set()
         OPEN.discard(self._key)
         self._publisher.close()
+
+    def _pause_s(self) -> float:
+        """Return the time until the next request: a period, or less to be there for the end."""
+        left_s = self._target.end_s - time.monotonic()
+        return left_s if 0.0 < left_s < PERIOD_S else PERIOD_S
 
     def _tick(self) -> None:
         cancelled, target = self._cancelled, self._target

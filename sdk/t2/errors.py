@@ -21,6 +21,10 @@ class NotAllowed(T2Error):
     """The router drops our requests or calls, or safety does not know our source."""
 
 
+class Late(T2Error):
+    """Requests reach safety too late: the link is slow, or this program was held up."""
+
+
 class NotConfirmed(T2Error):
     """Safety's state does not show the effect: look at the vehicle; it has a switch of its own."""
 

@@ -1,8 +1,10 @@
 """One robot: its streams, its calls, and what may be sent to it."""
 
+import concurrent.futures.thread  # noqa: F401 - before our function for the end, below
 import re
 import threading
 import time
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import msgspec
@@ -17,8 +19,8 @@ from t2.client import (
     request,
     reset_request,
 )
-from t2.drive import Drive, dropped, ignored
-from t2.errors import NoData, NotAllowed, NotConfirmed, Refused, T2Error
+from t2.drive import Drive, attended_s, dropped, ignored
+from t2.errors import LinkError, NoData, NotAllowed, NotConfirmed, Refused, T2Error
 from t2.messages import ROOT, TOPICS
 from t2.motion import check_word, finite
 from t2.publisher import PERIOD_S, DrivePublisher
@@ -34,6 +36,29 @@ MATCH_S = 1.0  # until the router has announced the service
 STANDSTILL_S = 2.0  # a release is refused until the vehicle stands
 SOURCE = re.compile("[a-z][a-z0-9_-]{0,31}")
 SWITCH = "use the vehicle's own switch"
+ENDED = "the main thread has ended, and its robots are closed: let it wait for the other threads"
+
+OPEN = set["Robot"]()  # of this process
+ending = threading.Event()
+
+
+def close_all() -> None:
+    """Close what is open when the main thread ends: Python waits for Zenoh's threads.
+
+    Nothing can be opened from now on.
+    """
+    ending.set()
+    robots = [*OPEN]
+    for robot in robots:
+        robot.end()
+    for robot in robots:
+        with suppress(Exception):  # in a fork, for example; nobody is left to act on it
+            robot.close()
+
+
+# `atexit` is too late: Python has waited for all threads then. The last function that was
+# registered runs first, and that of concurrent.futures waits for its threads.
+threading._register_atexit(close_all)  # type: ignore[attr-defined]
 
 
 class Robot:
@@ -71,6 +96,10 @@ class Robot:
         self.switches: Stream[m.Switches] = self._stream("switches")
         self.link: Stream[m.Link] = self._stream("link")
         self.events: Stream[m.Event] = self._stream("events", EVENTS_DEPTH, service="*")
+        OPEN.add(self)
+        if ending.is_set():
+            self.close()
+            raise LinkError(ENDED)
 
     def __enter__(self: R) -> R:
         return self
@@ -81,6 +110,7 @@ class Robot:
     def close(self) -> None:
         """End drives with zeros, end limits, and disconnect."""
         check_process()
+        OPEN.discard(self)
         for drive in self._drives:
             drive.close()
         for each in (*self._limits.values(), *self._keepalives.values()):
@@ -88,6 +118,11 @@ class Robot:
         for stream in self._streams:
             stream.close()
         self._session.close()
+
+    def end(self) -> None:
+        """End the drives with zeros, without waiting for that."""
+        for drive in self._drives:
+            drive.end()
 
     # --- moving -------------------------------------------------------------------------------
 
@@ -220,7 +255,8 @@ class Robot:
                 if is_refused and passed_s > STANDSTILL_S:
                     raise Refused(state.release_refusal)
                 # After a refusal safety wants a neutral request: let go, then request it again.
-                publisher.tick(None if is_refused else request(release=direction))
+                is_held = not is_refused and attended_s() > 0.0
+                publisher.tick(request(release=direction) if is_held else None)
                 time.sleep(PERIOD_S)
         finally:
             publisher.stop()

@@ -113,7 +113,7 @@ def test_a_velocity_ends_by_itself_or_with_the_drive(robot: t2.Robot) -> None:
         drive.velocity(np.float64(0.2), seconds=np.float64(0.6))
         await_motion(robot)
         wait_until(lambda: robot.velocity.latest().linear < 0.02, "the end of the velocity")
-        drive.velocity(0.2)
+        drive.velocity(0.2, seconds=10)
         await_motion(robot)
     wait_until(lambda: robot.velocity.latest().linear < 0.02, "the end of the drive")
 
@@ -131,6 +131,12 @@ def test_what_is_no_finite_number_is_refused(robot: t2.Robot) -> None:
             drive.forward(1.0, speed=-0.3)
         with pytest.raises(ValueError, match="seconds must not be negative"):
             drive.velocity(0.1, seconds=-5)
+        for number in (10.1, math.inf):
+            with pytest.raises(ValueError, match="valid for 10 s at most"):
+                drive.velocity(0.1, seconds=number)
+        none: Any = None
+        with pytest.raises(TypeError):
+            drive.velocity(0.1, seconds=none)
         word: Any = "skip"
         with pytest.raises(ValueError, match="'skip' is not one of raise, wait"):
             drive.forward(1.0, on_stop=word)
@@ -193,7 +199,7 @@ def test_a_stop_ends_a_motion_that_is_held_up(robot: t2.Robot, hold_up: HoldUp) 
 
 def test_a_latch_ends_a_drive_for_good(robot: t2.Robot) -> None:
     with robot.drive("nav") as drive:
-        drive.velocity(0.2)
+        drive.velocity(0.2, seconds=10)
         robot.estop()
         with pytest.raises(t2.Latched) as stopped:
             drive.forward(1.0)
@@ -202,7 +208,7 @@ def test_a_latch_ends_a_drive_for_good(robot: t2.Robot) -> None:
             pass
         wait_until(lambda: not blocked(robot), "the reset")
         with pytest.raises(t2.Latched):
-            drive.velocity(0.3)
+            drive.velocity(0.3, seconds=10)
     with pytest.raises(t2.Refused, match="Nothing is latched"):
         robot.reset()
 
@@ -212,7 +218,7 @@ def pressed(robot: t2.Robot, stack: RunningStack) -> Iterator[None]:
     """Press the bumper while the vehicle drives forward, and wait for the latch."""
     try:
         with suppress(t2.Latched), robot.drive("nav") as drive:
-            drive.velocity(0.2)
+            drive.velocity(0.2, seconds=10)
             await_motion(robot)
             stack.control.do(Bumper(pressed=True))
             drive.forward(5.0, speed=0.2)
@@ -257,7 +263,7 @@ def cap(robot: t2.Robot) -> float | None:
 
 def test_a_limit_slows_the_vehicle_down_for_its_seconds(robot: t2.Robot) -> None:
     with robot.drive("nav") as drive:
-        drive.velocity(0.3)
+        drive.velocity(0.3, seconds=10)
         await_motion(robot, 0.2)
         limit = robot.limit("detector", np.float64(0.1), reason="person ahead", seconds=0.3)
         (shown,) = robot.safety.latest().limit_sources
@@ -292,9 +298,9 @@ def test_an_unexpected_error_ends_drive_and_limit_and_frees_their_sources(robot:
         drive._target = None  # type: ignore[assignment]
         wait_until(lambda: not drive.is_open, "the end of the drive")
         with pytest.raises(t2.T2Error, match="AttributeError"):
-            drive.velocity(0.2)
+            drive.velocity(0.2, seconds=10)
     with robot.drive("nav") as drive:
-        drive.velocity(0.2)
+        drive.velocity(0.2, seconds=10)
         await_motion(robot)
 
 
@@ -359,7 +365,7 @@ def test_another_source_of_higher_priority_overrules(robot: t2.Robot, stack: Run
         loop.post(lambda: loop.every(0.05, lambda _: made[0].request(0.0, 0.0)))
 
     with running(Loop()) as loop, robot.drive("nav") as drive:
-        drive.velocity(0.05)
+        drive.velocity(0.05, seconds=10)
         with bus_on(stack.endpoint, loop, declare), pytest.raises(t2.Overruled) as overruled:
             drive.forward(5.0, speed=0.05)
     assert overruled.value.by == "teleop"
@@ -382,7 +388,7 @@ def test_a_protective_stop_is_raised_and_the_next_drive_sends_a_neutral_request(
 ) -> None:
     def drive_on() -> None:
         with robot.drive("nav") as drive:
-            drive.velocity(0.05)
+            drive.velocity(0.05, seconds=10)
             await_motion(robot, 0.02)
             robot.limit("detector", linear=0.0, seconds=0.5)
             wait_until(drive.check, "the stop")
@@ -392,7 +398,7 @@ def test_a_protective_stop_is_raised_and_the_next_drive_sends_a_neutral_request(
     assert {cause.name for cause in stop.value.causes} & {"limit_stop", "neutral"}
     wait_until(lambda: not blocked(robot), "a vehicle that may drive")
     with robot.drive("nav") as drive:
-        drive.velocity(0.2)
+        drive.velocity(0.2, seconds=10)
         await_motion(robot)
 
 
@@ -415,13 +421,13 @@ def test_a_motion_waits_for_the_end_of_a_protective_stop(robot: t2.Robot) -> Non
         stopping.join()
         assert stopped == [False]
         assert math.dist((start.x, start.y), (pose.x, pose.y)) == pytest.approx(0.6, abs=0.1)
-        drive.velocity(0.1, on_stop="wait")
+        drive.velocity(0.1, seconds=10, on_stop="wait")
         wait_until(lambda: drive.obeyed, "an obeyed request")
         robot.limit("detector", linear=0.0, seconds=60)
         wait_until(lambda: not drive.obeyed, "the stop")
         drive.check()
         with pytest.raises(t2.Stopped):
-            drive.velocity(0.1)
+            drive.velocity(0.1, seconds=10)
     robot.limit("detector", seconds=0.1).end()
 
 
@@ -430,7 +436,7 @@ def test_the_wait_for_the_end_of_a_stop_has_an_end(
 ) -> None:
     monkeypatch.setattr(t2.drive, "WAIT_S", 0.5)
     with robot.drive("nav") as drive:
-        drive.velocity(0.1, on_stop="wait")
+        drive.velocity(0.1, seconds=10, on_stop="wait")
         limit = robot.limit("detector", linear=0.0, seconds=60)
         with pytest.raises(t2.Stopped):
             wait_until(drive.check, "the end of the wait")
@@ -461,7 +467,7 @@ def test_a_keepalive_is_confirmed_and_its_end_latches(
 def test_a_drive_is_entered_once_and_alone(robot: t2.Robot) -> None:
     drive = robot.drive("nav")
     with pytest.raises(t2.T2Error, match="not entered"):
-        drive.velocity(0.2)
+        drive.velocity(0.2, seconds=10)
     with drive:
         for other in (robot.drive("nav"), drive):
             with pytest.raises(t2.T2Error, match="is open"), other:
@@ -480,8 +486,8 @@ def test_a_cancel_ends_the_next_motion(robot: t2.Robot) -> None:
             drive.forward(5.0)
         drive.cancel()
         with pytest.raises(t2.T2Error, match="cancelled"):
-            drive.velocity(0.2)
-        drive.velocity(0.2)
+            drive.velocity(0.2, seconds=10)
+        drive.velocity(0.2, seconds=10)
         await_motion(robot)
 
 
@@ -503,5 +509,5 @@ def test_two_simulated_robots_drive_in_one_program() -> None:
     with t2.sim() as first, t2.sim() as second:
         for robot in (first, second):
             with robot.drive("nav") as drive:
-                drive.velocity(0.2)
+                drive.velocity(0.2, seconds=10)
                 await_motion(robot)

@@ -187,6 +187,6 @@ class Vehicle:
             self._drive.close()
             self._drive = self.robot.drive("teleop")
             self._drive.__enter__()
-            self._drive.velocity(SPEED)
+            self._drive.velocity(SPEED, seconds=10.0)  # to stop it before is the fault's part
             return becomes_true(lambda: self.truth().linear > MOVING, 3.0)
         return False
