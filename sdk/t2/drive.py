@@ -10,15 +10,25 @@ from typing import TYPE_CHECKING
 import zenoh
 
 from t2.client import Contest, request
-from t2.errors import Blocked, Latched, Late, NoData, NotAllowed, Overruled, Stopped, T2Error
+from t2.errors import (
+    Blocked,
+    Latched,
+    Late,
+    NoData,
+    NotAllowed,
+    Overruled,
+    PoseSet,
+    Stopped,
+    T2Error,
+)
 from t2.messages import Odometry, SafetyState
 from t2.motion import (
-    NEAR_TURN,
     STILL,
     Arc,
     Motion,
     OnStop,
     Path,
+    Progress,
     Straight,
     Target,
     Turn,
@@ -27,7 +37,7 @@ from t2.motion import (
     not_negative,
 )
 from t2.publisher import FRESH_S, PERIOD_S, DrivePublisher
-from t2.stream import check_process
+from t2.stream import check_process, now_s
 
 if TYPE_CHECKING:
     from t2.robot import Robot
@@ -36,6 +46,8 @@ NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the fi
 READY_S = 2.0  # from the first neutral request until we are in control
 PATIENCE_S = 3.0  # without progress
 STEP_S = 0.3  # a motion's velocity is valid; odometry renews it every 0.04 s
+HELD_S = 1.0  # of this program: ends a drive
+UNHEARD_S = 1.0  # of requests that safety refuses as too late: ends a drive
 BLOCKED_S = 1.0  # of the event loop that waits for a motion: ends it
 VALID_S, LONGEST_S = 0.5, 10.0  # a velocity of the program is valid, by default and at most
 WAIT_S = 60.0  # for the end of a stop; a vehicle that stood for longer must not surprise anybody
@@ -56,7 +68,7 @@ class Attention:
 
     def renew(self) -> None:
         """Note that the loop runs."""
-        self.renewed_s = time.monotonic()
+        self.renewed_s = now_s()
 
 
 ATTENTION: ContextVar[Attention | None] = ContextVar("ATTENTION", default=None)
@@ -65,7 +77,7 @@ ATTENTION: ContextVar[Attention | None] = ContextVar("ATTENTION", default=None)
 def attended_s() -> float:
     """Return for how many s from now a motion may request a velocity; raise ``Late``."""
     attention = ATTENTION.get()
-    silent_s = time.monotonic() - attention.renewed_s if attention else 0.0
+    silent_s = now_s() - attention.renewed_s if attention else 0.0
     if silent_s > BLOCKED_S:
         raise Late(
             f"the event loop was blocked for {silent_s:.1f} s during a motion: await what takes "
@@ -86,7 +98,7 @@ class Drive:
     after ``patience`` s without progress. While its thread is held up or odometry is silent, the
     request is zero after 0.3 s. When safety stops the vehicle with a cause that wants a
     neutral request, ``on_stop="raise"`` raises ``Stopped``; ``"wait"`` sends the neutral request
-    and goes on after the stop, for 60 s at most. A latched cause, another source, and the silence
+    and goes on after the stop, or when an obstacle is gone, for 60 s at most. A latched cause, another source, and the silence
     of safety or odometry always raise.
 
     >>> with robot.drive("nav") as drive:
@@ -109,7 +121,9 @@ class Drive:
         self._target = STILL
         self._sent = 0  # requests
         self._contest = Contest(source)
-        self._obeyed_s = math.inf  # monotonic time of the last request without a stop
+        self._obeyed_s = math.inf  # time of the last request without a stop
+        self._heard_s = math.inf  # time of the last request that safety received, or that is zero
+        self._ticked_s = math.inf  # time of the last request
         self._error: T2Error | None = None  # for good, see the class
         self._reported = False  # whether it was raised
         self._cancelled = False
@@ -138,7 +152,7 @@ class Drive:
     def __enter__(self) -> "Drive":
         """Start with neutral requests; return once safety would let this source drive.
 
-        Raises ``Latched``, ``Stopped``, ``Overruled``, ``NotAllowed`` and ``NoData``.
+        Raises ``Latched``, ``Stopped``, ``Overruled``, ``NotAllowed``, ``Late`` and ``NoData``.
         """
         if not self.is_open:
             raise T2Error(CLOSED)
@@ -215,7 +229,7 @@ class Drive:
                 f"a velocity is valid for {LONGEST_S:g} s at most, not {seconds}: call it again "
                 "before its end to go on"
             )
-        end_s = time.monotonic() + not_negative(seconds, "seconds")
+        end_s = now_s() + not_negative(seconds, "seconds")
         target = Target(finite(linear), finite(angular), end_s, on_stop)
         self.check()
         self._end_cancelled()
@@ -300,23 +314,20 @@ class Drive:
 
     def _go(self, motion: Motion, patience: float, on_stop: OnStop) -> Odometry:
         """Follow a motion until little is left; raise ``Blocked`` without progress."""
-        patience, progress_s = not_negative(patience, "patience"), time.monotonic()
-        least = least_turning = math.inf
+        check_word(on_stop, OnStop)
+        progress = Progress(motion, patience, WAIT_S, now_s())
+        left = motion.left(self._pose())
 
         def arrived(pose: Odometry) -> bool:
-            nonlocal least, least_turning, progress_s
+            nonlocal left
             left = motion.left(pose)
             if left <= motion.near:
                 return True
             linear, angular = motion.velocity(pose, left)
             state = self._robot.safety.latest()
-            is_waiting = on_stop == "wait" and is_stopped(state)
-            if left < least - motion.near or is_waiting:
-                least, least_turning, progress_s = min(left, least), math.inf, time.monotonic()
-            elif 0 < motion.turning < least_turning - NEAR_TURN:
-                least_turning, progress_s = motion.turning, time.monotonic()
-            elif time.monotonic() - progress_s > patience:
-                raise Blocked(f"the vehicle does not get on: {state.text}", state.causes)
+            waits = on_stop == "wait" and (is_stopped(state) or is_blocked(state))
+            if progress.ends(left, motion.turning, now_s(), waits=waits):
+                raise Blocked(f"The vehicle does not get on: {state.text}", state.causes)
             self.velocity(linear, angular, seconds=attended_s(), on_stop=on_stop)
             return False
 
@@ -327,6 +338,9 @@ class Drive:
             self._until(arrived)
             self.stop()
             return self._pose()
+        except Stopped as stop:
+            stop.left, stop.unit = max(left, 0.0), motion.unit
+            raise
         finally:
             self._target = STILL
             self._motion.release()
@@ -344,7 +358,7 @@ class Drive:
                     raise NoData("odometry fell silent during a motion; see `t2 doctor`")
                 if (pose.boot, pose.epoch) != (start.boot, start.epoch):
                     self._target = STILL
-                    raise T2Error("odometry restarted, or its pose was set, during a motion")
+                    raise PoseSet("odometry restarted, or its pose was set, during a motion")
                 if arrived(pose):
                     return
 
@@ -356,8 +370,8 @@ class Drive:
     # --- requests -----------------------------------------------------------------------------
 
     def _await_control(self) -> None:
-        end_s, asked_at = time.monotonic() + READY_S, None
-        while time.monotonic() < end_s:
+        end_s, asked_at = now_s() + READY_S, None
+        while now_s() < end_s:
             self.check()
             state = self._robot.safety.latest()
             if asked_at is None and self._sent >= NEUTRAL:
@@ -369,7 +383,7 @@ class Drive:
             time.sleep(PERIOD_S)
         if state.source == self.source:
             raise Stopped(state.text, state.causes)
-        raise ignored(self.source, state)
+        raise self._robot.unheard(self.source, state)
 
     def _run(self) -> None:
         try:
@@ -385,12 +399,13 @@ class Drive:
 
     def _pause_s(self) -> float:
         """Return the time until the next request: a period, or less to be there for the end."""
-        left_s = self._target.end_s - time.monotonic()
+        left_s = self._target.end_s - now_s()
         return left_s if 0.0 < left_s < PERIOD_S else PERIOD_S
 
     def _tick(self) -> None:
         cancelled, target = self._cancelled, self._target
-        is_over = time.monotonic() >= target.end_s
+        self._note_pause(target)
+        is_over = now_s() >= target.end_s
         # A motion that is held up requests zero, and a stop ends it all the same.
         if cancelled or (is_over and not self._motion.locked()):
             target = STILL
@@ -402,16 +417,34 @@ class Drive:
         self._publisher.tick(request(target.linear, target.angular))
         self._sent += 1
 
+    def _note_pause(self, target: Target) -> None:
+        """End the drive when this program was held up while it moved the vehicle."""
+        before_s, self._ticked_s = self._ticked_s, now_s()
+        held_s = self._ticked_s - before_s
+        moved = self._motion.locked() or (target.moves and target.end_s > before_s)
+        if moved and held_s > HELD_S:
+            self._error = self._error or Late(
+                f"this program was held up for {held_s:.1f} s, suspended for example, and the "
+                "vehicle stopped: open another drive to go on"
+            )
+
     def _trouble(self, target: Target) -> "T2Error | None":
         safety = self._robot.safety
         state = safety.newest
         if state is None or safety.age > FRESH_S:
             return NoData("safety is silent, and the vehicle stops; see `t2 doctor`")
         self._contest.tick(state, requests=target.moves)
+        if not target.moves or state.source is not None or is_stopped(state):
+            self._heard_s = now_s()
         if stop := self._stop_of(target):
             return stop
         if self._publisher.denied:
             return dropped(self.source, self._robot.name)
+        if now_s() - self._heard_s > UNHEARD_S:
+            return Late(
+                f"safety has received no request of {self.source!r} in time for {UNHEARD_S:g} s: "
+                "the link to the robot is slow"
+            )
         if self._contest.is_lost:
             return Overruled(str(self._contest.other))
         return None
@@ -423,23 +456,13 @@ class Drive:
             return None
         if state.latched:
             return Latched.of(state)
-        now_s = time.monotonic()
+        now = now_s()
         if not (target.moves and is_stopped(state)) or self._contest.other:
-            self._obeyed_s = now_s
+            self._obeyed_s = now
             return None
-        if target.on_stop == "wait" and now_s - self._obeyed_s < WAIT_S:
+        if target.on_stop == "wait" and now - self._obeyed_s < WAIT_S:
             return None
         return Stopped(f"{state.text} Open another drive to go on.", state.causes)
-
-
-def ignored(source: str, state: SafetyState) -> T2Error:
-    """Return why safety, in this state, does not follow a source that sends requests."""
-    if state.source is not None:
-        return Overruled(state.source)
-    return NotAllowed(
-        f"safety takes no requests of {source!r}: is it one of safety.sources? "
-        f"Safety's state: {state.text} See `t2 doctor`"
-    )
 
 
 def dropped(source: str, robot: str) -> NotAllowed:
@@ -453,3 +476,8 @@ def dropped(source: str, robot: str) -> NotAllowed:
 def is_stopped(state: SafetyState) -> bool:
     """Return whether a cause stops the vehicle that wants a neutral request in the end."""
     return any(each.action != "slow" and each.name not in PASSING for each in state.causes)
+
+
+def is_blocked(state: SafetyState) -> bool:
+    """Return whether the sonars see an obstacle in the way."""
+    return any(each.name == "blocked" for each in state.causes)

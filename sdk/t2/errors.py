@@ -44,16 +44,26 @@ class Overruled(T2Error):
         return f"overruled by {self.by}, which has a higher priority"
 
 
+class PoseSet(T2Error):
+    """Odometry restarted, or its pose was set, during a motion."""
+
+
 class Stopped(T2Error):
-    """Safety stops the vehicle; ``causes`` are the reasons, the worst first."""
+    """Safety stops the vehicle; ``causes`` are the reasons, the worst first.
+
+    ``left`` is what is left of the motion, in ``unit``: m, or rad of a turn; None without a motion.
+    """
 
     def __init__(self, text: str, causes: Sequence[Cause]) -> None:
         super().__init__(text, causes)
         self.text: str = text
         self.causes: tuple[Cause, ...] = tuple(causes)
+        self.left: float | None = None
+        self.unit: str = ""
 
     def __str__(self) -> str:
-        return self.text
+        left = "" if self.left is None else f" Left of the motion: {self.left:.2f} {self.unit}."
+        return self.text + left
 
 
 class Latched(Stopped):

@@ -10,6 +10,9 @@ from t2.messages import MAX_NUMBER, Odometry
 ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towards its end
 SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
 NEAR, NEAR_TURN = 0.01, 0.02  # m, rad: of the end
+STEP, STEP_TURN = 0.001, 0.002  # m, rad: progress
+START_S = 0.5  # until a vehicle that stands shows progress: the least patience
+RESOLUTION, RESOLUTION_TURN = 0.001, math.radians(0.1)  # m/s, rad/s: of the board's commands
 KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
 AHEAD = 0.3  # m along a path, of the point that is aimed at
 FACING, TURNED = 0.8, 0.1  # rad: off the aim, a path is left for a turn on the spot, until turned
@@ -38,6 +41,8 @@ class Motion(Protocol):
     """A motion by odometry; ``near`` is the distance from the end, in m or rad, that is enough."""
 
     near: float
+    unit: str  # of what is left: m or rad
+    speed: float  # the greatest, in this unit per s
     turning: float  # rad that are left of a turn on the spot within the motion; 0 without one
 
     def left(self, pose: Odometry) -> float:
@@ -47,14 +52,40 @@ class Motion(Protocol):
         """Return the velocity to request: m/s, rad/s."""
 
 
+class Progress:
+    """Whether a motion gets on; a slow one may take the time that its smallest step needs."""
+
+    def __init__(self, motion: Motion, patience: float, longest_wait: float, now_s: float) -> None:
+        self._step = STEP if motion.unit == "m" else STEP_TURN
+        self._patience = max(
+            not_negative(patience, "patience"), START_S + self._step / motion.speed
+        )
+        self._longest_wait = longest_wait
+        self._least = self._least_turning = math.inf
+        self._progress_s = self._waited_s = now_s
+
+    def ends(self, left: float, turning: float, now_s: float, *, waits: bool) -> bool:
+        """Return whether nothing was achieved for too long; ``waits``: for the end of a stop."""
+        if left < self._least - self._step:
+            self._least, self._least_turning = left, math.inf
+            self._progress_s = self._waited_s = now_s
+        elif 0 < turning < self._least_turning - STEP_TURN:
+            self._least_turning = turning
+            self._progress_s = self._waited_s = now_s
+        elif waits and now_s - self._progress_s < self._longest_wait:
+            self._waited_s = now_s
+        return now_s - self._waited_s > self._patience
+
+
 class Straight:
     """A distance in m along the heading at the start; negative is backward."""
 
     near = NEAR
+    unit = "m"
     turning: float = 0.0
 
     def __init__(self, start: Odometry, distance: float, speed: float) -> None:
-        self._start, self._speed = start, positive(speed)
+        self._start, self.speed = start, resolved(speed)
         self._distance, self._sign = abs(finite(distance)), math.copysign(1.0, distance)
 
     def left(self, pose: Odometry) -> float:
@@ -68,18 +99,19 @@ class Straight:
         """Return the velocity to request: m/s, rad/s."""
         correction = KEEP_HEADING * math.remainder(self._start.heading - pose.heading, math.tau)
         bounded = max(-MAX_CORRECTION, min(MAX_CORRECTION, correction))
-        return self._sign * slowing(left, self._speed, ACCELERATION, SLOWEST), bounded
+        return self._sign * slowing(left, self.speed, ACCELERATION, SLOWEST), bounded
 
 
 class Turn:
     """An angle in rad on the spot, positive to the left; may be more than a whole turn."""
 
     near = NEAR_TURN
+    unit = "rad"
     turning: float = 0.0
 
     def __init__(self, start: Odometry, angle: float, speed: float) -> None:
         self._angle, self._sign = abs(finite(angle)), math.copysign(1.0, angle)
-        self._speed = positive(speed)
+        self.speed = resolved(speed, RESOLUTION_TURN, "rad/s")
         self._heading, self._turned = start.heading, 0.0
 
     def left(self, pose: Odometry) -> float:
@@ -90,17 +122,25 @@ class Turn:
 
     def velocity(self, _: Odometry, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
-        return 0.0, self._sign * slowing(left, self._speed, TURNING, SLOWEST_TURN)
+        return 0.0, self._sign * slowing(left, self.speed, TURNING, SLOWEST_TURN)
 
 
 class Arc(Turn):
     """An angle in rad along a circle of this radius in m, positive to the left; forward."""
 
     near = NEAR
+    unit = "m"
 
     def __init__(self, start: Odometry, radius: float, angle: float, speed: float) -> None:
-        super().__init__(start, angle, speed)
         self._radius = positive(radius, "radius")
+        self._slowest = RESOLUTION_TURN * self._radius  # m/s
+        if speed < self._slowest:
+            raise ValueError(
+                f"an arc of {radius:g} m at {speed:g} m/s turns less than 0.1 deg/s, which the "
+                "board cannot do"
+            )
+        super().__init__(start, angle, 1.0)
+        self.speed = resolved(speed)  # m/s
 
     def left(self, pose: Odometry) -> float:
         """Return the distance that is left, m; call it for each pose."""
@@ -108,7 +148,7 @@ class Arc(Turn):
 
     def velocity(self, _: Odometry, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
-        linear = slowing(left, self._speed, ACCELERATION, SLOWEST)
+        linear = slowing(left, self.speed, ACCELERATION, max(SLOWEST, self._slowest))
         return linear, self._sign * linear / self._radius
 
 
@@ -116,11 +156,12 @@ class Path:
     """Straight lines from the start through points in ``odom``, m; pure pursuit."""
 
     near = NEAR
+    unit = "m"
 
     def __init__(
         self, start: Odometry, points: Iterable[tuple[float, float]], speed: float, turning: float
     ) -> None:
-        self._speed, self._turning = positive(speed), positive(turning)
+        self.speed, self._turning = resolved(speed), turning
         corners = [(start.x, start.y), *((finite(x), finite(y)) for x, y in points)]
         self._lines = [(a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b]
         self.turning: float = 0.0
@@ -160,14 +201,21 @@ class Path:
         self.turning = abs(off) if is_turning else 0.0
         if is_turning:
             return 0.0, math.copysign(slowing(abs(off), self._turning, TURNING, SLOWEST_TURN), off)
-        linear = slowing(left, self._speed * math.cos(off), ACCELERATION, SLOWEST)
+        linear = slowing(left, self.speed * math.cos(off), ACCELERATION, SLOWEST)
         curvature = 2 * math.sin(off) / max(math.dist((x, y), (pose.x, pose.y)), AHEAD)
         return linear, linear * curvature
 
 
 def slowing(left: float, speed: float, deceleration: float, slowest: float) -> float:
-    """Return the speed at this distance from the end."""
-    return max(slowest, min(speed, math.sqrt(2 * deceleration * max(left, 0.0))))
+    """Return the speed at this distance from the end, never more than ``speed``."""
+    return min(speed, max(slowest, math.sqrt(2 * deceleration * max(left, 0.0))))
+
+
+def resolved(speed: float, resolution: float = RESOLUTION, unit: str = "m/s") -> float:
+    """Return a speed as the board's commands can carry it, rounded down; raise ``ValueError``."""
+    if positive(speed) < resolution:
+        raise ValueError(f"speed must be at least {resolution:.2g} {unit}, not {speed}")
+    return math.floor(speed / resolution + 1e-6) * resolution
 
 
 def finite(number: float) -> float:

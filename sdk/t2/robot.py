@@ -19,12 +19,21 @@ from t2.client import (
     request,
     reset_request,
 )
-from t2.drive import Drive, attended_s, dropped, ignored
-from t2.errors import LinkError, NoData, NotAllowed, NotConfirmed, Refused, T2Error
+from t2.drive import Drive, attended_s, dropped
+from t2.errors import (
+    Late,
+    LinkError,
+    NoData,
+    NotAllowed,
+    NotConfirmed,
+    Overruled,
+    Refused,
+    T2Error,
+)
 from t2.messages import ROOT, TOPICS
 from t2.motion import check_word, finite
 from t2.publisher import PERIOD_S, DrivePublisher
-from t2.stream import LIVE_S, Stream, check_process
+from t2.stream import LIVE_S, Stream, check_process, now_s
 from t2.third_party import Keepalive, SpeedLimit
 
 A = TypeVar("A", bound=msgspec.Struct)
@@ -32,6 +41,8 @@ R = TypeVar("R", bound="Robot")
 
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
+SLOW_S = 5.0  # for an answer over a slow link
+SOURCES = re.compile(r"safety\.sources\.([^.]+)\.priority")
 MATCH_S = 1.0  # until the router has announced the service
 STANDSTILL_S = 2.0  # a release is refused until the vehicle stands
 SOURCE = re.compile("[a-z][a-z0-9_-]{0,31}")
@@ -178,13 +189,13 @@ class Robot:
     def estop(self) -> None:
         """Stop the robot and latch it; repeated until safety confirms. Raises ``NotConfirmed``."""
         self.put_estop()  # before anything else
-        begin_s, repetition = time.monotonic(), EstopRepetition()
+        begin_s, repetition = now_s(), EstopRepetition()
         repetition.start(None)
         self.safety.open()
         while repetition.is_pending:
             time.sleep(PERIOD_S)
             # An older state may show the latch of an earlier stop.
-            is_newer = self.safety.age < time.monotonic() - begin_s
+            is_newer = self.safety.age < now_s() - begin_s
             if repetition.tick(self.safety.newest if is_newer else None) is EstopStep.NONE:
                 return
             self.put_estop()
@@ -238,9 +249,9 @@ class Robot:
         """
         check_word(direction, m.Direction)
         publisher = DrivePublisher(self._session, self._source_key("drive", source), self.safety)
-        begin_s, is_known = time.monotonic(), False
+        begin_s, is_known = now_s(), False
         try:
-            while (passed_s := time.monotonic() - begin_s) < timeout:
+            while (passed_s := now_s() - begin_s) < timeout:
                 if ended is not None and ended.is_set():
                     break
                 state = self.safety.latest()
@@ -250,7 +261,7 @@ class Robot:
                     raise dropped(source, self.name)
                 is_known = is_known or state.source == source
                 if passed_s > STANDSTILL_S and not is_known:
-                    raise ignored(source, state)
+                    raise self.unheard(source, state)
                 is_refused = state.source == source and bool(state.release_refusal)
                 if is_refused and passed_s > STANDSTILL_S:
                     raise Refused(state.release_refusal)
@@ -299,8 +310,8 @@ class Robot:
             token = f"{ROOT}/{self.name}/live/{service}/*"
             found = self._session.liveliness().get(token, timeout=LIVE_S)
             runs = any(it.ok is not None for it in found)
-            end_s = time.monotonic() + MATCH_S
-            while not querier.matching_status.matching and time.monotonic() < end_s:
+            end_s = now_s() + MATCH_S
+            while not querier.matching_status.matching and now_s() < end_s:
                 time.sleep(PERIOD_S)
             is_barred = runs and not querier.matching_status.matching
         finally:
@@ -311,6 +322,35 @@ class Robot:
                 "see `t2 keys list`"
             )
         return NoData(f"no answer from {key}: is {service} running? `t2 doctor` finds the reason")
+
+    def unheard(self, source: str, state: m.SafetyState) -> T2Error:
+        """Return why safety, in this state, does not follow a source that sends requests."""
+        if state.source is not None:
+            return Overruled(state.source)
+        begin_s, settings = now_s(), self._settings("safety")
+        round_trip_s = now_s() - begin_s
+        names = [found[1] for path in settings if (found := SOURCES.fullmatch(path))]
+        if source in names:
+            return Late(
+                f"safety has received no request of {source!r} in time: the link to the robot is "
+                f"slow (a round trip took {round_trip_s:.2f} s now), or other traffic holds it up. "
+                f"Safety's state: {state.text}"
+            )
+        return NotAllowed(
+            f"safety takes no requests of {source!r}: is it one of safety.sources "
+            f"({', '.join(names) or 'unknown'})? Safety's state: {state.text} See `t2 doctor`"
+        )
+
+    def _settings(self, service: str) -> dict[str, Any]:
+        """Return the running settings of a service by path; none without an answer."""
+        key = f"{ROOT}/{self.name}/info/{service}/config"
+        for answer in self._session.get(key, timeout=SLOW_S):
+            if answer.ok is not None:
+                with suppress(msgspec.MsgspecError):
+                    return msgspec.json.decode(
+                        answer.ok.payload.to_bytes(), type=dict[str, dict[str, Any]]
+                    )
+        return {}
 
     def _stream(self, name: str, depth: int = 1, **names: str) -> Stream[Any]:
         kind = TOPICS[name][1]

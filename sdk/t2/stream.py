@@ -24,6 +24,13 @@ logger: logging.Logger = logging.getLogger(__name__)
 CONNECTED = set[int]()  # this process, or the one that it was forked from, once it has connected
 
 
+def now_s() -> float:
+    """Return a monotonic time in s that goes on while the computer is suspended, if it can."""
+    if hasattr(time, "CLOCK_BOOTTIME"):
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.monotonic()
+
+
 def robots_of(session: zenoh.Session) -> list[str]:
     """Return the ids of the robots of which a service on board runs; laptops have some, too."""
     tokens = session.liveliness().get(f"{ROOT}/*/live/*/*", timeout=LIVE_S)
@@ -79,7 +86,7 @@ class Stream(Generic[M]):
     @property
     def age(self) -> float:
         """Time in s since the newest message was received; infinite before the first one."""
-        return time.monotonic() - self._received_s if self._newest else float("inf")
+        return now_s() - self._received_s if self._newest else float("inf")
 
     def latest(self, timeout: float = 1.0) -> M:
         """Return the newest message, at most ``timeout`` s old; wait for it at most that long.
@@ -162,7 +169,7 @@ class Stream(Generic[M]):
             self.invalid += 1
             return
         with self._changed:
-            self._newest, self._received_s = message, time.monotonic()
+            self._newest, self._received_s = message, now_s()
             for queue in self._queues:
                 self.dropped += len(queue) == self.depth
                 queue.append(message)

@@ -12,7 +12,7 @@ from t2.errors import NotAllowed, T2Error
 from t2.messages import EstopKeepalive, KeepaliveState, Limit, LimitState, SafetyState
 from t2.motion import not_negative
 from t2.publisher import SourcePublisher
-from t2.stream import Stream
+from t2.stream import Stream, now_s
 
 S = TypeVar("S", LimitState, KeepaliveState)
 
@@ -68,13 +68,13 @@ class Repetition:
             ) from self._error
         not_negative(seconds, "seconds")
         is_shown(0.0)  # raises for an unknown source
-        begin_s = time.monotonic()
+        begin_s = now_s()
         with self._lock:  # an old message must not follow a new one
             self._publisher.put(message)
             self._message, self._end_s = message, begin_s + seconds
             if self._thread.ident is None:
                 self._thread.start()
-        while (passed_s := time.monotonic() - begin_s) < SHOWN_S:
+        while (passed_s := now_s() - begin_s) < SHOWN_S:
             if is_shown(passed_s):
                 return
             time.sleep(POLL_S)
@@ -88,7 +88,7 @@ class Repetition:
         try:
             while not self._ended.wait(PERIOD_S):
                 with self._lock:
-                    if time.monotonic() < self._end_s:
+                    if now_s() < self._end_s:
                         self._publisher.put(self._message)
         except Exception as error:
             self._error = error

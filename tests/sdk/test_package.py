@@ -32,8 +32,12 @@ def test_it_is_python_3_10_and_imports_nothing_of_the_stack() -> None:
 CAUSE = Cause(name="estop", action="brake", age=0.0, text="Emergency stop.")
 
 
+BLOCKED = t2.Blocked("blocked", [CAUSE])
+BLOCKED.left, BLOCKED.unit = 0.5, "rad"
+
+
 @pytest.mark.parametrize(
-    "error", [t2.Overruled("teleop"), t2.Latched("latched", [CAUSE]), t2.NoData("no data")]
+    "error", [BLOCKED, t2.Overruled("teleop"), t2.Latched("latched", [CAUSE]), t2.NoData("no data")]
 )
 def test_an_error_survives_pickling(error: t2.T2Error) -> None:
     loaded = pickle.loads(pickle.dumps(error))

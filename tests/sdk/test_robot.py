@@ -1,6 +1,8 @@
 """The client library on the real stack: drives, limits, stops, resets and forks."""
 
 import math
+import re
+import signal
 import subprocess
 import sys
 import threading
@@ -14,12 +16,14 @@ import numpy as np
 import pytest
 
 import t2
+import t2.client
 import t2.drive
 import t2.third_party
 from common.bus.bus import Bus
 from common.loop import Loop
 from common.source import DriveSource
 from sim.requests import Bumper, Sonar
+from t2.drive import is_blocked
 from t2.messages import Odometry
 from t2.motion import Straight
 from tests.sdk.library_robot import blocked
@@ -66,6 +70,14 @@ with t2.connect("001", endpoint=sys.argv[1]) as robot, robot.drive("nav") as dri
 """
 
 
+SUSPENDED = """
+import sys, t2
+with t2.connect("001", endpoint=sys.argv[1]) as robot, robot.drive("nav") as drive:
+    try:
+        drive.forward(5.0, speed=0.05)
+    except t2.T2Error as error:
+        print(f"{type(error).__name__}: {error}")
+"""
 HoldUp = Callable[[Callable[[], object]], None]
 
 
@@ -193,8 +205,9 @@ def test_a_stop_ends_a_motion_that_is_held_up(robot: t2.Robot, hold_up: HoldUp) 
         wait_until(lambda: drive.obeyed or drive._error, "its end")
 
     hold_up(stop_for_a_while)
-    with pytest.raises(t2.Stopped), robot.drive("nav") as drive:
+    with pytest.raises(t2.Stopped) as stopped, robot.drive("nav") as drive:
         drive.forward(0.6)
+    assert 0.0 < (stopped.value.left or 0.0) < 0.6
 
 
 def test_a_latch_ends_a_drive_for_good(robot: t2.Robot) -> None:
@@ -315,7 +328,7 @@ def test_unknown_names_are_refused_with_the_known_ones(
     with pytest.raises(t2.NotAllowed, match="it lists detector"):
         robot.limit("stranger", linear=0.1, seconds=1)
     with (
-        pytest.raises(t2.NotAllowed, match=r"'stranger'.*safety\.sources"),
+        pytest.raises(t2.NotAllowed, match=r"'stranger'.*safety\.sources \(.*nav"),
         robot.drive("stranger"),
     ):
         pass
@@ -380,7 +393,85 @@ def test_an_obstacle_blocks_a_distance(robot: t2.Robot, stack: RunningStack) -> 
     finally:
         stack.control.do(Sonar(name="front"))
     assert stopped.value.causes
+    assert stopped.value.left == pytest.approx(1.0, abs=0.1)
+    assert stopped.value.unit == "m"
+    assert re.search(r"Left of the motion: \d\.\d\d m\.$", str(stopped.value))
     assert time.monotonic() - began_s >= 0.5
+
+
+def test_a_motion_that_waits_goes_on_when_the_obstacle_is_gone(
+    robot: t2.Robot, stack: RunningStack
+) -> None:
+    def go_away() -> None:
+        wait_until(lambda: drive.is_open and is_blocked(robot.safety.latest()), "the obstacle")
+        time.sleep(1.0)  # longer than the patience
+        stack.control.do(Sonar(name="front"))
+
+    stack.control.do(Sonar(name="front", range=0.2))
+    start = robot.odometry.latest()
+    try:
+        with robot.drive("nav") as drive:
+            going = threading.Thread(target=go_away)
+            going.start()
+            end = drive.forward(0.3, patience=0.6, on_stop="wait")
+            going.join()
+    finally:
+        stack.control.do(Sonar(name="front"))
+    assert math.dist((start.x, start.y), (end.x, end.y)) == pytest.approx(0.3, abs=0.1)
+
+
+def test_a_slow_motion_is_as_slow_as_asked(robot: t2.Robot) -> None:
+    fastest = 0.0
+
+    def note(velocity: t2.messages.Velocity) -> None:
+        nonlocal fastest
+        fastest = max(fastest, abs(velocity.linear))
+
+    with robot.velocity.on(note), robot.drive("nav") as drive:
+        drive.forward(0.03, speed=0.02)
+        assert 0.01 < fastest < 0.03
+        drive.forward(0.05, speed=0.05, patience=0.1)
+
+
+def test_requests_that_arrive_too_late_are_named(
+    robot: t2.Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late = "safety has received no request of 'nav' in time"
+
+    def drive_with_old_echoes() -> None:
+        with robot.drive("nav") as drive:
+            drive.velocity(0.05, seconds=10)
+            await_motion(robot, 0.02)
+            monkeypatch.setattr(t2.client.Access, "received", lambda *_: None)
+            wait_until(drive.check, "the error")
+
+    with pytest.raises(t2.Late, match=late):
+        drive_with_old_echoes()
+    with pytest.raises(t2.Late, match=rf"{late}.*a round trip took \d+\.\d+ s"):
+        robot.drive("nav").__enter__()
+
+
+def test_a_pose_that_is_set_ends_a_motion(robot: t2.Robot) -> None:
+    def set_pose() -> None:
+        await_motion(robot, 0.02)
+        robot.set_pose()
+
+    setting = threading.Thread(target=set_pose)
+    setting.start()
+    with pytest.raises(t2.PoseSet), robot.drive("nav") as drive:
+        drive.forward(5.0, speed=0.05)
+    setting.join()
+
+
+def test_a_suspended_program_is_told_so(stack: RunningStack, robot: t2.Robot) -> None:
+    words = [sys.executable, "-c", SUSPENDED, stack.endpoint]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as program:
+        await_motion(robot, 0.02)
+        program.send_signal(signal.SIGSTOP)
+        time.sleep(1.5)  # longer than HELD_S
+        program.send_signal(signal.SIGCONT)
+        out, _ = program.communicate(timeout=60)
+    assert "Late: this program was held up for" in out
 
 
 def test_a_protective_stop_is_raised_and_the_next_drive_sends_a_neutral_request(
