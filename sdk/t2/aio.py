@@ -165,7 +165,7 @@ class AsyncStream(Generic[M]):
         return await asyncio.to_thread(self.twin.latest, timeout)
 
     def on(self, handle: Callable[[M], object]) -> Subscription:
-        """Call a function as ``Stream.on`` does, in a thread."""
+        """Call a plain function as ``Stream.on`` does, in a thread."""
         return self.twin.on(handle)
 
     async def __aiter__(self) -> AsyncIterator[M]:

@@ -98,8 +98,8 @@ class Drive:
     after ``patience`` s without progress. While its thread is held up or odometry is silent, the
     request is zero after 0.3 s. When safety stops the vehicle with a cause that wants a
     neutral request, ``on_stop="raise"`` raises ``Stopped``; ``"wait"`` sends the neutral request
-    and goes on after the stop, or when an obstacle is gone, for 60 s at most. A latched cause, another source, and the silence
-    of safety or odometry always raise.
+    and goes on after the stop, or when an obstacle is gone, for 60 s at most. A latched cause,
+    another source, and the silence of safety or odometry always raise.
 
     >>> with robot.drive("nav") as drive:
     ...     pose = drive.forward(0.1)  # m

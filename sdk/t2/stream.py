@@ -1,5 +1,6 @@
 """Streams: the newest message of a topic, never a backlog."""
 
+import inspect
 import logging
 import os
 import threading
@@ -7,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 import msgspec
@@ -20,6 +22,7 @@ M = TypeVar("M", bound=Message)
 LIVE_S = 0.5  # for the list of robots
 CHECK_S = 0.1  # whether a subscription is closed
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
+AWAIT = "pass a plain function, or use `async for` in a task"
 logger: logging.Logger = logging.getLogger(__name__)
 CONNECTED = set[int]()  # this process, or the one that it was forked from, once it has connected
 
@@ -42,6 +45,26 @@ def check_process() -> None:
     """Raise ``LinkError`` in a fork: Zenoh has no threads there, so that it hangs or is mute."""
     if CONNECTED - {os.getpid()}:
         raise LinkError("no connection survives a fork: connect in the new process only")
+
+
+def check_function(handle: object) -> None:
+    """Raise ``TypeError`` for what cannot be called, and for what must be awaited."""
+    if not callable(handle):
+        raise TypeError(f"{handle!r} is no function")
+    plain: Any = handle
+    while isinstance(plain, partial):
+        plain = plain.func
+    for each in (plain, type(plain).__call__):
+        if inspect.iscoroutinefunction(each) or inspect.isasyncgenfunction(each):
+            raise TypeError(f"{plain!r} is a coroutine function, which nobody awaits; {AWAIT}")
+
+
+def check_result(result: object) -> None:
+    """Raise ``TypeError`` for what must be awaited, such as the result of a lambda."""
+    if inspect.iscoroutine(result):
+        result.close()
+    if inspect.isawaitable(result) or inspect.isasyncgen(result):
+        raise TypeError(f"the function returned {result!r}, which nobody awaits; {AWAIT}")
 
 
 class Stream(Generic[M]):
@@ -105,7 +128,8 @@ class Stream(Generic[M]):
         """Call a function with the newest message, in a thread of its own; return the subscription.
 
         It ends with its ``close``, or with the robot. A slow function skips messages. Its
-        exceptions are logged, and the next message is handled.
+        exceptions are logged, and the next message is handled. Raises ``TypeError`` for a coroutine
+        function: use ``async for``.
         """
         return Subscription(self, handle)
 
@@ -184,6 +208,7 @@ class Subscription:
     """
 
     def __init__(self, stream: Stream[M], handle: Callable[[M], object]) -> None:
+        check_function(handle)
         self._closed = threading.Event()
         reading = ExitStack()
         queue = reading.enter_context(stream.reading())  # now: no message before the thread is lost
@@ -195,7 +220,7 @@ class Subscription:
                     if message is None or self._closed.is_set():
                         continue
                     try:
-                        handle(message)
+                        check_result(handle(message))
                     except Exception:
                         logger.exception("handler of %s", stream.key)
 

@@ -2,7 +2,9 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
+from functools import partial
+from typing import Any
 
 import msgspec
 import pytest
@@ -101,6 +103,40 @@ def test_a_handler_that_fails_is_called_again_until_the_robot_closes(
     robot.client.close()
     thread.join(10)
     assert not thread.is_alive()
+
+
+async def coroutine(_: Velocity, __: int = 0) -> None: ...
+
+
+async def generator(_: Velocity) -> AsyncIterator[int]:
+    yield 1
+
+
+class Callables:
+    async def __call__(self, _: Velocity) -> None: ...
+
+    async def method(self, _: Velocity) -> None: ...
+
+
+@pytest.mark.parametrize(
+    "handle",
+    [
+        coroutine, partial(coroutine, __=1), partial(partial(coroutine)), generator, Callables(),
+        partial(Callables()), Callables().method, None, "print",
+    ],
+)  # fmt: skip
+def test_what_must_be_awaited_is_no_handler(robot: Robot, handle: Any) -> None:
+    for stream in (robot.stream, t2.AsyncStream(robot.stream)):
+        with pytest.raises(TypeError, match=r"is no function|coroutine function"):
+            stream.on(handle)
+
+
+def test_a_handler_that_returns_a_coroutine_is_logged(
+    robot: Robot, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot.stream.on(lambda velocity: coroutine(velocity))
+    robot.put_until_received(1.0)
+    wait_until(lambda: "which nobody awaits" in caplog.text, "the log")
 
 
 def test_a_handler_gets_a_message_that_comes_before_its_thread(
