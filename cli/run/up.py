@@ -4,9 +4,12 @@
 """
 
 import argparse
+import os
 import shlex
 import signal
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib.util import find_spec
 
 from cli.run.ports import claimed, wanted
@@ -35,6 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ros2", action="store_true", help="start the gateway to ROS 2, too: it takes cmd_vel"
     )
+    parser.add_argument(
+        "--until-eof", action="store_true",
+        help="end with standard input: a pipe ends when the process that started this one dies",
+    )  # fmt: skip
     add_insecure(parser)
     add_sources(parser)
 
@@ -55,6 +62,8 @@ def run(options: argparse.Namespace) -> int:
         supervisor = Supervisor(started)
         for name in (signal.SIGINT, signal.SIGTERM):
             signal.signal(name, lambda *_: supervisor.stop())
+        if options.until_eof:
+            threading.Thread(target=await_eof, args=[supervisor.stop], daemon=True).start()
         drive = shlex.join(["t2", "drive", *source_words(options)])
         log.Logger().info(
             f"starting; `{drive}` in a second terminal drives it",
@@ -64,6 +73,14 @@ def run(options: argparse.Namespace) -> int:
             bus=list(config.bus.endpoints),
         )
         return supervisor.run()
+
+
+def await_eof(then: Callable[[], None]) -> None:
+    """Call a function at the end of standard input."""
+    with suppress(OSError):
+        while os.read(0, 4096):
+            pass
+    then()
 
 
 def everything(options: argparse.Namespace) -> Commands:

@@ -34,6 +34,20 @@ SonarName = Literal[
 ]
 
 
+STACKS: list["subprocess.Popen[bytes]"] = []  # each ends with its pipe from this process
+
+
+def _close_pipes() -> None:
+    """In a fork: it must not keep the stacks of a dead parent running."""
+    for stack in STACKS:
+        if stack.stdin:
+            stack.stdin.close()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_close_pipes)
+
+
 class Simulator:
     """The simulated vehicle and its board: what happens to them. Raises ``Refused``.
 
@@ -111,8 +125,8 @@ def sim(
 
     ``world`` is a world of ``t2 sim``; ``sets`` are settings and ``configs`` settings files, as for
     ``t2 up``. ``command`` is T2's command: the one of this environment or of ``PATH``, or a path.
-    Other programs connect to ``Robot.endpoint``. Raises ``LinkError``, with the last lines of its
-    log.
+    Other programs connect to ``Robot.endpoint``. Its processes end with this one, however that
+    ends. Raises ``LinkError``, with the last lines of its log.
 
     >>> with t2.sim(world="empty") as robot:  # doctest: +SKIP
     ...     robot.odometry.latest().x
@@ -132,7 +146,7 @@ def sim(
         "bus.uplink=",
         f"sim.control_port={control}",
     )
-    words = [_found(command), "up", "--world", world]
+    words = [_found(command), "up", "--until-eof", "--world", world]
     words += [word for each in configs for word in ("--config", str(Path(each).resolve()))]
     words += [word for each in (*own, *sets) for word in ("--set", each)]
     # A folder of its own: a repository may have packages that are named like ours.
@@ -141,13 +155,17 @@ def sim(
         log = Path(folder) / "log"
         with (
             log.open("wb") as out,
-            subprocess.Popen(words, cwd=folder, env=env, stdout=out, stderr=out) as process,
+            subprocess.Popen(
+                words, cwd=folder, env=env, stdin=subprocess.PIPE, stdout=out, stderr=out
+            ) as process,
         ):
+            STACKS.append(process)
             try:
                 with _connected(endpoint, process, log) as robot:
                     robot.simulator = Simulator(control)
                     yield robot
             finally:
+                STACKS.remove(process)
                 process.terminate()
                 try:
                     process.wait(END_S)
