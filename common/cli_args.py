@@ -12,11 +12,9 @@ from pathlib import Path
 
 from common.config import DEFAULT_FILE, Sources
 from common.errors import ConfigError, LinkError, RobotError
+from common.messages import VERSION as VERSION
 from common.text import printable
 from common.text_file import expanded
-
-# As in `pyproject.toml`; reading it from the installed package's metadata takes 20 ms.
-VERSION = "0.1.0"
 
 FILES_ENV = "T2_CONFIG"  # settings files, separated as in PATH; programs pass it to their children
 

@@ -11,6 +11,8 @@ from msgspec import Meta, Struct
 
 from common.motion import Command
 
+VERSION = "0.1.0"  # of the stack, the client library and their packages
+
 # In the manual's order: counted clockwise from the left.
 SONAR_NAMES = (
     "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left",

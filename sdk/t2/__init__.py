@@ -4,11 +4,13 @@
 counter-clockwise positive). ``t2.messages`` has the types of the messages.
 """
 
+from t2 import messages as messages
 from t2.aio import AsyncDrive, AsyncRobot, AsyncStream, aconnect
 from t2.connection import connect, robots
 from t2.drive import Drive
 from t2.errors import (
     Blocked,
+    Incompatible,
     Latched,
     Late,
     LinkError,
@@ -27,13 +29,14 @@ from t2.sim import SimulatedRobot, Simulator, sim
 from t2.stream import Stream, Subscription
 from t2.third_party import Keepalive, SpeedLimit
 
-__version__ = "0.1.0"
+__version__: str = messages.VERSION
 __all__ = [
     "AsyncDrive",
     "AsyncRobot",
     "AsyncStream",
     "Blocked",
     "Drive",
+    "Incompatible",
     "Keepalive",
     "Latched",
     "Late",

@@ -280,6 +280,11 @@ class AsyncRobot:
         self.link: AsyncStream[Link] = AsyncStream(twin.link)
         self.events: AsyncStream[Event] = AsyncStream(twin.events)
 
+    @property
+    def version(self) -> Coroutine[Any, Any, str]:
+        """The version of the robot's stack, as ``await robot.version``."""
+        return self.run(lambda: self.twin.version)
+
     def drive(self, source: str) -> AsyncDrive:
         """Return a drive as this source, for ``async with``."""
         return AsyncDrive(self.twin.drive(source))

@@ -17,6 +17,10 @@ class NoData(T2Error):
     """No message arrived in time."""
 
 
+class Incompatible(T2Error):
+    """The robot's stack is of another version than this package, and its messages differ."""
+
+
 class NotAllowed(T2Error):
     """The router drops our requests or calls, or safety does not know our source."""
 

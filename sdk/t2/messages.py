@@ -10,6 +10,8 @@ from msgspec import Meta, Struct
 
 Command = Literal["run", "stop", "brake"]
 
+VERSION = "0.1.0"  # of the stack, the client library and their packages
+
 # In the manual's order: counted clockwise from the left.
 SONAR_NAMES = (
     "left", "front_left", "front", "front_right", "right", "rear_right", "rear", "rear_left",

@@ -33,7 +33,7 @@ from t2.errors import (
 from t2.messages import ROOT, TOPICS
 from t2.motion import check_word, finite
 from t2.publisher import PERIOD_S, DrivePublisher
-from t2.stream import LIVE_S, Stream, check_process, now_s
+from t2.stream import LIVE_S, Stream, check_process, now_s, stack_version
 from t2.third_party import Keepalive, SpeedLimit
 
 A = TypeVar("A", bound=msgspec.Struct)
@@ -111,6 +111,14 @@ class Robot:
         if ending.is_set():
             self.close()
             raise LinkError(ENDED)
+
+    @property
+    def version(self) -> str:
+        """The version of the robot's stack; waits for the next message of its health."""
+        self.safety.check()
+        if found := stack_version(self._session, self.name):
+            return found
+        raise NoData(f"no health of safety of robot {self.name}: is the stack running?")
 
     def __enter__(self: R) -> R:
         return self

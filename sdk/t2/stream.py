@@ -2,24 +2,26 @@
 
 import inspect
 import logging
+import math
 import os
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import Any, Generic, TypeVar
 
 import msgspec
 import zenoh
 
-from t2.errors import LinkError, NoData
-from t2.messages import ON_BOARD, ROOT, Message
+from t2.errors import Incompatible, LinkError, NoData, T2Error
+from t2.messages import ON_BOARD, ROOT, VERSION, Message
 
 M = TypeVar("M", bound=Message)
 
 LIVE_S = 0.5  # for the list of robots
+HEALTH_S = 2.0  # twice the period of health messages
 CHECK_S = 0.1  # whether a subscription is closed
 ADVICE = "is the stack running? `t2 doctor` on the robot or a laptop finds the reason"
 AWAIT = "pass a plain function, or use `async for` in a task"
@@ -39,6 +41,28 @@ def robots_of(session: zenoh.Session) -> list[str]:
     tokens = session.liveliness().get(f"{ROOT}/*/live/*/*", timeout=LIVE_S)
     keys = [str(it.ok.key_expr).split("/") for it in tokens if it.ok is not None]
     return sorted({key[2] for key in keys if key[4] in ON_BOARD})
+
+
+class Versioned(msgspec.Struct):
+    """What each version's message of health has."""
+
+    version: str
+
+
+def stack_version(session: zenoh.Session, robot: str) -> str:
+    """Return the version of a robot's stack by its health messages; empty without any."""
+    found = ""
+    received = threading.Event()
+
+    def on_sample(sample: zenoh.Sample) -> None:
+        nonlocal found
+        with suppress(msgspec.MsgspecError):
+            found = msgspec.msgpack.decode(sample.payload.to_bytes(), type=Versioned).version
+            received.set()
+
+    with session.declare_subscriber(f"{ROOT}/{robot}/tel/safety/health", on_sample):
+        received.wait(HEALTH_S)
+    return found
 
 
 def check_process() -> None:
@@ -72,7 +96,7 @@ class Stream(Generic[M]):
 
     ``for`` yields each new message until the robot is closed; ``depth`` messages wait for a slow
     reader, older ones are dropped and counted in ``dropped``. ``invalid`` counts messages that do
-    not have the topic's type.
+    not have the topic's type; the first one is logged.
 
     >>> robot.odometry.latest(timeout=1.0).epoch >= 0
     True
@@ -98,6 +122,7 @@ class Stream(Generic[M]):
         self._changed = threading.Condition()
         self._newest: M | None = None
         self._received_s = 0.0
+        self._invalid_s = -math.inf
         self._queues: list[deque[M]] = []
         self._subscriber: Any = None
 
@@ -114,7 +139,7 @@ class Stream(Generic[M]):
     def latest(self, timeout: float = 1.0) -> M:
         """Return the newest message, at most ``timeout`` s old; wait for it at most that long.
 
-        Raises ``NoData``.
+        Raises ``NoData``, and ``Incompatible`` when messages arrive that it cannot read.
         """
         self.open()
         with self._changed:
@@ -122,6 +147,8 @@ class Stream(Generic[M]):
             if self._newest is not None and self.age <= timeout:
                 return self._newest
         self.check()  # closed meanwhile
+        if now_s() - self._invalid_s <= timeout:
+            raise self._incompatible()
         raise NoData(f"no {self._what} within {timeout:g} s on {self.key}: {self._advice()}")
 
     def on(self, handle: Callable[[M], object]) -> "Subscription":
@@ -178,6 +205,17 @@ class Stream(Generic[M]):
             self.closed = True
             self._changed.notify_all()
 
+    def _incompatible(self) -> T2Error:
+        """Return the error of a topic with messages that cannot be read."""
+        found = f"{self.invalid} messages on {self.key} are not of this package's form"
+        stack = stack_version(self._session, self.key[len(ROOT) + 1 :].partition("/")[0])
+        if stack in ("", VERSION):
+            return NoData(f"{found}: a foreign program may send them; see `t2 doctor`")
+        return Incompatible(
+            f"{found}: incompatible (stack {stack}, this package {VERSION}); install the package "
+            "of the stack's version"
+        )
+
     def _advice(self) -> str:
         """Return what to do about silence; another robot's name is a frequent reason."""
         mine = self.key[len(ROOT) + 1 :].partition("/")[0]
@@ -189,8 +227,10 @@ class Stream(Generic[M]):
     def _on_sample(self, sample: zenoh.Sample) -> None:
         try:
             message = self._decoder.decode(sample.payload.to_bytes())
-        except msgspec.MsgspecError:
-            self.invalid += 1
+        except msgspec.MsgspecError as error:
+            self.invalid, self._invalid_s = self.invalid + 1, now_s()
+            if self.invalid == 1:
+                logger.warning("%s: not a message of this package: %s", self.key, error)
             return
         with self._changed:
             self._newest, self._received_s = message, now_s()

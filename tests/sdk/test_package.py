@@ -9,6 +9,8 @@ import msgspec
 import pytest
 
 import t2
+from common import cli_args, messages
+from services.relay import core as relay
 from t2.messages import Cause, Event
 from tools import sdk
 
@@ -48,6 +50,14 @@ def test_an_error_survives_pickling(error: t2.T2Error) -> None:
 def test_it_shows_its_public_names_only() -> None:
     assert set(dir(t2)) == {*t2.__all__, "__version__", "messages"}
     assert all(hasattr(t2, name) for name in dir(t2))
+
+
+def test_one_version_is_everywhere() -> None:
+    assert t2.__version__ == cli_args.VERSION == relay.VERSION == messages.VERSION
+    for project in (sdk.ROOT, sdk.ROOT / "sdk"):
+        text = (project / "pyproject.toml").read_text("utf-8")
+        assert 'dynamic = ["version"]' in text
+        assert 'messages.py"\n' in text.partition("[tool.hatch.version]")[2]
 
 
 def test_a_message_with_a_name_of_a_later_version_is_decoded() -> None:

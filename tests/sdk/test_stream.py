@@ -35,6 +35,9 @@ class Robot:
     def put_raw(self, payload: bytes) -> None:
         self._publisher.put(payload)
 
+    def put_health(self, payload: bytes) -> None:
+        self._session.put("t2/v1/001/tel/safety/health", payload)
+
     def put_until_received(self, linear: float) -> None:
         def received() -> bool:
             self.put(linear)
@@ -65,6 +68,46 @@ def test_the_newest_is_kept_with_its_age_and_others_are_counted(robot: Robot) ->
     wait_until(lambda: stream.invalid == 1, "the count")
     assert stream.latest(timeout=60.0).linear == 0.5
     assert stream.age < 60.0
+
+
+@pytest.mark.parametrize(
+    ("version", "error", "text"),
+    [
+        (
+            "0.0.9",
+            t2.Incompatible,
+            rf"incompatible \(stack 0\.0\.9, this package {t2.__version__}\)",
+        ),
+        (t2.__version__, t2.NoData, "a foreign program may send them"),
+    ],
+)
+def test_messages_of_another_version_are_named(
+    robot: Robot,
+    caplog: pytest.LogCaptureFixture,
+    version: str,
+    error: type[t2.T2Error],
+    text: str,
+) -> None:
+    health = msgspec.msgpack.encode({"version": version, "of_a_later_version": 1})
+    ended = threading.Event()
+
+    def publish() -> None:
+        while not ended.wait(0.05):
+            robot.put_raw(msgspec.msgpack.encode({"speed": 1.0}))
+            robot.put_health(health)
+
+    publishing = threading.Thread(target=publish)
+    publishing.start()
+    try:
+        wait_until(lambda: robot.client.version == version, "the version")
+        robot.stream.open()
+        wait_until(lambda: robot.stream.invalid > 2, "the messages")
+        with pytest.raises(error, match=text):
+            robot.stream.latest(timeout=1.0)
+        assert caplog.text.count("not a message of this package") == 1
+    finally:
+        ended.set()
+        publishing.join()
 
 
 def test_a_slow_reader_gets_the_newest_only_whatever_others_read(robot: Robot) -> None:
