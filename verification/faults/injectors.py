@@ -175,13 +175,11 @@ def query_flood(fixture: StackFixture) -> None:
     _start(fixture, QUERIES, operators_endpoint(fixture.running.config))
 
 
-@injector
 def request_flood(fixture: StackFixture) -> None:
     """Publish requests of one known and many unknown sources, and garbage, 3,000 a second."""
     _start(fixture, REQUESTS, operators_endpoint(fixture.running.config))
 
 
-@injector
 def session_flood(fixture: StackFixture) -> None:
     """Open sessions with the router until it refuses more, and hold them."""
     _start(fixture, SESSIONS, operators_endpoint(fixture.running.config))
