@@ -5,22 +5,22 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from cli.commission.stops import DIRECTIONS, Stop, Streams, find_stops
+from cli.commission.stops import DRIVING, TURNING, Axis, Stop, Streams, find_stops
 from cli.inspect import output
 from cli.inspect.addressing import chunks
 from cli.recordings.info import open_recording
 from cli.settings import Everything
 from common import keys
 from common.errors import ConfigError, RobotError
+from common.standstill import stopping_s
 from services.safety.config import Safety
-from services.safety.core.release import stopping_distance
 
 # Safety reckons from the reading of a sonar on, a stop begins with its command: between them are up
 # to one period of the sonars and one of the bridge's queries.
 SENSING_S = 2 / keys.ULTRASONIC.rate_hz
 KINDS = {"Motion", "Velocity", "Mileage", "Bumper"}  # the messages that ``Streams`` takes
-HEAD = ("stop", "command", "speed m/s", "reaction s", "deceleration m/s2", "distance m",
-        "needed m", "reckoned m", "recording")  # fmt: skip
+HEAD = ("stop", "command", "unit", "speed", "reaction s", "deceleration", "distance",
+        "needed", "reckoned", "recording")  # fmt: skip
 
 
 def run(options: argparse.Namespace, config: Everything) -> int:
@@ -45,14 +45,15 @@ def read(files: Sequence[Path], robot: str | None) -> tuple[list[Stop], Counter[
     Raise ``RobotError`` without any, and for several robots: ``robot`` chooses one.
     """
     robots: set[str] = set()
-    stops: dict[tuple[int, int], Stop] = {}
+    stops: dict[tuple[object, ...], Stop] = {}
     left_out: Counter[str] = Counter()
     for file in files:
         found, reasons = find_stops(read_streams(file, robot, robots), file.name)
         left_out += reasons
         for stop in found:
-            left_out["in two recordings"] += stop.command in stops
-            stops.setdefault(stop.command, stop)
+            key = (*stop.command, stop.axis.unit)
+            left_out["in two recordings"] += key in stops
+            stops.setdefault(key, stop)
     if len(robots) > 1:
         raise RobotError(f"recordings of {', '.join(sorted(robots))}: choose one with --robot")
     if not stops:
@@ -88,13 +89,14 @@ def counted(reasons: Counter[str]) -> str:
 
 
 def needed(stop: Stop) -> float:
-    """Return the distance (m) from the reading to standstill."""
+    """Return the distance (m or rad) from the reading to standstill."""
     return stop.distance + stop.speed * SENSING_S
 
 
 def reckoned(stop: Stop, safety: Safety) -> float:
-    """Return the stopping distance (m) that safety reckons with from this speed."""
-    return stopping_distance(stop.speed, safety.reaction, safety.deceleration)
+    """Return the distance (m or rad) that safety reckons with: as its zones, by the slower axis."""
+    stop_s = stopping_s(stop.twist, safety.deceleration, safety.angular_deceleration)
+    return stop.speed * (safety.reaction + stop_s / 2)
 
 
 def as_cells(number: int, stop: Stop, safety: Safety) -> Sequence[str]:
@@ -102,6 +104,7 @@ def as_cells(number: int, stop: Stop, safety: Safety) -> Sequence[str]:
     return (
         str(number),
         f"{stop.kind.upper()} {stop.direction}" + ", then BRAKE" * stop.braked,
+        stop.axis.unit,
         f"{stop.speed:.3f}",
         f"{stop.reaction:z.3f}",
         f"{stop.deceleration:.2f}",
@@ -115,28 +118,29 @@ def as_cells(number: int, stop: Stop, safety: Safety) -> Sequence[str]:
 def verdict(stops: Sequence[Stop], safety: Safety) -> tuple[bool, Iterator[str]]:
     """Return whether the vehicle passes, and the lines below the table.
 
-    It passes with a STOP, which is what an obstacle causes, in both directions, and without a stop
-    that was longer than reckoned.
+    It passes with a STOP, which is what an obstacle causes, forward, backward and turning to both
+    sides, and without a stop that was longer than reckoned.
     """
     spare = [reckoned(stop, safety) - needed(stop) for stop in stops]
     worst = min(range(len(stops)), key=spare.__getitem__)
     found = {stop.direction for stop in stops if stop.kind == "stop"}
-    missing = [each for each in DIRECTIONS.values() if each not in found]
+    wanted = (*DRIVING.directions.values(), *TURNING.directions.values())
+    missing = [each for each in wanted if each not in found]
 
     def lines() -> Iterator[str]:
+        unit = stops[worst].axis.unit
         yield (
             f"The worst is stop {worst + 1}: from the reading to standstill it needs "
-            f"{needed(stops[worst]):.2f} m, reckoned are {reckoned(stops[worst], safety):.2f} m."
+            f"{needed(stops[worst]):.2f} {unit}, reckoned are "
+            f"{reckoned(stops[worst], safety):.2f} {unit}."
         )
         yield (
             f"The slowest reaction is {max(each.reaction for each in stops) + SENSING_S:.2f} s "
-            f"from the reading (safety.react is {safety.reaction:g} s), the weakest deceleration "
-            f"{min(each.deceleration for each in stops):.2f} m/s2 (safety.deceleration is "
-            f"{safety.deceleration:g} m/s2)."
+            f"from the reading (safety.react is {safety.reaction:g} s)."
         )
-        fastest = max(each.speed for each in stops)
-        yield (
-            f"The fastest stop is from {fastest:.2f} m/s; safety allows {safety.max_linear:g} m/s."
+        yield from of_axis(stops, DRIVING, "deceleration", safety.deceleration, safety.max_linear)
+        yield from of_axis(
+            stops, TURNING, "angular_deceleration", safety.angular_deceleration, safety.max_angular
         )
         for direction in missing:
             yield f"NOT MEASURED: a STOP {direction}."
@@ -146,3 +150,16 @@ def verdict(stops: Sequence[Stop], safety: Safety) -> tuple[bool, Iterator[str]]
             yield "No stop was longer than safety reckons with."
 
     return not missing and spare[worst] >= 0, lines()
+
+
+def of_axis(
+    stops: Sequence[Stop], axis: Axis, name: str, reckoned_with: float, allowed: float
+) -> Iterator[str]:
+    """Yield the weakest deceleration and the fastest stop of an axis, if there is any."""
+    if mine := [stop for stop in stops if stop.axis is axis]:
+        weakest, fastest = min(s.deceleration for s in mine), max(s.speed for s in mine)
+        yield (
+            f"The weakest deceleration is {weakest:.2f} {axis.unit}/s2 (safety.{name} is "
+            f"{reckoned_with:g} {axis.unit}/s2). The fastest stop is from {fastest:.2f} "
+            f"{axis.unit}/s; safety allows {allowed:g} {axis.unit}/s."
+        )

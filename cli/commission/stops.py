@@ -1,7 +1,8 @@
 """Stops in the recorded messages of a vehicle: speed, reaction time, deceleration, distance. Pure.
 
 A stop begins with the first STOP or BRAKE after a RUN with speed and ends with the second of two
-consecutive velocities below the standstill threshold. All times are those of the robot's monotonic
+consecutive velocities below the standstill threshold. Driving and turning are measured one by one:
+a stop in a curve is one of each, in m and in rad. All times are those of the robot's monotonic
 clock, so a late recorder changes nothing. A line through the velocities between 90 % and 10 % of
 the speed has two results::
 
@@ -13,25 +14,23 @@ the speed has two results::
 When BRAKE follows a STOP that takes too long, the line ends there, and the stop counts as STOP.
 With fewer than three velocities on the slope the line connects the two velocities around it, so
 that the deceleration is a lower bound. The distance comes from the board's counters. Velocities are
-in steps of 1 mm/s, counters of 1 mm.
+in steps of 1 mm/s and 0.1 deg/s, counters of 1 mm and 0.1 deg.
 """
 
 from bisect import bisect_left, bisect_right
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise, takewhile
-from math import isclose
+from math import isclose, remainder, tau
 from statistics import linear_regression, median
 from typing import Literal
 
 from common.freshness import NS_PER_S
-from common.messages import Bumper, Direction, Message, Mileage, Motion, Velocity
-from common.motion import STANDING_MPS, Command, Twist
+from common.messages import Bumper, Message, Mileage, Motion, Velocity
+from common.motion import STANDING_MPS, STANDING_RADPS, Command, Twist
 
-SLOWEST_MPS = 0.1
-STEADY_S, STEADY_MPS, STEADY = 0.2, 0.03, 0.05  # before the command: time, deviation, relative one
-TURNING_RADPS = 0.1
+STEADY_S, STEADY = 0.2, 0.05  # before the command: time, and relative deviation
 LONGEST_GAP_S = 0.1  # between two velocities, and around the begin of a stop
 COUNTED_S = 0.2  # from standstill to the counters' next value
 COARSEST_S = 0.03  # between two velocities; 50 Hz have 0.02 s
@@ -42,7 +41,42 @@ NO_VELOCITIES, NO_COUNTERS = "velocities are missing", "counters are missing"
 Kind = Literal["stop", "brake"]
 Point = tuple[float, float]  # s since the command, m/s in the direction of the motion
 
-DIRECTIONS: dict[float, Direction] = {1: "forward", -1: "backward"}  # by the sign of the speed
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What is measured of a stop: driving, or turning."""
+
+    unit: str
+    directions: dict[float, str]  # by the sign of the speed
+    slowest: float  # of the unit per second, as the next two
+    steady: float  # deviation before the command
+    standing: float
+    speed: Callable[[Velocity], float]
+    travel: Callable[[Mileage, Mileage], float]  # from one reading of the counters to the next
+
+    def runs(self, velocity: Velocity) -> bool:
+        """Return whether the vehicle moves fast enough to show a stop."""
+        return abs(self.speed(velocity)) >= self.slowest
+
+
+DRIVING = Axis(
+    "m",
+    {1: "forward", -1: "backward"},
+    slowest=0.1,
+    steady=0.03,
+    standing=STANDING_MPS,
+    speed=lambda velocity: velocity.linear,
+    travel=lambda before, after: after.distance - before.distance,
+)
+TURNING = Axis(
+    "rad",
+    {1: "left", -1: "right"},
+    slowest=0.2,
+    steady=0.05,
+    standing=STANDING_RADPS,
+    speed=lambda velocity: velocity.angular,
+    travel=lambda before, after: remainder(after.heading - before.heading, tau),
+)
 
 
 @dataclass(slots=True)
@@ -95,12 +129,14 @@ class Streams:
 class Stop:
     """One measured stop."""
 
+    axis: Axis
     kind: Kind
-    direction: Direction
-    speed: float  # m/s, at the command
+    direction: str
+    speed: float  # m/s or rad/s, at the command
+    twist: Twist  # at the command
     reaction: float  # s
-    deceleration: float  # m/s^2
-    distance: float  # m, by the counters, from the command to standstill
+    deceleration: float  # m/s^2 or rad/s^2
+    distance: float  # m or rad, by the counters, from the command to standstill
     braked: bool = False  # BRAKE followed the STOP before standstill
     file: str = ""
     command: tuple[int, int] = (0, 0)  # boot of safety and time; the same in two recordings of it
@@ -116,18 +152,18 @@ def find_stops(streams: Streams, file: str = "") -> tuple[list[Stop], Counter[st
     left_out: Counter[str] = Counter()
     for motions in _begins(streams.motions):
         try:
-            found.append(_measure(streams, motions, file))
+            found += _measured(streams, motions, file)
         except UnsuitableError as reason:
             left_out[str(reason)] += 1
     return found, left_out
 
 
-def slope(points: Sequence[Point]) -> tuple[float, float]:
-    """Return reaction time (s) and deceleration (m/s^2) from the first point to standstill."""
+def slope(points: Sequence[Point], standing: float = STANDING_MPS) -> tuple[float, float]:
+    """Return reaction time (s) and deceleration from the first point to standstill."""
     _, speed = points[0]
     above = max(n for n, (_, v) in enumerate(points) if v > UPPER * speed)
     falling = points[above:]
-    lowest = max(LOWER * speed, STANDING_MPS)
+    lowest = max(LOWER * speed, standing)
     part = list(takewhile(lambda point: point[1] >= lowest, falling))
     below = falling[len(part) :]
     if len(part) > SLOPE:
@@ -150,30 +186,40 @@ def _begins(motions: Sequence[Motion]) -> Iterator[Sequence[Motion]]:
             yield motions[index:]
 
 
-def _measure(streams: Streams, motions: Sequence[Motion], file: str) -> Stop:
-    """Return the stop that the first of these motions commands."""
-    command = motions[0]
+def _measured(streams: Streams, motions: Sequence[Motion], file: str) -> list[Stop]:
+    """Return the stop that the first of these motions commands, of each axis that moved."""
     window = _until_standstill(streams.velocities, motions)
+    axes = [axis for axis in (DRIVING, TURNING) if axis.runs(window[0])]
+    return [_measure(streams, motions, window, axis, file) for axis in axes]
+
+
+def _measure(
+    streams: Streams, motions: Sequence[Motion], window: Sequence[Velocity], axis: Axis, file: str
+) -> Stop:
+    """Return one axis of the stop that the first of these motions commands."""
+    command = motions[0]
     first, end_ns = window[0], window[-1].mono_ns
     if any(b.pressed and command.mono_ns <= b.mono_ns <= end_ns for b in streams.bumpers):
         raise UnsuitableError("the bumper was pressed")
-    distance = _distance(streams.mileages, command.mono_ns, end_ns)
+    distance = _distance(streams.mileages, command.mono_ns, end_ns, axis)
     kind: Kind = "brake" if command.command is Command.BRAKE else "stop"
     brakes = [m.mono_ns for m in motions if m.command is Command.BRAKE and m.mono_ns <= end_ns]
     braked = kind == "stop" and bool(brakes)
     last_ns = brakes[0] if braked else end_ns
-    speed = abs(first.linear)
-    sign = first.linear / speed
+    speed = abs(axis.speed(first))
+    sign = axis.speed(first) / speed
     points = [
-        ((v.mono_ns - command.mono_ns) / NS_PER_S, sign * v.linear)
+        ((v.mono_ns - command.mono_ns) / NS_PER_S, sign * axis.speed(v))
         for v in window
         if v.mono_ns <= last_ns
     ]
-    reaction, deceleration = slope(points)
+    reaction, deceleration = slope(points, axis.standing)
     return Stop(
+        axis,
         kind,
-        DIRECTIONS[sign],
+        axis.directions[sign],
         speed,
+        Twist(first.linear, first.angular),
         reaction,
         deceleration,
         distance,
@@ -208,19 +254,20 @@ def _until_standstill(
 def _check_begin(velocities: Sequence[Velocity]) -> None:
     """Check the motion up to the command."""
     newest = velocities[-1]
-    if abs(newest.linear) < SLOWEST_MPS:
-        raise UnsuitableError(f"slower than {SLOWEST_MPS:g} m/s")
-    if abs(newest.angular) > TURNING_RADPS:
-        raise UnsuitableError("turning")
+    axes = [axis for axis in (DRIVING, TURNING) if axis.runs(newest)]
+    if not axes:
+        raise UnsuitableError(f"slower than {DRIVING.slowest:g} m/s and {TURNING.slowest:g} rad/s")
     since_ns = newest.mono_ns - round(STEADY_S * NS_PER_S)
     since = bisect_left(velocities, since_ns, key=lambda v: v.mono_ns)
     for before in velocities[since:]:
-        if not isclose(before.linear, newest.linear, rel_tol=STEADY, abs_tol=STEADY_MPS):
-            raise UnsuitableError("not at a steady speed")
+        for axis in axes:
+            speeds = axis.speed(before), axis.speed(newest)
+            if not isclose(*speeds, rel_tol=STEADY, abs_tol=axis.steady):
+                raise UnsuitableError("not at a steady speed")
 
 
-def _distance(mileages: Sequence[Mileage], begin_ns: int, end_ns: int) -> float:
-    """Return the counted distance (m)."""
+def _distance(mileages: Sequence[Mileage], begin_ns: int, end_ns: int, axis: Axis) -> float:
+    """Return the counted distance (m or rad); of a turn the sum of its steps."""
     first = bisect_right(mileages, begin_ns, key=lambda m: m.mono_ns)
     last = bisect_right(mileages, end_ns, key=lambda m: m.mono_ns)
     if first == 0 or last == len(mileages):
@@ -231,4 +278,5 @@ def _distance(mileages: Sequence[Mileage], begin_ns: int, end_ns: int) -> float:
     if len({(m.boot, m.epoch) for m in mileages[first - 1 : last + 1]}) > 1:
         raise UnsuitableError("bridge or board restarted")
     share = (begin_ns - before.mono_ns) / (after.mono_ns - before.mono_ns)
-    return abs(end.distance - before.distance - share * (after.distance - before.distance))
+    steps = [axis.travel(*pair) for pair in pairwise(mileages[first - 1 : last + 1])]
+    return abs(sum(steps) - share * steps[0])

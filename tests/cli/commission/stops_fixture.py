@@ -1,5 +1,6 @@
 """A drive with a STOP, as recorded messages: constant deceleration, 0.1 s after the command."""
 
+import math
 from collections.abc import Callable
 
 import msgspec
@@ -28,23 +29,28 @@ def streams(
     deceleration: float = 0.5,
     command: Command = Command.STOP,
     begin_s: float = 10.0,
+    turns: bool = False,
 ) -> Streams:
-    """Return a drive with a stop at 0 s: 50 velocities and 25 counters a second."""
+    """Return a drive, or a turn, with a stop at 0 s: 50 velocities and 25 counters a second."""
     made = Streams()
 
     def add(message: Message, seconds: float) -> None:
         made.add(at(message, seconds, begin_s))
 
-    add(Motion(command=Command.RUN, linear=sign * speed), -0.02)
+    linear, angular = (0.0, sign * speed) if turns else (sign * speed, 0.0)
+    add(Motion(command=Command.RUN, linear=linear, angular=angular), -0.02)
     add(Motion(command=command, boot=6), 0.0)
-    distance = 7.0
+    travel = 0.0
     for number in range(-15, round(until_s * 50)):
         now = number / 50 + 0.005
-        linear = sign * speed_at(now, speed, deceleration)
-        distance += linear / 50
-        add(Velocity(linear=linear, angular=0.0), now)
+        moving = sign * speed_at(now, speed, deceleration)
+        travel += moving / 50
+        linear, angular = (0.0, moving) if turns else (moving, 0.0)
+        add(Velocity(linear=linear, angular=angular), now)
+        distance, heading = (7.0, travel) if turns else (round(7.0 + travel, 3), 0.0)
         if number % 2 == 0:
-            add(Mileage(distance=round(distance, 3), heading=0.0, epoch=0, boot=3), now)
+            heading = math.remainder(3.0 + heading, math.tau)
+            add(Mileage(distance=distance, heading=heading, epoch=0, boot=3), now)
     for message in extra:
         made.add(message)
     return made

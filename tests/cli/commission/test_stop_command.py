@@ -21,7 +21,10 @@ from tests.recorder.samples import bare
 
 PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
          "mileages": "tel/bridge/mileage"}  # fmt: skip
-CAREFUL = ("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5")
+CAREFUL = (
+    *("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5"),
+    *("--set", "safety.angular_deceleration=0.5"),
+)
 
 
 def record(path: Path, *robots: Streams) -> Path:
@@ -42,12 +45,16 @@ def record(path: Path, *robots: Streams) -> Path:
     return path
 
 
-def driven(*speeds: float, first_s: float = 10.0, **how: Any) -> Streams:
-    """Return a stop from each speed (m/s), ten seconds apart; a negative one is backward."""
+def driven(*speeds: float, first_s: float = 10.0, turns: int = 2, **how: Any) -> Streams:
+    """Return a stop from each speed (m/s, a negative one is backward), ten seconds apart.
+
+    After them come turns of 0.5 rad/s to both sides.
+    """
     made = Streams()
-    for number, speed in enumerate(speeds):
+    for number, speed in enumerate((*speeds, 0.5, -0.5)[: len(speeds) + turns]):
         sign, begin_s = (1 if speed > 0 else -1), first_s + 10.0 * number
-        one = streams(sign=sign, speed=abs(speed), begin_s=begin_s, **how)
+        turn = number >= len(speeds)
+        one = streams(sign=sign, speed=abs(speed), begin_s=begin_s, turns=turn, **how)
         made.motions += one.motions
         made.velocities += one.velocities
         made.mileages += one.mileages
@@ -65,11 +72,13 @@ def test_stops_within_what_safety_reckons_with(
 ) -> None:
     assert main(["checkout", "stop", str(path), *CAREFUL]) == 0
     printed, errors = capsys.readouterr()
-    assert printed.count("a.mcap") == 5
+    assert printed.count("a.mcap") == 7
     assert "STOP backward" in printed
+    assert "STOP right" in printed
     assert "The worst is stop " in printed
-    assert "m/s2 (safety.deceleration is 0.5 m/s2)." in printed
+    assert "m/s2 (safety.deceleration is 0.5 m/s2). The fastest" in printed
     assert "The fastest stop is from 1.00 m/s; safety allows 1 m/s.\n" in printed
+    assert "rad/s2 (safety.angular_deceleration is 0.5 rad/s2). The fastest" in printed
     assert printed.endswith("No stop was longer than safety reckons with.\n")
     assert not errors
 
@@ -77,13 +86,13 @@ def test_stops_within_what_safety_reckons_with(
 def test_a_stop_that_was_too_long(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    other = record(tmp_path / "b.mcap", driven(0.6, -0.6, first_s=100.0, deceleration=0.3))
+    other = record(tmp_path / "b.mcap", driven(0.6, -0.6, first_s=100.0, turns=0, deceleration=0.3))
     words = ["checkout", "stop", str(path), str(other)]
     assert main(words) == 1
     printed = capsys.readouterr().out
-    assert "The worst is stop 6" in printed or "The worst is stop 7" in printed
+    assert "The worst is stop 8" in printed or "The worst is stop 9" in printed
     assert "NOT SAFE: this vehicle needs more" in printed
-    rows = [line.split()[3:-1] for line in printed.splitlines() if line.endswith("b.mcap")]
+    rows = [line.split()[4:-1] for line in printed.splitlines() if line.endswith("b.mcap")]
     assert len(rows) == 2
     for speed, _, deceleration, distance, needed, reckoned in (map(float, row) for row in rows):
         assert deceleration == pytest.approx(0.3, rel=0.04)
@@ -95,12 +104,13 @@ def test_a_stop_that_was_too_long(
 
 def test_each_direction_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     forward = record(tmp_path / "c.mcap", driven(0.5))
-    braked = driven(-0.5, first_s=20.0, command=Command.BRAKE)
+    braked = driven(-0.5, first_s=50.0, turns=1, command=Command.BRAKE)
     backward = record(tmp_path / "d.mcap", braked)
     assert main(["checkout", "stop", str(forward), str(backward), *CAREFUL]) == 1
     printed = capsys.readouterr().out
     assert "BRAKE backward" in printed
     assert "NOT MEASURED: a STOP backward.\n" in printed
+    assert "NOT MEASURED: a STOP left.\n" not in printed
     assert "NOT SAFE" not in printed
 
 
@@ -110,8 +120,8 @@ def test_a_stop_in_two_recordings_counts_once(
     """The black box records what a continuous recording also has."""
     assert main(["checkout", "stop", str(path), str(path), *CAREFUL]) == 0
     printed = capsys.readouterr().out
-    assert printed.count("a.mcap") == 5
-    assert "Left out: 5 in two recordings.\n" in printed
+    assert printed.count("a.mcap") == 7
+    assert "Left out: 7 in two recordings.\n" in printed
 
 
 def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -119,17 +129,17 @@ def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert main(["checkout", "stop", merged]) == 1
     assert "recordings of 001, 002: choose one with --robot" in capsys.readouterr().err
     assert main(["checkout", "stop", merged, "--robot", "001", *CAREFUL]) == 0
-    assert capsys.readouterr().out.count("two.mcap") == 2
+    assert capsys.readouterr().out.count("two.mcap") == 4
 
 
 def test_what_it_cannot_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    slow = record(tmp_path / "slow.mcap", driven(0.05))
+    slow = record(tmp_path / "slow.mcap", driven(0.05, turns=0))
     still = driven(0.5)
     still.motions = [motion for motion in still.motions if motion.command == "stop"]
     stands = record(tmp_path / "still.mcap", still)
     for words, code, error in (
         ((slow,), 1, "no stop to measure: a STOP or BRAKE from a steady speed, until standstill "),
-        ((slow,), 1, "(1 slower than 0.1 m/s)"),
+        ((slow,), 1, "(1 slower than 0.1 m/s and 0.2 rad/s)"),
         ((stands,), 1, "(no RUN with speed ends)"),
         ((), EXIT_CONFIG, "name at least one recording: start `t2 record` on the robot"),
         ((slow, "--only", "link"), EXIT_CONFIG, "has no steps and no report"),

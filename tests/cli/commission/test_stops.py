@@ -5,10 +5,17 @@ from collections.abc import Callable, Sequence
 import pytest
 from msgspec.structs import replace
 
-from cli.commission.stops import Streams, UnsuitableError, find_stops, slope
+from cli.commission.stops import (
+    DRIVING,
+    TURNING,
+    Streams,
+    UnsuitableError,
+    find_stops,
+    slope,
+)
 from common.freshness import NS_PER_S
 from common.messages import Bumper, Health, Message, Mileage, Motion, Velocity
-from common.motion import Command
+from common.motion import Command, Twist
 from tests.cli.commission.stops_fixture import at, changed, speed_at, streams
 
 
@@ -22,6 +29,28 @@ def test_a_stop_is_measured(sign: int, direction: str) -> None:
     assert stop.reaction == pytest.approx(0.1, abs=0.002)
     assert stop.deceleration == pytest.approx(0.5, abs=0.002)
     assert stop.distance == pytest.approx(0.8 * 0.1 + 0.64, abs=0.008)
+
+
+@pytest.mark.parametrize(("sign", "direction"), [(1, "left"), (-1, "right")])
+def test_a_stop_of_a_turn_is_measured(sign: int, direction: str) -> None:
+    """Across the end of the heading's range."""
+    (stop,), left_out = find_stops(streams(sign=sign, turns=True))
+    assert not left_out
+    assert (stop.axis, stop.direction, stop.speed) == (TURNING, direction, 0.8)
+    assert stop.twist == Twist(0.0, sign * 0.8)
+    assert stop.reaction == pytest.approx(0.1, abs=0.002)
+    assert stop.deceleration == pytest.approx(0.5, abs=0.002)
+    assert stop.distance == pytest.approx(0.8 * 0.1 + 0.64, abs=0.008)
+
+
+def test_a_stop_in_a_curve_is_one_of_each_axis() -> None:
+    made = changed(streams(), lambda v, now: replace(v, angular=v.linear / 2))
+    made.mileages = [replace(m, heading=(m.distance - 7) / 2) for m in made.mileages]
+    driving, turning = find_stops(made)[0]
+    assert (driving.axis, turning.axis) == (DRIVING, TURNING)
+    assert driving.twist == turning.twist == Twist(0.8, 0.4)
+    assert driving.deceleration == pytest.approx(2 * turning.deceleration, abs=0.004)
+    assert driving.distance == pytest.approx(2 * turning.distance)
 
 
 def test_the_distance_begins_between_two_counters() -> None:
@@ -121,6 +150,7 @@ RUN_FIRST, STOP_FIRST = (f"changed to {name} before standstill" for name in ("RU
 TOO_SOON = "changed to BRAKE before it slowed down"
 SPEEDS, COUNTERS = "velocities are missing", "counters are missing"
 ENDS, UNSTEADY = "the recording ends before standstill", "not at a steady speed"
+SLOW = "slower than 0.1 m/s and 0.2 rad/s"
 HIT, RESTART = "the bumper was pressed", "bridge or board restarted"
 
 
@@ -134,11 +164,11 @@ HIT, RESTART = "the bumper was pressed", "bridge or board restarted"
         (streams(commanding(Command.BRAKE, 0.3)), TOO_SOON),
         (braking(Command.STOP), STOP_FIRST),
         (braking(Command.BRAKE), ""),
-        (streams(speed=0.099), "slower than 0.1 m/s"),
+        (streams(speed=0.099), SLOW),
         (streams(speed=0.1), ""),
-        (turned(0.11), "turning"),
-        (turned(0.1), ""),
-        (turned(0.2, until_s=0.0), "turning"),
+        (turned(0.19), ""),  # as straight
+        (turned(0.2, -0.15), UNSTEADY),
+        (streams(speed=0.199, turns=True), SLOW),
         # 5 % of the faster velocity, in the 0.2 s before the newest one at the command
         (faster(0.041, -0.19), ""),
         (faster(0.043, -0.19), UNSTEADY),
@@ -182,13 +212,13 @@ def test_a_pressed_bumper(seconds: float, pressed: bool, reasons: dict[str, int]
 def test_stops_that_are_left_out_are_counted() -> None:
     made = streams(speed=0.05)
     made.motions *= 2
-    assert find_stops(made) == ([], {"slower than 0.1 m/s": 2})
+    assert find_stops(made) == ([], {SLOW: 2})
 
 
 def test_a_vehicle_that_turns_in_place_has_speed() -> None:
     made = streams(speed=0.0)
     made.motions[0] = replace(made.motions[0], angular=0.5)
-    assert find_stops(made) == ([], {"slower than 0.1 m/s": 1})
+    assert find_stops(made) == ([], {SLOW: 1})
 
 
 def test_what_begins_a_stop() -> None:
