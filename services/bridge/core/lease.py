@@ -186,9 +186,15 @@ def on_hit(lease: Lease, seq: int, now_ns: int) -> Lease:
 
 
 def on_estop(lease: Lease, received_ns: int) -> tuple[Lease, Command | None]:
-    """Brake for an emergency stop; another one is the same until safety has latched it."""
+    """Brake for an emergency stop; another one is the same until safety has latched it.
+
+    While a BRAKE of the authority is valid the board holds it already: a flood of emergency stops
+    adds no frames.
+    """
     if lease.estop is not None:
         return lease, None
+    if lease.braked and lease.over_since_ns is None:
+        return replace(lease, estop=received_ns), None
     return replace(lease, estop=received_ns, sent_ns=received_ns), BRAKE
 
 
