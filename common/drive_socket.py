@@ -33,6 +33,18 @@ def socket_path(where: BusSettings, robot: str) -> Path:
     return path
 
 
+def check_router(where: BusSettings) -> None:
+    """Refuse several routers: sessions of one robot could settle on different ones.
+
+    An emergency stop that reaches one of them would then pass safety or the bridge by.
+    """
+    if (count := len(set(where.connect))) > 1:
+        raise ConfigError(
+            f"bus.connect: bridge and safety need one router, not {count}: name the robot's own, "
+            "and connect it to others by bus.uplink"
+        )
+
+
 def prepare(path: Path) -> None:
     """Create the socket's directory; raise ``ConfigError`` if other users could connect."""
     folder = path.parent

@@ -12,7 +12,7 @@ import zenoh
 from common.bus.bus import Arrival, Bus
 from common.bus.publisher import Publisher
 from common.bus.session import WARN_PERIOD_S, Session, drive_config
-from common.drive_socket import prepare, socket_path
+from common.drive_socket import check_router, prepare, socket_path
 from common.freshness import NS_PER_S
 from common.keys import Topic
 from common.log import Logger
@@ -25,8 +25,9 @@ class DriveLink:
     """One end of the drive link; it opens and closes with its bus."""
 
     def __init__(self, bus: Bus, *, listens: bool) -> None:
-        """Raise ``ConfigError`` when the socket cannot be created or others could connect."""
+        """Raise ``ConfigError`` for several routers, or a socket that is not private."""
         self.other = "safety" if listens else "bridge"
+        check_router(bus.where)
         self.socket = socket_path(bus.where, bus.robot)
         prepare(self.socket)
         self._bus = bus

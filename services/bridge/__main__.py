@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from common import child_process, log, realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.config import load
-from common.drive_socket import prepare, socket_path
+from common.drive_socket import check_router, prepare, socket_path
 from common.errors import ConfigError, LinkError
 from common.settings import Board
 from services.bridge.config import BridgeConfig
@@ -23,6 +23,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if argv is None else argv
     try:
         config = load(BridgeConfig, sources(arguments("bridge").parse_args(given))).config
+        check_router(config.bus)
         prepare(socket_path(config.bus, config.robot.id))  # the bridge listens there
     except ConfigError as error:
         print(f"bridge: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet

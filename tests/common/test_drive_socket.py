@@ -2,12 +2,15 @@
 
 import os
 import socket
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from common import drive_socket
+from common.cli_args import EXIT_CONFIG
 from common.drive_socket import prepare, socket_path
 from common.errors import ConfigError
 from common.settings import BusSettings
@@ -29,6 +32,23 @@ def test_both_ends_derive_one_path_and_two_stacks_or_networks_two(
     assert {path.parent for path in paths} == {Path(f"/elsewhere/t2-{os.getuid()}")}
     given = BusSettings(drive="unixsock-stream//run/t2-drive/drive.sock")
     assert socket_path(given, "001") == Path("/run/t2-drive/drive.sock")
+
+
+def test_bridge_and_safety_need_one_router() -> None:
+    one, other = "tcp/127.0.0.1:7447", "tcp/127.0.0.1:7448"
+    for where in (BusSettings(listen=(one, other)), BusSettings(connect=(one, one))):
+        drive_socket.check_router(where)
+    with pytest.raises(ConfigError, match="bridge and safety need one router, not 2"):
+        drive_socket.check_router(BusSettings(connect=(one, other)))
+
+
+@pytest.mark.parametrize("name", ["bridge", "safety"])
+def test_neither_starts_with_two_routers(name: str) -> None:
+    words = ["--set", 'bus.connect=["tcp/127.0.0.1:7447", "tcp/127.0.0.1:7448"]']
+    command = [sys.executable, "-m", f"services.{name}", *words]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == EXIT_CONFIG
+    assert "bus.connect: bridge and safety need one router" in ended.stderr
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 import zenoh
@@ -25,7 +26,8 @@ from services.safety.core.inputs import DriveRequest
 from services.safety.service import SafetyService
 from tests.common.bus_fixture import until_received
 from tests.factories import safety_state
-from verification.harness.bus import at, joined, running
+from verification.harness.bus import at, joined, router_process, running
+from verification.harness.ports import free_port
 from verification.harness.waiting import wait_until
 
 ROBOT = "berlin-007"
@@ -37,9 +39,11 @@ def make_node(endpoint: str, *sets: str) -> Node[SafetyConfig]:
 
 
 @contextlib.contextmanager
-def safety_on(endpoint: str) -> Iterator[Node[SafetyConfig]]:
+def safety_on(endpoint: str, of_estop: str = "") -> Iterator[Node[SafetyConfig]]:
+    """Run a safety service; its emergency stop's session may have another router."""
     node = make_node(endpoint)
-    reader = node.open_bus()
+    reader = Bus(at(of_estop or endpoint), ROBOT, node.loop.post)
+    node.buses.append(reader)
     SafetyService(node, reader)
     with running(node.loop):
         node.open()
@@ -87,6 +91,36 @@ def safety(shared_router: str) -> Iterator[Safety]:
         made = Safety(node, session)
         with joined(at(shared_router), ROBOT, loop, made.watch):
             yield made
+
+
+def test_two_routers_leave_the_path_of_the_emergency_stop_unproven(shared_router: str) -> None:
+    other = f"tcp/127.0.0.1:{free_port()}"
+    with (
+        router_process(other),
+        running(Loop()) as loop,
+        safety_on(shared_router, other) as node,
+        zenoh.open(client_config(at(shared_router))) as session,
+    ):
+        made = Safety(node, session)
+        with joined(at(shared_router), ROBOT, loop, made.watch):
+            streams: list[tuple[Any, Any]] = [
+                (made.drive.publisher(topic), message)
+                for topic, message in (
+                    (keys.VELOCITY, Velocity(linear=0.0, angular=0.0)),
+                    (keys.BUMPER, Bumper(pressed=False)),
+                )
+            ]
+
+            def missing() -> str:
+                for publisher, message in streams:
+                    publisher.put(message)
+                causes = made.states[-1].causes if made.states else ()
+                return next((one.text for one in causes if one.name == "starting"), "")
+
+            wait_until(lambda: "velocity" not in (text := missing()) and text, "the samples")
+            count = len(made.states)
+            wait_until(lambda: missing() and len(made.states) > count + 20, "more states")
+            assert "the emergency stop's path through the router" in missing()
 
 
 def test_it_stops_from_the_beginning_judges_a_hit_and_answers_calls(safety: Safety) -> None:

@@ -16,6 +16,7 @@ T = TypeVar("T")
 # The bridge ends a hit after three clear samples, so a hit is at least three samples long. Fewer
 # lost samples cannot hide it.
 LOST_SAMPLES = 3  # between two decisions, at most
+ESTOP_PATH = "the emergency stop's path through the router"
 MOVED_ALONE = "The vehicle moved without a command while safety was absent."
 # Of the polls of the last 0.2 s, ten at the full rate: this many lost ones can hide a hit of 60 ms.
 LOST_POLLS = 3
@@ -101,6 +102,8 @@ def _starting(inputs: Inputs, settings: Safety, keepalives: list[str]) -> Observ
     missing = [name for name, latest in needed.items() if latest is None]
     if not inputs.estop_connection:
         missing.append("emergency stop")
+    elif inputs.estop_path is None:
+        missing.append(ESTOP_PATH)
     missing += [f"emergency stop keepalive of {name}" for name in keepalives]
     text = f"Waiting for the first sample of: {', '.join(missing)}."
     return Observation("starting", bool(missing), text=text)
@@ -165,9 +168,7 @@ def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Obse
         and _is_old(inputs.switches, settings.times.switches_age, now_ns),
         "left driver": _is_old(inputs.left, settings.times.driver_age, now_ns),
         "right driver": _is_old(inputs.right, settings.times.driver_age, now_ns),
-        "the emergency stop's path through the router": _is_old(
-            inputs.estop_path, settings.times.estop_path_age, now_ns
-        ),
+        ESTOP_PATH: _is_old(inputs.estop_path, settings.times.estop_path_age, now_ns),
     }
     old = [name for name, is_old in too_old.items() if is_old]
     return Observation("silent", bool(old), text=f"No recent data: {', '.join(old)}.")

@@ -39,7 +39,7 @@ from services.safety.core.inputs import (
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, Verdict
 from services.safety.report import state_message, text
-from tests.factories import link
+from tests.factories import link, safety_state
 
 TICK_S = 0.02
 FREE: tuple[float | None, ...] = (None,) * 8
@@ -121,6 +121,7 @@ class PolicyFixture:
             "right": Driver(faults=(), bits=self.right_bits),
             "switches": self.switches,
             "link": self.link,
+            "estop_path": safety_state(),
         }
         for name, sample in samples.items():
             if name not in self.muted:

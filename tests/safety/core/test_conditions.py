@@ -120,6 +120,8 @@ BY_INPUTS: list[tuple[dict[str, Any], str, str | None]] = [
     (driver("right", "encoder"), "driver_right", "The right motor driver reports: encoder."),
     ({"leaving": True}, "leaving", ""),
     ({"estop_connection": 0}, "starting", "Waiting for the first sample of: emergency stop."),
+    ({"estop_path": None}, "starting",
+     "Waiting for the first sample of: the emergency stop's path through the router."),
     ({"switches": None}, "starting", "Waiting for the first sample of: switches."),
     (linked(state="lost"), "link", "The link to the board is lost."),
     (linked(state="never"), "link", "No frame came from the board yet."),

@@ -9,8 +9,6 @@ from common.freshness import NS_PER_S, Latest
 from common.messages import (
     Bumper,
     Drive,
-    Limits,
-    SafetyState,
     Switches,
     Velocity,
 )
@@ -259,17 +257,25 @@ def test_a_stall_in_which_an_emergency_stop_may_be_missed_latches(
 
 def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_request() -> None:
     fixture = PolicyFixture().running(0.3)
-    state = SafetyState(
-        verdict="run", latched=(), causes=(), source=None, heartbeat=1, text="",
-        limits=Limits(forward=1.0, backward=1.0, angular=1.0),
-    )  # fmt: skip
-    fixture.inputs = replace(fixture.inputs, estop_path=Latest(state, fixture.now_ns))
+    fixture.muted = {"estop_path"}
     assert fixture.drive(0.3, seconds=0.18).command == "run"
     assert fixture.drive(0.3, seconds=0.08).command == "stop"
     assert "the emergency stop's path through the router" in fixture.state.latches["silent"].text
-    fixture.inputs = replace(
-        fixture.inputs, estop_path=Latest(state, fixture.now_ns + 2 * NS_PER_S)
-    )
+    fixture.muted = set()
+    assert fixture.drive(0.3, seconds=1.0).command == "stop"
+    fixture.drive()
+    assert fixture.drive(0.3).command == "run"
+
+
+def test_nothing_drives_before_the_emergency_stop_s_path_was_proven() -> None:
+    fixture = PolicyFixture()
+    fixture.muted = {"estop_path"}
+    fixture.tick(40)
+    fixture.drive()
+    assert fixture.drive(0.3, seconds=60.0).command == "stop"
+    path = "the emergency stop's path through the router"
+    assert fixture.text("starting") == f"Waiting for the first sample of: {path}."
+    fixture.muted = set()
     assert fixture.drive(0.3, seconds=1.0).command == "stop"
     fixture.drive()
     assert fixture.drive(0.3).command == "run"
