@@ -83,7 +83,8 @@ class BusSettings(ProtectedSection, frozen=True, kw_only=True):
 
     protective: ClassVar[Limits] = {"lease": (0.0, 2.0)}
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
-    connect: tuple[str, ...] = ()  # where services connect; empty means ``listen``
+    # where services connect, bridge and safety to one router only; empty means ``listen``
+    connect: tuple[str, ...] = ()
     uplink: tuple[str, ...] = ()  # the site's router, to which the robot's router connects
     # the drive link between bridge and safety, unixsock-stream/PATH; empty means derived.
     drive: str = ""
