@@ -210,8 +210,8 @@ def test_an_emergency_stop_brakes_at_once_and_until_safety_has_latched_it() -> N
     assert on_estop(lease, NOW + MS) == (lease, None)  # repeated until it is confirmed
     braked = replace(ARMED, braked=True)
     assert on_estop(braked, NOW) == (replace(braked, estop=NOW), None)  # the board holds BRAKE
-    over = replace(braked, over_since_ns=NOW - MS)
-    assert on_estop(over, NOW) == (replace(over, estop=NOW, sent_ns=NOW), BRAKE)
+    ended = replace(braked, over_since_ns=NOW - MS)
+    assert on_estop(ended, NOW) == (replace(ended, estop=NOW, sent_ns=NOW), BRAKE)
     over = NOW + LEASE + MS
     lease, order = on_tick(lease, over, LEASE, COAST, True)
     assert order is BRAKE
