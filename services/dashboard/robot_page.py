@@ -10,6 +10,8 @@ import msgspec
 
 from common import clock
 from common.bus.bus import Bus
+from common.freshness import NS_PER_S
+from common.heartbeat import MAX_CALL_AGE_NS
 from common.messages import Level
 from services.dashboard import client_messages as client
 from services.dashboard.config import DashboardConfig
@@ -49,6 +51,7 @@ class RobotPage:
             "vehicle": self._config.vehicle,
             "gears": self._config.dashboard.gears_linear,
             "hold_s": HOLD_S,
+            "call_s": MAX_CALL_AGE_NS / NS_PER_S,
             "keepalive": bool(self._config.dashboard.estop_keepalive),
         }
         self._send([viewer], hello)

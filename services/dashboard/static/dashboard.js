@@ -175,7 +175,9 @@ function showTexts() {
 function reset() {
   if (!isDriver()) toast(driving.viewOnly(fast) || "take_first");
   else if (stateBar.resetRefusal(newest())) toast(stateBar.resetRefusal(newest()), "warning");
-  else send({ k: "reset", echo: echoOf(drawn), name: name() });
+  else if (delayNow().delay > hello.call_s) {
+    toast(t("hold.slow", delayNow().delay.toFixed(2), hello.call_s.toFixed(2)), "warning"); // safety refuses it
+  } else send({ k: "reset", echo: echoOf(drawn), name: name() });
 }
 
 // The robot belongs to this page: a reload keeps it, and a change is never silent.

@@ -25,6 +25,7 @@ let barred = ""; // why this page may not drive
 let refused = null; // { code, key }: a key that is held, and why it is refused
 let pad = { push: null, state: "" }; // what the gamepads say
 let repeats = null; // { code, at }: the held key that repeats, and its last repeat
+let isHeld = false; // a control, at the last snapshot
 let sent = false; // whether the server has a hold from here
 
 const clamped = (value) => Math.max(-1, Math.min(1, value));
@@ -56,6 +57,7 @@ export function answer(echo, isDriver, hold, safety) {
   if (!driving) return;
   if (repeats && performance.now() - repeats.at > REPEATS_MS) letGo(); // its key-up was lost
   const controls = held();
+  isHeld = !!controls;
   if (controls) sent = page.send({ k: "hold", echo, ...controls });
   // After a lapse the server requires a release before the next hold.
   else if (sent || hold !== "free") free();
@@ -71,6 +73,7 @@ export function letGo() {
   stick = null;
   releasing = refused = repeats = null;
   gamepads.drop();
+  isHeld = false;
   if (driving) free();
   knob(0, 0);
 }
@@ -119,10 +122,10 @@ function holdText(isDriver, driver) {
   if (refused) return t(refused.key);
   if (!isDriver) return "";
   const { delay, limit } = page.delay();
-  const isSlow = driver.hold !== "held" && (sent || driver.hold === "lapsed") && delay > limit;
+  const isSlow = driver.hold !== "held" && (isHeld || driver.hold === "lapsed") && delay > limit;
   if (isSlow) return t("hold.slow", delay.toFixed(2), limit.toFixed(2));
   if (pad.state) return t(`hold.${pad.state}`);
-  return t(driver.hold === "free" && sent ? "hold.waiting" : `hold.${driver.hold}`);
+  return t(driver.hold === "free" && isHeld ? "hold.waiting" : `hold.${driver.hold}`);
 }
 
 // Why safety refuses a release in this direction now, as a key; empty if it does not.
@@ -248,7 +251,7 @@ const typing = (event) => event.target.matches?.("input");
 
 // The place of a key, whatever the layout; by its letter where no place is reported.
 function placeOf(event) {
-  const key = event.key.normalize("NFKC");
+  const key = (event.key ?? "").normalize("NFKC"); // a form that is filled in sends none
   if (event.code) return event.code;
   if (key === " ") return "Space";
   if (/^[a-z]$/i.test(key)) return `Key${key.toUpperCase()}`;
@@ -260,7 +263,7 @@ const isForeign = (event) => ["Process", "Unidentified", "Dead"].includes(event.
   || (event.key.length === 1 && !/[ -~]/.test(event.key.normalize("NFKC")));
 
 function refuseKey(event) {
-  if (event.repeat) return;
+  if (event.repeat || !event.key) return;
   if (isForeign(event)) page.toast("key_foreign", "warning");
   else if (event.key.length === 1) page.toast(page.t("key_unknown", event.key), "warning");
 }

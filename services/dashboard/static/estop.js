@@ -16,10 +16,11 @@
   var MIN_AGE_MS = 300; // an earlier snapshot may be older than the request
   var UNCONFIRMED_MS = 3000;
   var KEPT_MS = 30000;
-  var STORE = "t2.estop.";
+  var STORE = "t2.estop."; // and the robot: time of day, state, sent
+  var PATTERN = /^(\d{1,15}) (pending|late|handed) (true|false)$/;
   // A letter that looks like E is E, wherever it is: Cyrillic, Greek.
   var LETTERS_E = "e\u0435\u03b5";
-  var stops = {}; // by robot: { since, wall, state, sent, status, barred }
+  var stops = Object.create(null); // by robot: { since, wall, state, sent, status, barred }
   var viaXhr = false;
   var press = { type: "", at: -Infinity };
   var page = null; // what dashboard.js offers
@@ -72,7 +73,7 @@
   function store(robot) {
     var it = stops[robot];
     try {
-      if (it) localStorage.setItem(STORE + robot, JSON.stringify([it.wall, it.state, it.sent]));
+      if (it) localStorage.setItem(STORE + robot, it.wall + " " + it.state + " " + it.sent);
       else localStorage.removeItem(STORE + robot);
     } catch (error) { /* then a reload forgets it */ }
   }
@@ -81,15 +82,17 @@
     try {
       for (var i = 0; i < localStorage.length; i += 1) {
         var key = localStorage.key(i);
-        if (key.indexOf(STORE) === 0) restoreOne(key.slice(STORE.length), JSON.parse(localStorage.getItem(key)));
+        var found = key.indexOf(STORE) === 0 && PATTERN.exec(localStorage.getItem(key));
+        if (found) restoreOne(key.slice(STORE.length), Number(found[1]), found[2], found[3] === "true");
       }
     } catch (error) { /* nothing is stored */ }
   }
 
-  function restoreOne(robot, values) {
-    var age = new Date().getTime() - values[0];
-    var young = values[1] === "pending" && age >= 0 && age < KEPT_MS;
-    stops[robot] = { since: now() - age, wall: values[0], state: young ? "pending" : "late", sent: !!values[2] };
+  function restoreOne(robot, wall, state, sent) {
+    var age = new Date().getTime() - wall;
+    var young = age >= 0 && age < KEPT_MS;
+    if (state === "pending" && !young) state = "late";
+    stops[robot] = { since: now() - age, wall: wall, state: state, sent: sent };
   }
 
   // --- sending ----------------------------------------------------------------------------------
