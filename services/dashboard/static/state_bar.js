@@ -83,7 +83,7 @@ function showHead(view) {
   chip("driver", off ? "" : driver(view), isDriver && !fast.driver.other ? "clear" : "slow");
   $("delay").hidden = !fast;
   set("delay-value", `${delay.toFixed(2)} s`);
-  $("delay").dataset.tone = delay > limit ? "stop" : "";
+  $("delay").dataset.tone = delay > limit ? "late" : "";
   const keeper = off || !keepsAlive ? "" : fast.keeper === viewer ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
   chip("watching", off || !view.viewers ? "" : t("watching", view.viewers));
