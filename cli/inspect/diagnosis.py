@@ -5,7 +5,7 @@ part of the path is wrong. What follows from an earlier finding is no problem of
 gives one remedy, an instruction to the operator.
 """
 
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -104,8 +104,9 @@ class Observation:
     listed: bool = True  # whether the router has listed the tokens in time
     instances: dict[str, int] = field(default_factory=dict)  # by service, from tokens
     others: list[str] = field(default_factory=list)  # other robots at the same router
-    may_drive: bool | None = None
-    may_call: bool | None = None
+    sources: list[str] | None = None  # as which this certificate may drive; None without safety
+    limits: list[str] = field(default_factory=list)  # as which it may limit the speed
+    calls: list[str] = field(default_factory=list)
     may_stop: bool | None = None  # as it seems
     delays_s: list[float] = field(default_factory=list)  # by both wall clocks
     rates: dict[str, float] = field(default_factory=dict)  # Hz by path
@@ -195,8 +196,6 @@ def versions(seen: Observation) -> Iterator[Finding]:
 
 def rights(seen: Observation) -> Iterator[Finding]:
     """Report what the router allows this laptop to do."""
-    allowed = {"driving": seen.may_drive, "calls": seen.may_call}
-    barred = [name for name, may in allowed.items() if may is False]
     if not seen.instances:
         yield Finding("rights", "unknown", "no service found")
     elif not seen.rates:
@@ -206,16 +205,25 @@ def rights(seen: Observation) -> Iterator[Finding]:
             "if other laptops receive nothing either, all services hang: restart them"
         )
         yield Finding("rights", "wrong", text, todo)
-    elif barred:
-        text = f"this laptop may read; safety does not receive its {' and '.join(barred)}"
-        if seen.may_stop is False:
-            text += ", nor, as it seems, its emergency stop: use the vehicle's own switch"
-        todo = "`t2 keys list`, where the certificate authority is, shows its certificate's role"
-        yield Finding("rights", "note", text, todo)
-    elif None in allowed.values():
+    elif seen.sources is None:
         yield Finding("rights", "unknown", "driving and calls require safety")
     else:
-        yield Finding("rights", "ok", "this laptop may read, call and drive")
+        yield _granted(seen, seen.sources)
+
+
+def _granted(seen: Observation, sources: Sequence[str]) -> Finding:
+    """Return what safety and the other services receive from this certificate."""
+    rights = {"drive as": sources, "limit as": seen.limits, "call": seen.calls}
+    granted = [f"{what} {', '.join(names)}" for what, names in rights.items() if names]
+    text = f"this laptop may {'; '.join(['read', *granted])}"
+    if not granted:
+        text = "this laptop may read and stop" if seen.may_stop else "this laptop may only read"
+    if seen.may_stop is False:
+        text += "; as it seems, not stop: use the vehicle's own switch"
+    if granted:
+        return Finding("rights", "ok", text)
+    todo = "`t2 keys list`, where the certificate authority is, shows its certificate's role"
+    return Finding("rights", "note", text, todo)
 
 
 def clock(seen: Observation) -> Iterator[Finding]:

@@ -13,6 +13,9 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
+
+import msgspec
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
@@ -26,6 +29,7 @@ from common.cli_args import VERSION, source_words, with_options
 from common.codec import Sample
 from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
+from common.keys import Topic
 from common.messages import Health, Link, SafetyState
 from common.settings import BusSettings, Shared
 from common.text import printable
@@ -34,6 +38,11 @@ from common.text_file import pem_problem
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
 CONNECT_S = 2.0
 ALERT_S = 0.3  # after the handshake, the router's alert about our certificate arrives within this
+# Tables of settings that name sources, and names that are tried without the settings.
+SOURCES: dict[Topic[Any], tuple[str, tuple[str, ...]]] = {
+    keys.DRIVE: ("safety.sources", ("teleop", "web")),
+    keys.LIMIT: ("safety.limits", ()),
+}
 STREAMS = ("tcp", "tls", "ws")
 MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
 KEYS = (
@@ -164,13 +173,31 @@ def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Obse
         # The rules allow all members to query the admin space, and nothing to anybody else.
         seen.stranger = "" if opened.query("@/*/*") else common_name(bus)
     if "safety" in seen.instances:
-        seen.may_drive = opened.has_reader(keys.DRIVE.on(robot, source="teleop"))
-        seen.may_call = opened.has_server(keys.RESET.on(robot))
+        seen.sources, seen.limits = (as_source(opened, robot, topic) for topic in SOURCES)
+        seen.calls = [
+            each.path.removeprefix("srv/") for each in keys.CALLS
+            if each.server in seen.instances and opened.has_server(each.on(robot))
+        ]  # fmt: skip
         is_fleet = common_name(bus).startswith("fleet.")  # it may stop, and nothing else
-        seen.may_stop = is_fleet or seen.may_drive or not is_barred(opened, robot)
+        seen.may_stop = is_fleet or bool(seen.sources) or not is_barred(opened, robot)
     for sample in opened.queued():  # the queries take seconds: judge what has arrived meanwhile
         add_sample(sample, seen)
     return seen
+
+
+def as_source(opened: Probe, robot: str, topic: Topic[Any]) -> list[str]:
+    """Return the sources of safety's settings as which this certificate may publish."""
+    table, usual = SOURCES[topic]
+    names = {*usual}
+    for answer in opened.query(keys.info_key(robot, "safety", "config")):
+        if not answer.refusal:
+            names |= {
+                path.split(".")[2]
+                for path in msgspec.json.decode(answer.payload, type=dict[str, Any])
+                if path.startswith(f"{table}.")
+            }
+    by_key = {topic.on(robot, source=name): name for name in names}
+    return sorted(by_key[key] for key in opened.readers(by_key))
 
 
 def listen(opened: Probe, robot: str, seconds: float, seen: Observation) -> None:

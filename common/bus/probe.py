@@ -6,7 +6,7 @@ queue samples.
 
 import queue
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -116,13 +116,25 @@ class Probe:
     def has_reader(self, *of: str) -> bool:
         """Return whether another session subscribes to one of these keys; publishes nothing."""
         elsewhere = zenoh.Locality.REMOTE  # subscriptions of this session do not count
-        return _matches(
+        return _undeclared(
             *(self._session.declare_publisher(key, allowed_destination=elsewhere) for key in of)
         )
 
+    def readers(self, keys: Collection[str]) -> set[str]:
+        """Return the keys to which another session subscribes, and that may be published here."""
+        elsewhere = zenoh.Locality.REMOTE
+        declared: dict[str, Any] = {
+            key: self._session.declare_publisher(key, allowed_destination=elsewhere) for key in keys
+        }
+        _matches(*declared.values(), every=True)
+        found = {key for key, each in declared.items() if each.matching_status.matching}
+        for each in declared.values():
+            each.undeclare()
+        return found
+
     def has_server(self, key: str) -> bool:
         """Return whether a queryable matches the key; sends no query."""
-        return _matches(self._session.declare_querier(key))
+        return _undeclared(self._session.declare_querier(key))
 
     def _queue(self, sample: zenoh.Sample) -> None:
         received_ns, wall_ns = clock.now_ns(), time.time_ns()
@@ -149,15 +161,21 @@ def probe(where: BusSettings) -> Iterator[Probe]:
         yield Probe(session)
 
 
-def _matches(*declared: Any) -> bool:
-    """Return whether one is matched within ``MATCH_TIMEOUT_S``, and undeclare all."""
+def _matches(*declared: Any, every: bool = False) -> bool:
+    """Return whether one is matched within ``MATCH_TIMEOUT_S``, or all of them."""
     end_s = time.monotonic() + MATCH_TIMEOUT_S
+    enough = all if every else any
+    while not enough(each.matching_status.matching for each in declared):
+        if time.monotonic() > end_s:
+            return False
+        time.sleep(POLL_PERIOD_S)
+    return True
+
+
+def _undeclared(*declared: Any) -> bool:
+    """Return whether one is matched in time, and undeclare all."""
     try:
-        while not any(each.matching_status.matching for each in declared):
-            if time.monotonic() > end_s:
-                return False
-            time.sleep(POLL_PERIOD_S)
-        return True
+        return _matches(*declared)
     finally:
         for each in declared:
             each.undeclare()

@@ -3,10 +3,12 @@
 Each cell of the table of rights is tried in ``tests/cli/keys/test_rights.py``.
 """
 
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from cli.__main__ import main
@@ -129,6 +131,63 @@ def test_t2_estop_reports_the_reason_before_the_advice(
         assert "does not confirm" in advice
         (unknown,) = stopped("driver", "anna", "009")
         assert "robot 009 is not at this router (seen: 001). If it moves, USE THE" in unknown
+
+
+@contextmanager
+def repeated(call: Callable[[], object]) -> Iterator[None]:
+    """Repeat a call in a thread for the context."""
+    ended = threading.Event()
+
+    def run() -> None:
+        while not ended.wait(0.05):
+            call()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def test_t2_doctor_judges_the_rights_of_its_own_certificate(
+    join: Join, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def rights(role: str, name: str) -> list[str]:
+        where = connecting(site.settings(role, name), secured)
+        sets = [f"--set=bus.{field}={getattr(where, field)}" for field in CERTIFIED]
+        main(["doctor", "--duration", "1", *sets, f"--set=bus.connect={secured}"])
+        lines = capsys.readouterr().out.splitlines()
+        return [line for line in lines if line.startswith("rights")]
+
+    def safety(bus: Bus) -> None:
+        for topic, source in ((keys.DRIVE, "patrol"), (keys.DRIVE, "web"), (keys.LIMIT, "lidar")):
+            bus.on_any(topic.on(bus.robot, source=source), lambda _: None)
+        names = ("sources.patrol.priority", "sources.web.priority", "limits.lidar.lease")
+        config = {f"safety.{name}": {"value": 1, "origin": "default"} for name in names}
+        bus.answer(
+            keys.info_key(bus.robot, "safety", "config"),
+            lambda: msgspec.json.encode(config),
+            "application/json",
+        )
+
+    site = Site(tmp_path / "keys")
+    site.member("robot", "001", "--address", "127.0.0.1")
+    site.member("driver", "planner", "--robot", "001", "--source", "patrol")
+    site.member("device", "lidar", "--robot", "001", "--source", "lidar")
+    site.member("viewer", "hall")
+    with site.router(site.settings("robot", "001")) as (secured, onboard):
+        robot = OnBoard(join, onboard)
+        join(at(onboard), "001", safety)
+        with repeated(lambda: robot.state.put(safety_state(heartbeat=1))):
+            (planner,) = rights("driver", "planner")
+            assert "ok" in planner.split()
+            assert planner.endswith("this laptop may read; drive as patrol")
+            (lidar,) = rights("device", "lidar")
+            assert lidar.endswith("this laptop may read; limit as lidar")
+            (hall,) = rights("viewer", "hall")
+            assert "this laptop may only read; as it seems, not stop" in hall
 
 
 def test_t2_call_reports_why_no_service_answers(site: Site, join: Join) -> None:

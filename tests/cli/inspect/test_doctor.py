@@ -48,7 +48,7 @@ def test_what_it_observes(buses: BusFixture, tool: Tool) -> None:
     result = tool("doctor", "--duration", "1")
     assert (result.code, result.err) == (1, "")
     found = [(each["where"], each["level"], each["text"]) for each in result.lines]
-    assert ("rights", "ok", "this laptop may read, call and drive") in found
+    assert ("rights", "ok", "this laptop may read; drive as teleop; call safety/reset") in found
     assert ("services", "ok", "bridge is up for 60 s") in found
     assert ("services", "wrong", "odom is not running") in found
     assert not any(level == "wrong" and "odom/odometry" in text for _, level, text in found)
