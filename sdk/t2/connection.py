@@ -74,6 +74,8 @@ def open_session(endpoint: str, config: str | Path | None) -> tuple[zenoh.Sessio
     for address in addresses:
         if not ENDPOINT.fullmatch(address):
             raise LinkError(f"{address!r} is no endpoint, such as {LOCAL} or tls/ROBOT:7447")
+    if any(address.startswith(("tls/", "quic/")) for address in addresses):
+        check_key(bus)
     try:
         made = zenoh.open(zenoh.Config.from_json5(json.dumps(settings(addresses, bus))))
     except zenoh.ZError as error:
@@ -93,14 +95,20 @@ def read(file: Path) -> dict[str, Any]:
     try:
         file = Path(expanded(str(file)))
         bus: dict[str, Any] = toml.loads(read_text(file)).get("bus", {})
-        files = {name: file.parent / expanded(str(bus[name])) for name in FILES if bus.get(name)}
-        for name, each in files.items():
-            if problem := pem_problem(each.read_bytes()):
-                raise LinkError(f"{file}: bus.{name} {each}: {problem}")
+        names = {name: expanded(str(bus[name])) for name in FILES if bus.get(name)}
     except (OSError, ValueError) as error:
-        place = getattr(error, "filename", None) or file
-        raise LinkError(f"{place}: {getattr(error, 'strerror', error)}") from None
-    return bus | {name: str(each) for name, each in files.items()}
+        raise LinkError(f"{file}: {getattr(error, 'strerror', error)}") from None
+    return bus | {name: str(file.parent / each) for name, each in names.items()}
+
+
+def check_key(bus: dict[str, Any]) -> None:
+    """Raise ``LinkError`` for an encrypted private key: Zenoh names no reason."""
+    try:
+        problem = pem_problem(Path(bus["private_key"]).read_bytes())
+    except (KeyError, OSError):
+        return  # the connection fails, with Zenoh's reason
+    if problem:
+        raise LinkError(f"bus.private_key {bus['private_key']}: {problem}")
 
 
 def settings(endpoints: list[str], bus: dict[str, Any]) -> dict[str, Any]:

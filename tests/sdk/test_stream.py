@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -267,3 +268,15 @@ def test_tls_files_go_into_the_settings_of_zenoh() -> None:
     plain = settings([LOCAL], {})["transport"]["link"]
     assert plain == {"rx": {"max_message_size": 8 * 2**20}}
     assert made["transport"]["link"]["rx"] == plain["rx"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_settings_of_any_editor_and_an_encrypted_key(
+    tmp_path: Path, encoding: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "key.pem").write_text("-----BEGIN ENCRYPTED PRIVATE KEY-----\n", encoding="ascii")
+    text = '[bus]\r\nconnect = ["tls/robot:7447"]\r\nprivate_key = "~/key.pem"\r\n'
+    (tmp_path / "bus.toml").write_bytes(text.encode(encoding))
+    with pytest.raises(t2.LinkError, match=rf"private_key {tmp_path}/key.pem: is encrypted"):
+        t2.connect("001", config="~/bus.toml")
