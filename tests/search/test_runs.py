@@ -8,7 +8,8 @@ import pytest
 from msgspec.structs import replace
 
 from services.safety.core.planning import SonarLimit, Zones
-from verification.search.draw import Draw, draw
+from services.teleop.core.hold import Deadman
+from verification.search.draw import Draw, Value, draw
 from verification.search.run import run
 
 BATCHES, BATCH = 25, 8
@@ -43,3 +44,18 @@ def test_a_run_is_the_same_each_time() -> None:
 def test_a_safety_that_ignores_walls_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Zones, "limit", lambda *_: SonarLimit(1.0))
     assert any(run(draw(seed)).violations for seed in SOUND)
+
+
+@pytest.mark.parametrize("is_released", [True, False])
+def test_a_frozen_gamepad_that_drives_is_found(
+    is_released: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not is_released:
+        monkeypatch.setattr(Deadman, "is_silent", lambda *_: False)
+    frozen: dict[str, Value] = {
+        "operator.device": "gamepad",
+        "operator.manoeuvres": 2,
+        "fault.gamepad_frozen": 2.0,
+    }
+    result = run(Draw(6, frozen))
+    assert result.violations == ([] if is_released else ["a frozen gamepad drives"])

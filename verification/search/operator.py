@@ -21,6 +21,8 @@ from verification.search.stack import Stack as Robot
 
 RELEASE_KEYS: dict[m.Direction, str] = {"forward": "f", "backward": "b"}
 KEYS = ("w", "w", "w", "w", "s", "s", "a", "d", "z", "c", "end", "pagedown")
+TICK_S = 0.05
+FROZEN_S = 2.0  # that a gamepad may drive after it froze
 PATIENCE_S = 0.7  # without room, until the next manoeuvre
 LET_GO_S = 0.4  # for a neutral request
 LOOK_S = 1.2  # from a stop that is latched to the first call
@@ -69,6 +71,9 @@ class Operator(Source):
         self._controls = Controls(Teleop())
         self._controls.gear = int(draw.get("operator.gear", 3))
         self._events = 0
+        self._stick = Stick(Deflection(), deadman=False)
+        self._frozen_ns: int | None = None  # since when the gamepad keeps its reading
+        self.violations: list[str] = []
         self._began_ns: int | None = None  # the current manoeuvre
         self._idle_until_ns = 0
         self._blocked_ns: int | None = None
@@ -99,13 +104,21 @@ class Operator(Source):
         now_ns = self.process.net.now_ns
         driving = self._began_ns is not None
         push = self._script[-1].push if driving and self._script else Deflection()
-        stick = Stick(push, deadman=driving, events=self._events)
-        request = self._controls.tick(stick if self._gamepad else None, now_ns)
+        if self._frozen_ns is None:
+            self._stick = Stick(push, deadman=driving, events=self._events)
+        request = self._controls.tick(self._stick if self._gamepad else None, now_ns)
         self.message = request
         moves = request is not None and not (request.linear == 0 == request.angular)
+        frozen_s = (now_ns - (self._frozen_ns or now_ns)) / NS_PER_S
+        if moves and self._gamepad and frozen_s > FROZEN_S + TICK_S:
+            self.violations.append("a frozen gamepad drives")
         self.asks_since_ns = (self.asks_since_ns or now_ns) if moves else None
         if now_ns >= self.muted_until_ns:
             super().publish()
+
+    def freeze(self, frozen: bool) -> None:
+        """Freeze the gamepad in its reading, or end that; keys go on."""
+        self._frozen_ns = self.process.net.now_ns if frozen else None
 
     def _drive(self, state: m.SafetyState, now_ns: int) -> None:
         self._latched_ns = self._free_ns = None
@@ -133,7 +146,8 @@ class Operator(Source):
         self._controls.press(Press(key, now_ns), now_ns)
 
     def _let_go(self, now_ns: int, pause_s: float) -> None:
-        self._controls.enforce("unfocused", now_ns)
+        if self._frozen_ns is None:  # a frozen gamepad shows no release
+            self._controls.enforce("unfocused", now_ns)
         self._began_ns = self._blocked_ns = None
         self._idle_until_ns = now_ns + round(pause_s * NS_PER_S)
 

@@ -73,7 +73,7 @@ def run(draw: Draw) -> Result:
     except Exception as error:  # whatever a service raises would end it
         where = traceback.extract_tb(error.__traceback__)[-1]
         violations.append(f"{type(error).__name__} in {where.name}: {error}")
-    violations += dict.fromkeys(stack.oracle.violations)
+    violations += dict.fromkeys(stack.oracle.violations + operator.violations)
     finished = not operator.gave_up and operator.done
     return Result(
         seed=draw.seed,
@@ -169,6 +169,10 @@ def _silence(trial: Trial) -> None:
     trial.operator.muted_until_ns = trial.stack.net.now_ns + NS_PER_S
 
 
+def _freeze(frozen: bool) -> Step:
+    return lambda trial: trial.operator.freeze(frozen)
+
+
 def _late(trial: Trial) -> None:
     trial.stack.net.disturbances["drive"] = Disturbance(late_ms=400, lose=3)
 
@@ -184,6 +188,7 @@ FAULTS: dict[str, tuple[tuple[float, Step], ...]] = {
         (1.0, lambda trial: trial.stack.router(True)),
     ),
     "fault.operator_silent": ((0.0, _silence),),
+    "fault.gamepad_frozen": ((0.0, _freeze(True)), (4.0, _freeze(False))),
     "fault.requests_late": (
         (0.0, _late),
         (0.5, lambda trial: trial.stack.net.disturbances.clear()),
