@@ -15,6 +15,7 @@ SWITCH = "SWITCH THE KEYBOARD TO LATIN (ENGLISH)"
         ("ctrl+e", "\x05", "e"),
         ("ctrl+e", None, "e"),
         ("alt+у", "у", "e"),
+        ("alt+ctrl+e", None, "e"),
         ("shift+e", None, "e"),
         ("space", " ", "space"),
         ("ideographic_space", "\u3000", "space"),
