@@ -14,6 +14,7 @@ pause of ``PAUSE_NS`` is neutral, by its clock and ours: what a network held bac
 | ---------- | -------------------------------------------------- | ---------- | ----------------- |
 | (new)      | its first command                                  | must pause |                   |
 | must pause | a command after a pause, while no other one drives | settling   | a neutral request |
+| settling   | a command before ``SETTLE_NS``                     | settling   | a neutral request |
 | settling   | a delivery that shows that the pause was a delay   | must pause |                   |
 | settling   | a command ``SETTLE_NS`` later                      | drives     | the command       |
 | drives     | a command                                          | drives     | the command       |
@@ -25,10 +26,11 @@ pause of ``PAUSE_NS`` is neutral, by its clock and ours: what a network held bac
 The state changes before the command is judged: after a silence the same command begins anew. What
 is lost may have commanded motion, so it is no pause. Of a new publisher the first ``UNHEARD`` may
 be lost, as ROS does not wait for a match. Before a later one it may have driven for long, while its
-link was down: no pause is known. The neutral request is sent when the pause ends, not when the
-publisher has settled, so that what bars motion in between bars it by safety's own rule. With
-``by_zero`` a pause is not neutral: a publisher settles first, and its next zero counts. A command
-is passed on once, as it is.
+link was down: no pause is known. The neutral request is sent when the pause ends, and for each
+command until the publisher has settled: safety wants a new one when the vehicle stood without a
+request. What bars motion in between shows in safety's state, and the publisher must pause again.
+With ``by_zero`` a pause is not neutral: a publisher settles first, and its next zero counts. A
+command is passed on once, as it is.
 """
 
 from typing import NamedTuple
@@ -91,6 +93,7 @@ SETTLING = Refusal(
     "settling", "A publisher begins, or its delay changes. Its commands are taken after 0.5 s."
 )
 BEGINS = SETTLING._replace(is_neutral=True)
+SETTLES = SETTLING._replace(is_neutral=True)
 SECOND_PUBLISHER = Refusal("second_publisher", "Another publisher drives. One at a time may.")
 NOT_PAUSED = Refusal(
     "not_paused",
@@ -266,7 +269,7 @@ class Commands:
             known.settle(known.received_ns)
             return BEGINS
         if known.is_settling:
-            return SETTLING
+            return SETTLING if known.begun_ns is None else SETTLES
         if known.begun_ns is None:
             if twist.moves:
                 return NOT_ZERO

@@ -2,9 +2,9 @@
 
 All decisions are made by ``Policy``, 50 times a second. What cannot wait is decided at once: a new
 contact, a driver fault, new ranges, an emergency stop, a reset. A motion leaves at each of the 50
-decisions, and at once if its command is more severe than the last one; such a motion takes the
-place of the next regular one. So no member of the bus can raise the rate of decisions or of frames
-to the board.
+decisions, and at once if its command is more severe than the last one, or if it acknowledges a new
+hit; such a motion takes the place of the next regular one. So no member of the bus can raise the
+rate of decisions or of frames to the board.
 """
 
 from collections.abc import Callable, Collection
@@ -68,6 +68,7 @@ class SafetyService:
         node.is_stopped = self._is_stopped
         self._sent = STOP  # command of the newest motion
         self._ahead = 0  # motions that left before their turn
+        self._hit_due = False  # a new hit, for whose acknowledgement the bridge waits
         self._estop_due = False  # another emergency stop while one is latched
         self._may_reset = True  # one reset a period
         node.loop.every(DECISION_PERIOD_S, self._on_tick)
@@ -143,6 +144,7 @@ class SafetyService:
     def _on_bumper(self, arrival: Arrival[Bumper]) -> None:
         bumper, before = arrival.message, self._inputs.bumper
         self._inputs = replace(self._inputs, bumper=Latest(bumper, arrival.received_ns))
+        self._hit_due |= bumper.pressed and (before is None or not before.value.pressed)
         # Most samples repeat that the bumper is free, and change no verdict. But a decision counts
         # the samples since the last one: too many would look like lost ones.
         due = bumper.seq - self._state.verdict.judged[1] >= LOST_SAMPLES
@@ -205,15 +207,15 @@ class SafetyService:
         self._report(before, answer, now_ns)
 
     def _send(self, motion: Motion, *, is_tick: bool) -> None:
-        """Publish a motion in its turn, or at once if it is more severe than the last one."""
-        if SEVERITY[motion.command] > SEVERITY[self._sent]:
+        """Publish a motion in its turn, or at once if it may not wait."""
+        if self._hit_due or SEVERITY[motion.command] > SEVERITY[self._sent]:
             self._ahead += not is_tick
         elif not is_tick:
             return
         elif self._ahead:
             self._ahead -= 1
             return
-        self._sent = motion.command
+        self._sent, self._hit_due = motion.command, False
         self._motion_publisher.put(motion)
 
     def _report(self, before: State, answer: Callable[[Reply], None] | None, now_ns: int) -> None:

@@ -499,7 +499,9 @@ MUTATIONS: dict[str, Mutation] = {
         "safety knows of estop_reader",
     ),
     "a suspended program drives on": (
-        (sources, "LAPSE_S", 1e9), (*LET_GO, *GO), "was not neutral",
+        (sources, "LAPSE_S", 1e9),  # another source drives on, so the vehicle never stands
+        (lambda s: s.request(None), lambda s: s.request(0.0, 450, source="nav"),
+         lambda s: s.request(0.5, 1500, source="nav"), *GO), "teleop was not neutral",
     ),
     "a ROS node drives on without a pause": (
         (command, "PAUSE_NS", -NS_PER_S),

@@ -6,7 +6,7 @@ from common import keys
 from common import messages as m
 from common.freshness import NS_PER_S
 from services.ros2.cdr import Attachment
-from services.ros2.command import BEGINS, SOURCE, Commands, Request, Twist
+from services.ros2.command import BEGINS, SETTLES, SOURCE, Commands, Request, Twist
 from verification.search.bus import Process, Source
 
 TICKS = 60  # of 50 ms, until a pattern repeats
@@ -16,6 +16,8 @@ PATTERNS = {
     "planner": range(32),  # a goal, then a pause
 }  # the ticks at which a node publishes
 PAUSE_NS = NS_PER_S // 2  # from the safety case
+TRANSIENT = {"blocked", "no_request", "neutral"}  # they end without a neutral request
+SETTLE_NS = NS_PER_S // 2  # likewise: how long a pause may be followed by neutral requests
 
 
 class RosSource(Source):
@@ -30,6 +32,7 @@ class RosSource(Source):
         self._twist = Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._nodes = self._sent = self._ticks = self._unheard = 0
         self._moved_ns = 0  # when the node last published
+        self._paused_ns = 0  # when its newest pause ended
         self._state: m.SafetyState | None = None
         process.subscribe(keys.SAFETY, self._on_state)
 
@@ -54,17 +57,22 @@ class RosSource(Source):
             return
         about = Attachment(self._sent, now_ns, self._nodes.to_bytes(16, "big"))
         decided = self._commands.judge(about, self._twist, now_ns, now_ns, self._state)
-        if decided is BEGINS:
-            self._put_neutral(now_ns - moved_ns)
+        if now_ns - moved_ns >= PAUSE_NS:
+            self._paused_ns = now_ns
+        if decided in (BEGINS, SETTLES):
+            self._put_neutral(now_ns)
         elif isinstance(decided, Request):
             if decided.neutral_first:
-                self._put_neutral(now_ns - moved_ns)
+                self._put_neutral(now_ns)
             self.put(m.Drive(linear=decided.linear, angular=decided.angular, echo=self.echo))
 
-    def _put_neutral(self, paused_ns: int) -> None:
-        if paused_ns < PAUSE_NS:
+    def _put_neutral(self, now_ns: int) -> None:
+        if now_ns - self._paused_ns > SETTLE_NS:
             self._violations.append("a neutral request without a pause of the ROS node")
         self.put(m.Drive(linear=0.0, angular=0.0, echo=self.echo))
 
     def _on_state(self, arrival: Any) -> None:
         self._state = arrival.message
+        stops = {cause.name for cause in arrival.message.causes if cause.action != "slow"}
+        if stops - TRANSIENT:
+            self._paused_ns = 0  # motion is barred: a new pause is due

@@ -101,6 +101,9 @@ class SafetyBook:
         if channel.is_neutral:
             self.zeros[source] = now_ns
             self.let_go.add(source)
+            due_ns = max(self.barred_ns, self.better_ns.get(source, 0))
+            if now_ns > due_ns and not self._better(source, now_ns):
+                self.neutral[source] = now_ns
         if not was_fresh:
             self.still_ns.pop(source, None)  # it may take over from one that drives
         if channel.is_still:
@@ -185,11 +188,6 @@ class SafetyBook:
         if barred or tripped:
             self.barred_ns = now_ns
             self.neutral.clear()
-            return
-        for source, request in self.requests.items():
-            due_ns = max(self.barred_ns, self.better_ns.get(source, 0))
-            if request.is_neutral and request.is_fresh(now_ns) and request.at_ns > due_ns:
-                self.neutral[source] = request.at_ns
 
     def _better(self, source: str, now_ns: int) -> list[str]:
         """Return the sources above this one that hold the wheel."""
