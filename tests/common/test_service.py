@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -249,8 +248,3 @@ def test_zenoh_has_a_thread_for_each_session(
     node.open()
     node.close()
     assert os.environ[RUNTIME_ENV] == ONE_POOL.format(links=3)
-
-
-def test_its_version_is_that_of_the_package() -> None:
-    project = Path(__file__).parents[2] / "pyproject.toml"
-    assert tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"] == VERSION

@@ -19,6 +19,8 @@ from services.ros2.command import (
     OWNER_NS,
     PAUSE_NS,
     SETTLE_NS,
+    SETTLES,
+    SETTLING,
     UNHEARD,
     Commands,
     Refusal,
@@ -98,6 +100,19 @@ def test_a_keyboard_that_repeats_nothing_drives_with_its_second_press() -> None:
 @pytest.mark.parametrize("pause_s", [1.1, 70.0, 36000.0])
 def test_a_planner_drives_on_after_any_pause_when_it_has_settled(pause_s: float) -> None:
     Sender(started()).drive().drive(1.0 + pause_s)
+
+
+@pytest.mark.parametrize(("by_zero", "decided"), [(False, SETTLES), (True, SETTLING)])
+def test_a_publisher_that_settles_after_a_pause_requests_zero(
+    by_zero: bool, decided: Refusal
+) -> None:
+    """Otherwise a vehicle that stands would want a neutral request again."""
+    commands = started(by_zero=by_zero)
+    for number in range(2):
+        about = Attachment(number, number * S // 10, NAV)
+        last = commands.judge(about, twist(0.3), about.source_ns, about.source_ns, None)
+    assert last is decided
+    assert last.is_neutral is not by_zero
 
 
 @pytest.mark.parametrize(

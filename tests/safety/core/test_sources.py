@@ -231,7 +231,7 @@ def test_a_suspended_source_needs_a_neutral_request(gap_s: float, neutral: bool)
 def test_a_source_whose_lease_was_over_at_a_standstill_resumes(
     rested_ms: int, gap_ms: int, neutral: bool
 ) -> None:
-    arbiter = request(DRIVES, 1)[0].at_rest(rested_ms * MS)
+    arbiter = request(DRIVES, 1)[0].at_rest(rested_ms * MS + 1)
     at_ns = gap_ms * MS
     drive = Drive(linear=0.5, angular=0.0, echo=43, seq=2, boot=1)
     arbiter, refused = arbiter.accept(
