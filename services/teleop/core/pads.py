@@ -25,6 +25,7 @@ changes by more than the noise of a converter.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from operator import sub
 
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Deflection, Stick
@@ -46,17 +47,18 @@ class Reading:
 
     def differs(self, other: "Reading") -> bool:
         """Return whether it differs by more than noise."""
-        pairs = zip(self.axes, other.axes, strict=False)
-        return self.buttons != other.buttons or any(abs(a - b) > NOISE for a, b in pairs)
+        steps = map(sub, self.axes, other.axes)
+        return self.buttons != other.buttons or any(abs(step) > NOISE for step in steps)
 
 
 class Pad:
     """One device."""
 
+    went_down: bool  # the deadman, in the newest reading
+    has_changed: bool  # the newest reading
+
     def __init__(self, settings: Teleop, reading: Reading) -> None:
         self.is_down = True  # the deadman; unknown, so it must come up
-        self.went_down = False  # in the newest reading
-        self.has_changed = False  # the newest reading
         self.ignored: dict[int, float] = {}  # axes, by index, with their position
         self._settings = settings
         self._axes = settings.linear_axis, settings.angular_axis

@@ -34,6 +34,9 @@ def pushes(*readings: Reading) -> list[tuple[float, float]]:
     [
         (0.0, 0.0, True),
         (-1.0, 0.05, True),  # an end until the first report
+        (-1.0, SETTINGS.deadzone, True),
+        (SETTINGS.deadzone, -0.8, True),
+        (0.0, -0.95, False),
         (0.0, -0.8, True),  # stick and deadman moved together
         (-1.0, -1.0, False),  # a trigger at rest
         (0.0, -1.0, False),  # 0 until the first report
@@ -53,8 +56,21 @@ def test_an_axis_counts_if_it_is_centred_when_the_deadman_goes_down(
 
 
 def test_an_axis_that_is_no_number_is_ignored_until_the_next_press() -> None:
-    moved = pushes(reading(), held(0.5), held(math.nan), held(0.5), reading(), held(), held(0.5))
-    assert [linear for linear, _ in moved] == [0, -0.5, 0, 0, 0, 0, -0.5]
+    moved = pushes(
+        reading(math.nan),
+        reading(),
+        held(0.5),
+        held(math.nan),
+        held(0.5),
+        reading(),
+        held(),
+        held(0.5),
+    )
+    assert [linear for linear, _ in moved] == [0, 0, -0.5, 0, 0, 0, 0, -0.5]
+    pads = Pads(SETTINGS)
+    for each in (reading(), held(0.5), held(math.inf)):
+        pads.update({0: each})
+    assert pads.ignored == {1: math.inf}
 
 
 def test_the_ignored_axes_are_named_while_the_device_drives() -> None:
@@ -68,9 +84,12 @@ def test_the_ignored_axes_are_named_while_the_device_drives() -> None:
 
 def test_a_missing_axis_is_at_rest() -> None:
     pads = Pads(SETTINGS)
+    assert pads.driving is None
     for deadman in (0, 1):
-        stick = pads.update({0: Reading((0.0, -0.5 * deadman), (0, 0, 0, 0, deadman))})
+        stick = pads.update({0: Reading((0.0, -0.5 * deadman, 0.0), (0, 0, 0, 0, deadman))})
     assert stick == Stick(Deflection(0.5, 0.0), deadman=True, events=1)
+    assert pads.ignored == {}
+    assert pads.update({0: reading()}) == Stick(Deflection(), deadman=False, events=1)
 
 
 def test_the_device_whose_deadman_goes_down_drives_until_it_comes_up() -> None:
@@ -104,7 +123,7 @@ def test_only_the_device_that_drives_shows_that_it_lives() -> None:
 
     pads.update({1: reading(), 2: reading()})
     assert [events(angular, other) for angular, other in (
-        (0.0, 0.0), (0.0, 0.5), (0.0009, -0.5), (0.0, 0.5), (0.002, 0.0),
+        (0.0, 0.0), (0.0, 0.5), (0.001, -0.5), (0.0, 0.5), (0.002, 0.0),
     )] == [1, 1, 1, 1, 2]  # fmt: skip
 
 
