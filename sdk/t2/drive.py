@@ -156,7 +156,7 @@ class Drive:
         """
         if not self.is_open:
             raise T2Error(CLOSED)
-        state = self._robot.safety.latest()
+        state = self._robot.safety.latest(READY_S)  # the first one, over a slow link
         if state.latched:
             raise Latched.of(state)
         if self._key in OPEN:

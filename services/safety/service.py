@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from common import clock, keys
 from common.bus.bus import Arrival, Bus, Caller
-from common.freshness import Latest
+from common.freshness import NS_PER_S, Latest
 from common.heartbeat import Heartbeat
 from common.keys import Topic
 from common.messages import (
@@ -67,10 +67,11 @@ class SafetyService:
         self._subscribe()
         node.is_stopped = self._is_stopped
         self._sent = STOP  # command of the newest motion
-        self._ahead = 0  # motions that left before their turn
+        self._has_turn = True  # False while a motion has left in the place of the next regular one
         self._hit_due = False  # a new hit, for whose acknowledgement the bridge waits
         self._estop_due = False  # another emergency stop while one is latched
         self._may_reset = True  # one reset a period
+        self._refused_ns = 0  # when a refused reset was last reported
         node.loop.every(DECISION_PERIOD_S, self._on_tick)
         node.loop.every(STATE_PERIOD_S, self._publish_state)
 
@@ -208,13 +209,11 @@ class SafetyService:
 
     def _send(self, motion: Motion, *, is_tick: bool) -> None:
         """Publish a motion in its turn, or at once if it may not wait."""
-        if self._hit_due or SEVERITY[motion.command] > SEVERITY[self._sent]:
-            self._ahead += not is_tick
-        elif not is_tick:
+        is_severe = SEVERITY[motion.command] > SEVERITY[self._sent]
+        has_turn, self._has_turn = self._has_turn, self._has_turn or is_tick
+        if not (is_severe or (has_turn and (is_tick or self._hit_due))):
             return
-        elif self._ahead:
-            self._ahead -= 1
-            return
+        self._has_turn = is_tick
         self._sent, self._hit_due = motion.command, False
         self._motion_publisher.put(motion)
 
@@ -225,6 +224,11 @@ class SafetyService:
         if signature(before) != signature(self._state):
             self._publish_state(now_ns)
         for transition in transitions(before, self._state):
+            if transition.name == "reset_refused":
+                # Repeated calls must not push other events out of the history.
+                if now_ns - self._refused_ns < NS_PER_S:
+                    continue
+                self._refused_ns = now_ns
             self._node.event(transition.name, transition.level, transition.text, **transition.about)
 
     def _publish_state(self, now_ns: int) -> None:

@@ -24,12 +24,12 @@ from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
 from services.ros2 import command
 from services.safety.config import LimitSource, Safety
-from services.safety.core import causes, conditions, operator_requests, planning, policy, sources
+from services.safety.core import causes, conditions, operator_requests, planning, sources
 from services.safety.core.causes import Held, Observation
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import Standstill
 from services.safety.core.release import Release
-from services.safety.core.sonars import SonarOverrides
+from services.safety.core.sonars import Axis, SonarOverrides
 from services.safety.core.sources import Arbiter
 from services.safety.core.state import State
 from services.safety.service import SafetyService
@@ -317,8 +317,9 @@ def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False)
     return STORE(ports, field)
 
 
-def as_straight(twist: Twist, deceleration: float, _: float) -> float:
-    return (abs(twist.linear) + abs(twist.angular) * 0.55) / deceleration
+def as_straight(zones: planning.Zones, axis: Axis, twist: Twist) -> tuple[float, float]:
+    speed = max(0.0, sum(axis.approach(twist)))
+    return speed, speed * speed / (2 * zones.deceleration)
 
 
 def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
@@ -443,7 +444,7 @@ MUTATIONS: dict[str, Mutation] = {
         (*CRAWL, lambda s: s.silence("teleop", 900), *CRAWL), "was not neutral",
     ),
     "a turn is judged by the linear deceleration": (
-        (planning, "stopping_s", as_straight),
+        (planning.Zones, "_stopping", as_straight),
         (lambda s: s.request(0.0, 400), lambda s: s.sonars(600, numbers=LEFT),
          lambda s: s.request(0.0, 1500, angular=1.0)), "toward sonar 0",
     ),
@@ -468,8 +469,7 @@ MUTATIONS: dict[str, Mutation] = {
         PROTECTIVE_STOP, "protective stop of fleet",
     ),
     "a protective stop wants no neutral": (
-        (policy, "BARRING", causes.BARRING - {"limit_stop"}),
-        PROTECTIVE_STOP, "was not neutral",
+        (Arbiter, "barred", unchanged), PROTECTIVE_STOP, "was not neutral",
     ),
     "a silent limit source drives on": (
         configured("safety", limits=dict.fromkeys((NEEDED, IGNORED), SILENT)),

@@ -35,6 +35,7 @@ LOST_POLLS = 3  # of the bumper
 MOST_MPS, MOST_RADPS = 1.0, 1.0
 RAMP_S = 2.5  # from the highest speed to standstill, and some
 FAST_MPS, FAST_S = 1.35, 0.4  # measured: no command allows it, so it is a runaway
+STEPS = 20  # of a stop whose axes end at different times
 STEP_S = 0.03  # decisions are that far apart at most, while nothing stalled
 ROUNDING = 2e-3
 
@@ -279,21 +280,27 @@ class SafetyBook:
         for sonar in range(len(SONARS)):
             room = max(0.0, self._distance(sonar, now_ns) - self.recess - MARGIN_M)
             if not self.creeps(motion) and self._may_creep(sonar, motion.source, now_ns):
-                room = max(room, reacting_way(BLIND_MPS, BLIND_MPS / BRAKING_MPS2))
-            speed = approach(sonar, motion.linear, motion.angular)
-            stop_s = self._stopping_s(motion)
-            if speed > ROUNDING and reacting_way(speed - ROUNDING, stop_s) > room:
+                room = max(room, BLIND_MPS * (REACT_S + BLIND_MPS / BRAKING_MPS2 / 2))
+            speed, way = self._stopping(sonar, motion)
+            if max(speed, way) > ROUNDING and speed * REACT_S + way > room + ROUNDING:
                 yield f"{speed:.3f} m/s toward sonar {sonar} with {room:.3f} m of room"
             if measured is not None and isinstance(measured[1], m.Velocity):
-                real = approach(sonar, measured[1].linear, measured[1].angular) - ROUNDING
-                slower = max(0.0, real - 0.2)
-                stop_s = self._stopping_s(measured[1]) * slower / real if slower else 0.0
-                if reacting_way(slower, stop_s) > room or (room == 0 and real > 0.05):
+                real, way = self._stopping(sonar, measured[1])
+                real -= ROUNDING
+                share = max(0.0, real - 0.2) / real if real > 0 else 0.0
+                needed = share * real * REACT_S + share * share * way
+                if needed > room or (room == 0 and real > 0.05):
                     yield f"really {real:.3f} m/s toward sonar {sonar} with {room:.3f} m of room"
 
-    def _stopping_s(self, twist: m.Motion | m.Velocity) -> float:
-        """Return how long a vehicle on this curve takes to stop: as the slower axis, in s."""
-        return max(abs(twist.linear) / BRAKING_MPS2, abs(twist.angular) / self.turn_braking)
+    def _stopping(self, sonar: int, twist: m.Motion | m.Velocity) -> tuple[float, float]:
+        """Return the speed toward what a sonar sees, and the way of stopping (m/s, m).
+
+        The farther one of a stop on the curve, and of one in which each axis stops by itself.
+        """
+        driving, turning = approaches(sonar, twist.linear, twist.angular)
+        times = abs(twist.linear) / BRAKING_MPS2, abs(twist.angular) / self.turn_braking
+        together = (driving + turning) * max(times) / 2
+        return max(0.0, driving + turning), max(0.0, together, farthest(driving, turning, times))
 
     def _distance(self, sonar: int, now_ns: int) -> float:
         """Return what may be believed: the nearest of the last three samples, in metres."""
@@ -302,9 +309,15 @@ class SafetyBook:
         return min(shown(message, sonar) for _, message in self.ranges)
 
 
-def reacting_way(speed: float, stop_s: float) -> float:
-    """Return what reacting and stopping in this time takes, in metres."""
-    return speed * (REACT_S + stop_s / 2)
+def farthest(driving: float, turning: float, times: tuple[float, float]) -> float:
+    """Return the farthest way (m) of two speeds that fall to zero in these times."""
+    way, best, end_s = 0.0, 0.0, max(times)
+    for step in range(STEPS if driving * turning < 0 else 0):
+        now_s = end_s * (step + 0.5) / STEPS
+        left = [max(0.0, 1 - now_s / one) if one else 0.0 for one in times]
+        way += (driving * left[0] + turning * left[1]) * end_s / STEPS
+        best = max(best, way)
+    return best
 
 
 def shown(message: m.Ultrasonic, sonar: int) -> float:
@@ -315,9 +328,9 @@ def shown(message: m.Ultrasonic, sonar: int) -> float:
     return reading if message.status[sonar] == "ok" and reading is not None else 0.0
 
 
-def approach(sonar: int, linear: float, angular: float) -> float:
-    """Return how fast (m/s) a twist closes in on what a sonar sees."""
+def approaches(sonar: int, linear: float, angular: float) -> tuple[float, float]:
+    """Return how fast (m/s) driving and turning close in on what a sonar sees."""
     x, y, degrees = SONARS[sonar]
     yaw = math.radians(degrees)
-    along = (linear - angular * y) * math.cos(yaw) + angular * x * math.sin(yaw)
-    return max(along, abs(angular) * FRONT) if sonar in FLANKS else along
+    turning = angular * (x * math.sin(yaw) - y * math.cos(yaw))
+    return linear * math.cos(yaw), abs(angular) * FRONT if sonar in FLANKS else turning

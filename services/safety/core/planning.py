@@ -1,13 +1,14 @@
 """Planning: limits, zones and ramp turn a requested twist into the twist to command.
 
-Toward a reading d a twist may approach at the speed s whose reaction and stopping distance fits:
+Toward a reading d a twist may have the speed whose reaction and stopping distance fits:
 
-    s * t_react + s * t_stop / 2 = d - margin
+    (v + w) * t_react + max((v + w) * max(t_v, t_w), v * t_v + w * t_w) / 2 = d - margin
 
-``Axis`` gives s, the speed of approach to what a sonar sees. ``t_stop`` is the stopping time of the
-twist: the longer one of its two axes, because a vehicle in a curve slows down on both together. A
-twist that is too fast for one sonar is scaled as a whole, which keeps its curve. A sonar without
-approach sets no limit, so motion away from an obstacle stays possible.
+``Axis`` gives v and w, the speeds (m/s) at which driving and turning approach what a sonar sees;
+t_v and t_w are the stopping times of both. A vehicle in a curve slows down on both axes together,
+in the longer time, or on each one by itself: then the one that retreats may end first. A twist that
+is too fast for one sonar is scaled as a whole, which keeps its curve. A sonar without approach sets
+no limit, so motion away from an obstacle stays possible.
 """
 
 import math
@@ -17,14 +18,13 @@ from msgspec import Struct
 
 from common.motion import RUN, STILL, Twist, clamp
 from common.settings import Vehicle
-from common.standstill import stopping_s
 from services.safety.config import Safety
 from services.safety.core.causes import BARRING, Latches, Observation
 from services.safety.core.release import stopping_distance, sweep
 from services.safety.core.sonars import Axis, axes
 from services.safety.core.state import State
 
-GRAZING_MPS = 1e-6  # below this is rounding: cos(90 deg) is not exactly 0
+GRAZING = 1e-6  # m/s, m; below this is rounding: cos(90 deg) is not exactly 0
 MEASURED_EXCESS_MPS = 0.2  # tolerance over the allowed speed, for lag and noise
 MEASURED_CREEP_MPS = 0.05  # inside the margin
 
@@ -51,40 +51,48 @@ class Zones(Struct, frozen=True):
 
     def limit(self, twist: Twist, distances: Sequence[float]) -> SonarLimit:
         """Return the limit on a twist; a factor of 0 means blocked."""
-        tightest, stop_s = SonarLimit(1.0), self._stop_s(twist)
+        tightest = SonarLimit(1.0)
         for sonar, axis in enumerate(self.axes):
-            speed = axis.approach(twist)
-            if speed <= GRAZING_MPS:
+            speed, way = self._stopping(axis, twist)
+            if max(speed, way) <= GRAZING:
                 continue
-            factor = self._factor(speed, stop_s, distances[sonar])
+            factor = self._factor(speed, way, distances[sonar])
             if factor < tightest.factor:
                 tightest = SonarLimit(factor, sonar)
         return tightest
 
     def too_fast(self, measured: Twist, distances: Sequence[float]) -> int | None:
         """Return the sonar toward which the measured speed is too high, if any."""
-        stop_s = self._stop_s(measured)
         for sonar, axis in enumerate(self.axes):
-            speed = axis.approach(measured)
+            speed, way = self._stopping(axis, measured)
             if speed <= MEASURED_CREEP_MPS:
                 continue
-            allowed = speed * self._factor(speed, stop_s, distances[sonar])
+            allowed = speed * self._factor(speed, way, distances[sonar])
             # 1 equivalent mutant: a measured speed, at the limit or above it.
             if not allowed or speed > allowed + MEASURED_EXCESS_MPS:
                 return sonar
         return None
 
-    def _stop_s(self, twist: Twist) -> float:
-        return stopping_s(twist, self.deceleration, self.angular_deceleration)
+    def _stopping(self, axis: Axis, twist: Twist) -> tuple[float, float]:
+        """Return the speed of approach (m/s), and the way of stopping toward the sonar's sector."""
+        driving, turning = axis.approach(twist)
+        linear_s = abs(twist.linear) / self.deceleration
+        angular_s = abs(twist.angular) / self.angular_deceleration
+        together = (driving + turning) * max(linear_s, angular_s)
+        apart = driving * linear_s + turning * angular_s
+        return max(0.0, driving + turning), max(0.0, together, apart) / 2
 
-    def _factor(self, speed: float, stop_s: float, distance: float) -> float:
+    def _factor(self, speed: float, way: float, distance: float) -> float:
         """Return the factor for a twist to stop before the margin; above 1 it may go faster.
 
-        ``speed`` is its speed of approach (m/s), ``stop_s`` its stopping time (s). Both shrink with
-        the factor: f * speed * react + f^2 * speed * stop_s / 2 is the room.
+        With the factor the speed shrinks, and the way of stopping with its square:
+        f * speed * react + f^2 * way is the room.
         """
-        room_s = max(0.0, distance - self.margin) / speed
-        return (math.sqrt(self.react * self.react + 2 * stop_s * room_s) - self.react) / stop_s
+        room = max(0.0, distance - self.margin)
+        if room in (0.0, math.inf):
+            return room
+        reacting = speed * self.react
+        return 2 * room / (reacting + math.sqrt(reacting * reacting + 4 * way * room))
 
 
 def zones(vehicle: Vehicle, settings: Safety) -> Zones:

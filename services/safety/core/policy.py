@@ -81,7 +81,11 @@ class Policy:
             case LimitRequest():
                 checked = self._admission(state, settings.times.max_echo_age, now_ns)
                 limits, refused = state.speed_limits.accept(request, checked)
-                return replace(state, speed_limits=limits), refused and f"limit_{refused}"
+                arbiter = state.arbiter
+                if not refused and limits.channels[request.source].stops:
+                    arbiter = arbiter.barred(now_ns)  # also if it ends before the next decision
+                state = replace(state, speed_limits=limits, arbiter=arbiter)
+                return state, refused and f"limit_{refused}"
             case _:
                 checked = self._admission(state, settings.estop_keepalive_timeout, now_ns)
                 keepalives, refused = state.keepalives.accept(request, checked)

@@ -80,10 +80,11 @@ class Axis(Struct, frozen=True):
         """Return the speed (m/s) of the sonar along its axis."""
         return twist.linear * self.linear + twist.angular * self.angular
 
-    def approach(self, twist: Twist) -> float:
-        """Return the speed (m/s) of approach to what the sonar sees."""
-        along = self.along(twist)
-        return max(along, abs(twist.angular) * self.swing) if self.swing else along
+    def approach(self, twist: Twist) -> tuple[float, float]:
+        """Return the speeds (m/s) at which driving and turning approach what the sonar sees."""
+        turning = twist.angular * self.angular
+        swinging = abs(twist.angular) * self.swing
+        return twist.linear * self.linear, max(turning, swinging) if self.swing else turning
 
 
 def axes(vehicle: Vehicle) -> tuple[Axis, ...]:

@@ -13,7 +13,7 @@ from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
 from services.safety.core.causes import Held
 from services.safety.core.planning import (
-    GRAZING_MPS,
+    GRAZING,
     Planner,
     RequestedTwist,
     Zones,
@@ -51,11 +51,52 @@ def test_a_sonar_closes_in_as_its_place_moves_along_the_way_it_looks(
     field: Zones, linear: float, angular: float
 ) -> None:
     for sonar, mount in enumerate(sonar_mounts(Vehicle())):
-        place = linear - angular * mount.y, angular * mount.x
-        along = place[0] * math.cos(mount.yaw) + place[1] * math.sin(mount.yaw)
-        swings = abs(angular) * Vehicle().length / 2 if mount.name in ("left", "right") else along
-        expected = pytest.approx(max(along, swings), abs=1e-12)
-        assert field.axes[sonar].approach(Twist(linear, angular)) == expected
+        along = math.cos(mount.yaw), math.sin(mount.yaw)
+        driving = linear * along[0]
+        turning = angular * (mount.x * along[1] - mount.y * along[0])
+        if mount.name in ("left", "right"):
+            turning = abs(angular) * Vehicle().length / 2
+        approach = field.axes[sonar].approach(Twist(linear, angular))
+        assert approach == pytest.approx((driving, turning), abs=1e-12)
+
+
+@pytest.mark.parametrize("decelerations", [(0.6, 1.0), (0.6, 0.1), (0.1, 3.0)])
+@given(twist=st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)))
+def test_a_stop_stays_in_its_room_whichever_axis_ends_first(
+    field: Zones, decelerations: tuple[float, float], twist: Twist
+) -> None:
+    """Both axes slow down together, or each one by itself: the way along the sonar's axis."""
+    linear, angular = decelerations
+    field = replace(field, deceleration=linear, angular_deceleration=angular)
+    for name, axis in zip(SONAR_NAMES, field.axes, strict=True):
+        slower = twist.scaled(field.limit(twist, only(name, 0.6)).factor)
+        times = abs(slower.linear) / linear, abs(slower.angular) / angular
+        parts = axis.approach(slower)
+        reacting = 0.25 * max(0.0, sum(parts))
+        together = sum(parts) * max(times) / 2
+        apart = travels(parts, times)
+        assert reacting + max(together, apart) <= 0.4 + 1e-3  # of the integration
+
+
+def test_a_turn_away_that_ends_before_the_drive_is_limited(field: Zones) -> None:
+    """Weak angular brakes, and the other way round: what approaches ends last."""
+    weak = replace(field, angular_deceleration=0.1)
+    retreats = Twist(0.2, -1.0)  # toward the rear left only by turning
+    assert sum(weak.axes[7].approach(retreats)) == pytest.approx(0.0, abs=1e-3)
+    assert weak.limit(retreats, only("rear_left", 0.3)).factor < 0.5
+    strong = replace(field, angular_deceleration=3.0)
+    assert strong.limit(Twist(-1.0, 3.0), only("rear_left", 0.3)).factor < 0.5
+
+
+def travels(parts: tuple[float, float], times: tuple[float, float], steps: int = 200) -> float:
+    """Return the farthest way of two speeds that fall to zero in these times, step by step."""
+    end_s, way, farthest = max(times), 0.0, 0.0
+    for step in range(steps):
+        now_s = end_s * (step + 0.5) / steps
+        left = [max(0.0, 1 - now_s / time_s) if time_s else 0.0 for time_s in times]
+        way += (parts[0] * left[0] + parts[1] * left[1]) * end_s / steps
+        farthest = max(farthest, way)
+    return farthest
 
 
 def only(name: str, distance: float) -> tuple[float, ...]:
@@ -85,9 +126,9 @@ def test_reacting_and_stopping_takes_the_room_there_is(
         limit = field.limit(twist, only(name, 0.6))
         slower = twist.scaled(limit.factor)
         stop_s = max(abs(slower.linear) / deceleration, abs(slower.angular) / angular_deceleration)
-        needed = max(0.0, axis.approach(slower)) * (0.25 + stop_s / 2)
+        needed = sum(axis.approach(slower)) * (0.25 + stop_s / 2)
         assert needed <= 0.4 + 1e-9
-        if limit.sonar is not None:
+        if limit.sonar is not None and min(axis.approach(slower)) >= 0:
             assert needed == pytest.approx(0.4)
 
 
@@ -109,7 +150,7 @@ def test_the_room_of_a_speed_is_where_it_is_allowed(
     assert replace(field, react=0.5, deceleration=0.4).room(0.2) == pytest.approx(0.35)
 
 
-@pytest.mark.parametrize(("speed", "factor"), [(GRAZING_MPS, 1.0), (2 * GRAZING_MPS, 0.0)])
+@pytest.mark.parametrize(("speed", "factor"), [(GRAZING, 1.0), (2 * GRAZING, 0.0)])
 def test_grazing_is_no_approach(field: Zones, speed: float, factor: float) -> None:
     assert field.limit(Twist(speed, 0.0), only("front", 0.0)).factor == factor
 

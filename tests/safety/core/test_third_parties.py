@@ -2,8 +2,10 @@
 
 import pytest
 
+from common.messages import Limit
 from common.motion import STILL
 from services.safety.config import LimitSource, Safety
+from services.safety.core.inputs import LimitRequest
 from services.safety.core.operator_requests import LET_GO
 from tests.safety.core.policy_fixture import PolicyFixture
 
@@ -49,6 +51,19 @@ def test_a_protective_stop_ends_by_itself_and_then_needs_a_neutral_request() -> 
     fixture.limit()
     fixture.drive(0.5, seconds=1.0)
     assert fixture.verdict.name == "inhibited"  # the stick is still pushed
+    fixture.drive()
+    assert fixture.drive(0.5).command == "run"
+
+
+def test_a_protective_stop_between_two_decisions_wants_a_neutral_request() -> None:
+    fixture = PolicyFixture(IGNORED).running()
+    for cap in (0.0, None):
+        fixture.limit_seq += 1
+        limit = Limit(linear=cap, echo=fixture.echo, seq=fixture.limit_seq, boot=55)
+        request = LimitRequest("lidar", limit, fixture.now_ns)
+        fixture.state, refused = fixture.policy.accept(fixture.state, request, fixture.now_ns)
+        assert refused == ""
+    assert fixture.drive(0.5).name == "inhibited"
     fixture.drive()
     assert fixture.drive(0.5).command == "run"
 
