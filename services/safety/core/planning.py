@@ -80,7 +80,7 @@ class Zones(Struct, frozen=True):
         angular_s = abs(twist.angular) / self.angular_deceleration
         together = (driving + turning) * max(linear_s, angular_s)
         apart = driving * linear_s + turning * angular_s
-        return max(0.0, driving + turning), max(0.0, together, apart) / 2
+        return max(0.0, driving + turning), max(together, apart) / 2
 
     def _factor(self, speed: float, way: float, distance: float) -> float:
         """Return the factor for a twist to stop before the margin; above 1 it may go faster.

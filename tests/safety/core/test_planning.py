@@ -54,9 +54,11 @@ def test_a_sonar_closes_in_as_its_place_moves_along_the_way_it_looks(
         along = math.cos(mount.yaw), math.sin(mount.yaw)
         driving = linear * along[0]
         turning = angular * (mount.x * along[1] - mount.y * along[0])
+        axis = field.axes[sonar]
+        assert axis.along(Twist(linear, angular)) == pytest.approx(driving + turning, abs=1e-12)
         if mount.name in ("left", "right"):
             turning = abs(angular) * Vehicle().length / 2
-        approach = field.axes[sonar].approach(Twist(linear, angular))
+        approach = axis.approach(Twist(linear, angular))
         assert approach == pytest.approx((driving, turning), abs=1e-12)
 
 

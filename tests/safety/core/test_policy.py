@@ -370,6 +370,16 @@ def test_a_source_that_was_silent_at_a_standstill_does_not_drive_on(
     assert fixture.drive(0.5, source=source).command == "run"
 
 
+def test_a_rest_is_remembered_while_the_vehicle_moves_again() -> None:
+    fixture = PolicyFixture().running(0.5)
+    fixture.linear = 0.0
+    fixture.tick(20)  # its lease is over, and it stands
+    fixture.linear = 0.1
+    fixture.tick(3)
+    fixture.drive(0.5, seconds=0.1)
+    assert "neutral" in fixture.state.latches
+
+
 def test_a_gap_in_which_the_vehicle_never_stood_changes_nothing() -> None:
     fixture = PolicyFixture().running(0.5)
     fixture.linear = 0.3  # it rolls on
