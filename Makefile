@@ -136,7 +136,7 @@ format: $(STAMP)
 	$(BIN)/ruff check --fix .
 
 LAPTOP = teleop dashboard record report foxglove keys ros2
-LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes \
+LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes --no-emit-package t2-sdk \
   --custom-compile-command 'make lock' pyproject.toml
 
 lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, robot, demo, dashboard, laptop, bench
@@ -163,12 +163,13 @@ wheelhouse: $(STAMP) ## package set for a robot without internet; SET=laptop WHE
 	mkdir -p $(HOUSE)
 	$(DOWNLOAD) -r deploy/pip.lock
 	$(DOWNLOAD) -r requirements-$(SET).lock
-	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w $(HOUSE) .
+	$(BIN)/pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w $(HOUSE) . ./sdk
 	cp requirements-$(SET).lock $(HOUSE)/requirements.txt
 	cp deploy/t2-install.sh $(HOUSE)
 	cd $(HOUSE) && set -- t2-*-py3-none-any.whl && version=$${1#t2-} && version=$${version%%-*} && \
 	  echo $$version > VERSION && echo "Python $(WHEEL_PYTHON) on $(WHEEL_ARCH)" > PLATFORM && \
-	  echo "t2==$$version --hash=sha256:$$(sha256sum $$1 | cut -d ' ' -f 1)" >> requirements.txt && \
+	  for wheel in t2-*.whl t2_sdk-*.whl; do \
+	    echo "$${wheel%%-*}==$$version --hash=sha256:$$(sha256sum $$wheel | cut -d ' ' -f 1)"; done >> requirements.txt && \
 	  sha256sum -- * > SHA256SUMS
 	@echo "copy $(HOUSE) to the robot; there: sudo sh wheelhouse/t2-install.sh"
 

@@ -10,14 +10,14 @@ from collections.abc import Sequence
 from functools import partial
 
 from bench.child_process import serve
-from common import keys
-from common import messages as m
 from common.bus.bus import Arrival, Bus
-from common.client import reset_request
 from common.config import Sources, load
 from common.loop import Loop
 from common.settings import BusSettings, Shared
 from common.source import DriveSource
+from t2 import keys
+from t2 import messages as m
+from t2.client import reset_request
 
 SLOW_MPS, STEP_MPS, STEPS = 0.3, 0.001, 20
 PERIOD_S, RESET_TICKS = 0.05, 10

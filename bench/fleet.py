@@ -26,10 +26,11 @@ from bench.child_process import ChildProcess, serve
 from bench.figures import CPU, MS, ONE, Column, Figures, Limits, Unit
 from bench.load import MARGIN
 from bench.processes import cpu_shares
-from common import clock, keys
+from common import clock
 from common.bus.session import client_config
 from common.freshness import NS_PER_S
 from sim.trace import Command
+from t2 import keys
 from verification.harness.bus import at, router_process
 from verification.harness.ports import free_port
 from verification.harness.process_stats import stat

@@ -21,12 +21,13 @@ import msgspec
 from bench.child_process import ChildProcess
 from bench.figures import MS, ONE, Column, Figures, Limits, Unit
 from bench.processes import MissingError
-from common import clock, keys
+from common import clock
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from services.safety.config import SafetyConfig
 from sim.requests import Wire
 from sim.trace import Command
+from t2 import keys
 from verification.faults.namespaces import enter
 from verification.faults.remote_host import Address, net
 from verification.faults.stack_fixture import QUICK, QUICK_MOTORS

@@ -15,7 +15,7 @@ from bench.child_process import ChildProcess
 from bench.figures import CPU, ONE, US, Column, Figures, Limits, Unit
 from bench.processes import cpu_shares, module, one_pool, running
 from bench.reaction import SEED
-from common import keys
+from t2 import keys
 from verification.harness.bus import router_process, set_options
 from verification.harness.ports import free_port, udp_ports
 from verification.harness.process_stats import children

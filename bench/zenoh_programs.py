@@ -23,7 +23,7 @@ from bench.child_process import serve
 from bench.loop import BUMPER, MOTION, RUN, BoardSocket, Call, command, content, framed, run_pair
 from common import clock
 from common.bus.publisher import qos
-from common.keys import COMMAND, ESTOP_CLASS, FAST
+from t2.keys import COMMAND, ESTOP_CLASS, FAST
 
 WAIT_FOREVER = -1  # a client waits until the router listens
 HIT = b"\1"  # payload of a hit and of its answer

@@ -13,8 +13,8 @@ from importlib import import_module
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parents[1]
-ROOT = str(HERE)
-PACKAGES = ("common", "services", "sim", "cli")
+SDK = HERE / "sdk"  # in a checkout, the folder of t2
+PACKAGES = ("t2", "common", "services", "sim", "cli")
 FOLDERS = tuple(f"{name}/" for name in PACKAGES)
 EXIT_CONFIG = 78  # as in ``common.cli_args``, which may be foreign
 REMEDY = (
@@ -28,7 +28,7 @@ TRIED = "t2 estop: it is tried; without its confirmation USE THE VEHICLE'S OWN S
 
 def main() -> int:
     """Run the command; return its exit code."""
-    sys.path.insert(0, ROOT)
+    sys.path[:0] = [str(folder) for folder in (HERE, SDK) if folder.exists()]
     problem = next(foreign(HERE), "")
     if problem:
         print(f"t2: {problem}. {REMEDY}", file=sys.stderr)
@@ -42,9 +42,10 @@ def main() -> int:
 
 def foreign(root: Path) -> Iterator[str]:
     """Yield what is not ours in our packages; a wheel's list has the size of each file."""
-    for record in root.glob("t2-*.dist-info/RECORD"):
-        rows = (line.rsplit(",", 2) for line in record.read_text(encoding="utf-8").splitlines())
-        sizes = {path: size for path, _, size in rows if path.startswith(FOLDERS)}
+    records = [*root.glob("t2-*.dist-info/RECORD"), *root.glob("t2_sdk-*.dist-info/RECORD")]
+    rows = (line.rsplit(",", 2) for it in records for line in it.read_text("utf-8").splitlines())
+    sizes = {path: size for path, _, size in rows if path.startswith(FOLDERS)}
+    if sizes:
         found = dict(each for name in PACKAGES for each in _modules(f"{root}/{name}", f"{name}/"))
         for path, size in sizes.items():
             if path.endswith(".py") and found.get(path) != int(size):
@@ -55,8 +56,9 @@ def foreign(root: Path) -> Iterator[str]:
                 yield f"{root / path} is in a package of T2, but not of T2{_owner(root, path)}"
     for name in PACKAGES:
         place = import_module(name).__file__
-        if place is None or Path(place).resolve() != root / name / "__init__.py":
-            yield f"Python imports {place or name} as the package {name}, not {root / name}"
+        ours = next(folder for folder in (root / name, root / "sdk" / name) if folder.exists())
+        if place is None or Path(place).resolve() != ours / "__init__.py":
+            yield f"Python imports {place or name} as the package {name}, not {ours}"
 
 
 def _modules(folder: str, below: str) -> Iterator[tuple[str, int]]:
@@ -73,6 +75,8 @@ def _owner(root: Path, path: str) -> str:
     """Return which other package has installed a file, if its list of files shows it."""
     for record in root.glob("*.dist-info/RECORD"):
         name = record.parent.name.removesuffix(".dist-info")
-        if not name.startswith("t2-") and f"\n{path}," in "\n" + record.read_text("utf-8"):
+        if not name.startswith(("t2-", "t2_sdk-")) and f"\n{path}," in "\n" + record.read_text(
+            "utf-8"
+        ):
             return f": {name} has installed it"
     return ""

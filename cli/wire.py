@@ -19,13 +19,13 @@ from typing import Any, get_args
 import msgspec
 from msgspec.structs import replace
 
-from common.errors import RobotError
-from common.messages import FaultName
 from common.wire import framing
 from common.wire.commands import TO_BOARD
 from common.wire.frame import Frame, Kinds
 from common.wire.framing import Reason, Received, Rejected
 from common.wire.reports import FROM_BOARD
+from t2.errors import T2Error
+from t2.messages import FaultName
 
 TABLES: dict[str, Kinds] = {"pc": TO_BOARD, "board": FROM_BOARD}
 
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def datagrams(source: str) -> list[Datagram]:
-    """Return the datagrams of a hex string or of a capture; raise ``RobotError`` without any."""
+    """Return the datagrams of a hex string or of a capture; raise ``T2Error`` without any."""
     try:
         data = bytes.fromhex(re.sub(r"0[xX]|[\s:,-]", "", source))
     except ValueError:
@@ -70,19 +70,19 @@ def datagrams(source: str) -> list[Datagram]:
     try:
         content = Path(source).read_bytes()
     except OSError as error:
-        raise RobotError(f"{source!r} is neither hex nor a file: {error.strerror}") from None
+        raise T2Error(f"{source!r} is neither hex nor a file: {error.strerror}") from None
     found = list(from_pcap(source, content))
     if not found:
-        raise RobotError(f"{source}: contains no UDP packets")
+        raise T2Error(f"{source}: contains no UDP packets")
     return found
 
 
 def from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
-    """Yield the payload of each UDP packet; raise ``RobotError`` at the first invalid one."""
+    """Yield the payload of each UDP packet; raise ``T2Error`` at the first invalid one."""
     try:
         from dpkt import dpkt, ethernet, ip, pcap, sll, sll2, udp, utils  # type: ignore[import-untyped]
     except ImportError:
-        raise RobotError(
+        raise T2Error(
             "reading a capture needs dpkt; `make` installs it, or pip install -e '.[inspect]'"
         ) from None
     links = {
@@ -94,9 +94,7 @@ def from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
     try:
         reader = pcap.UniversalReader(io.BytesIO(content))
         if reader.datalink() not in links:
-            raise RobotError(
-                f"{name}: unsupported link type {reader.datalink()}; capture on Ethernet"
-            )
+            raise T2Error(f"{name}: unsupported link type {reader.datalink()}; capture on Ethernet")
         for number, (_, packet) in enumerate(reader, 1):
             network = links[reader.datalink()](packet)
             while not isinstance(network, (ip.IP, bytes)):
@@ -107,7 +105,7 @@ def from_pcap(name: str, content: bytes) -> Iterator[Datagram]:
                 target = f"{utils.inet_to_str(network.dst)}:{segment.dport}"
                 yield f"packet {number} {source} > {target}", bytes(segment.data)
     except (dpkt.Error, ValueError, KeyError) as error:
-        raise RobotError(f"{name}: invalid after packet {number}: {error}") from None
+        raise T2Error(f"{name}: invalid after packet {number}: {error}") from None
 
 
 # --- frames -------------------------------------------------------------------------------------

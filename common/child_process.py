@@ -8,7 +8,8 @@ import os
 import sys
 from pathlib import Path
 
-ROOT = str(Path(__file__).resolve().parents[1])  # the folder of our packages
+ROOT = Path(__file__).resolve().parents[1]  # the folder of our packages; in a checkout sdk has one
+PATHS = [str(folder) for folder in (ROOT, ROOT / "sdk") if folder.exists()]
 VARIABLE = "PYTHONPATH"
 
 BACKOFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)  # delay before each restart; the last value repeats
@@ -22,8 +23,8 @@ def command(module: str, *words: str) -> list[str]:
 
 def environ() -> dict[str, str]:
     """Return this process' environment with our packages first in PYTHONPATH."""
-    others = [path for path in os.environ.get(VARIABLE, "").split(os.pathsep) if path != ROOT]
-    paths = [ROOT, *filter(None, others)]
+    others = os.environ.get(VARIABLE, "").split(os.pathsep)
+    paths = [*PATHS, *(path for path in others if path and path not in PATHS)]
     return os.environ | {VARIABLE: os.pathsep.join(paths)}
 
 

@@ -11,10 +11,11 @@ from functools import partial
 from pathlib import Path
 
 from common.config import DEFAULT_FILE, Sources
-from common.errors import ConfigError, LinkError, RobotError
-from common.messages import VERSION as VERSION
+from common.errors import ConfigError
 from common.text import printable
-from common.text_file import expanded
+from t2.errors import LinkError, T2Error
+from t2.messages import VERSION as VERSION
+from t2.text_file import expanded
 
 FILES_ENV = "T2_CONFIG"  # settings files, separated as in PATH; programs pass it to their children
 
@@ -95,7 +96,7 @@ def run_program(
     options = parser.parse_args(argv)
     try:
         return run(options)
-    except RobotError as error:
+    except T2Error as error:
         text = with_options(str(error), source_words(options) if "sets" in options else ())
         print(printable(f"{name}: {text}", "\n"), file=sys.stderr)  # noqa: T201 - logs may not be set up yet
         return EXIT_CODES.get(type(error), 1)
@@ -103,10 +104,10 @@ def run_program(
 
 @contextmanager
 def needs_extra(extra: str, what: str) -> Iterator[None]:
-    """Raise ``RobotError`` that names the extra if an import in the block finds no library."""
+    """Raise ``T2Error`` that names the extra if an import in the block finds no library."""
     try:
         yield
     except ModuleNotFoundError as error:
-        raise RobotError(
+        raise T2Error(
             f"{what} needs {error.name}: install the extra `{extra}` (pip install -e '.[{extra}]')"
         ) from None

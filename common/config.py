@@ -20,7 +20,7 @@ from msgspec import Struct
 
 from common.errors import ConfigError
 from common.removed_settings import REMOVED
-from common.text_file import expanded, read_text, typographic
+from t2.text_file import expanded, read_text, typographic
 
 C = TypeVar("C", bound=Struct)
 

@@ -1,21 +1,11 @@
-"""Exceptions of T2; all are a ``RobotError``."""
+"""Exceptions of the stack; as those of ``t2.errors``, each is a ``T2Error``."""
+
+from t2.errors import T2Error
 
 
-class RobotError(Exception):
-    """Base class of all errors that T2 raises."""
-
-
-class WireError(RobotError):
+class WireError(T2Error):
     """A frame that violates the vehicle's protocol."""
 
 
-class MessageError(RobotError):
-    """A message that violates the bus contract."""
-
-
-class ConfigError(RobotError):
+class ConfigError(T2Error):
     """A setting that is missing, unknown or out of range."""
-
-
-class LinkError(RobotError):
-    """A socket, session or peer that cannot be reached."""

@@ -9,7 +9,7 @@ that echoes of an earlier start are unknown.
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.messages import SafetyState
+from t2.messages import SafetyState
 
 MAX_CALL_AGE_NS = NS_PER_S  # of an operator's call
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here

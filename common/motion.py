@@ -4,9 +4,10 @@ Frames follow REP-103: in ``base_link``, m/s forward positive and rad/s counter-
 """
 
 import math
-from enum import StrEnum
 
 from msgspec import Struct
+
+from t2.messages import Command
 
 # A measured velocity below both counts as standstill.
 STANDING_MPS = 0.02
@@ -14,14 +15,6 @@ STANDING_RADPS = 0.05  # 3 deg/s: the board resolves 0.1 deg/s, its sensor is no
 # Half of the resolution of a motion frame: 1 mm/s and 0.1 deg/s.
 ROUNDED_MPS = 0.0005
 ROUNDED_RADPS = math.radians(0.05)
-
-
-class Command(StrEnum):
-    """A motion command (manual 2.2); ``common.wire`` spells BRAKE as the manual does."""
-
-    RUN = "run"  # follow the velocities
-    STOP = "stop"  # ramp down to standstill
-    BRAKE = "brake"  # stop at once
 
 
 # For hot paths: before Python 3.12 each ``Command.RUN`` calls a Python function.

@@ -18,7 +18,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from common.messages import Link, SafetyState
+from t2.messages import CauseName, Link, SafetyState
 
 Part = Literal["", "router", "safety", "bridge", "relay", "board"]
 
@@ -31,15 +31,15 @@ TEXTS: dict[Part, str] = {
 MAY_MOVE = "The vehicle may still move: use its own switch."
 # Causes of safety that it has without a bridge, and others that follow from a missing bridge, relay
 # or board. One that latches, or that brakes a moving vehicle, is not among them.
-WITHOUT_BRIDGE = ("starting", "bumper", "silent", "link")
-FROM_LINK = (*WITHOUT_BRIDGE, "bumper_lossy", "sonar", "switches", "unarmed")
+WITHOUT_BRIDGE: tuple[CauseName, ...] = ("starting", "bumper", "silent", "link")
+FROM_LINK: tuple[CauseName, ...] = (*WITHOUT_BRIDGE, "bumper_lossy", "sonar", "switches", "unarmed")
 
 
 class RootCause(Struct, frozen=True):
     """The missing part; empty if there is none."""
 
     part: Part = ""
-    folded: tuple[str, ...] = ()  # names of safety's causes that follow from it
+    folded: tuple[CauseName, ...] = ()  # names of safety's causes that follow from it
 
 
 def root_cause(connected: bool, state: SafetyState | None, link: Link | None) -> RootCause:

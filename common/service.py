@@ -18,18 +18,20 @@ from typing import Generic, TypeVar
 
 import msgspec
 
-from common import clock, keys, log, realtime
+from common import clock, log, realtime
 from common.bus.bus import Bus
 from common.bus.drive import DriveLink, LinkWatch
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION, arguments, needs_extra, sources
 from common.config import Loaded, Sources, load
-from common.errors import ConfigError, LinkError, RobotError
+from common.errors import ConfigError
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import MAX_TEXT, Durations, Event, Health, Level
 from common.settings import Shared
 from common.systemd import CHECK_PERIOD_S, Systemd
+from t2 import keys
+from t2.errors import LinkError, T2Error
+from t2.messages import MAX_TEXT, Durations, Event, EventName, Health, Level
 
 STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
 QUERY_PERIOD_S = 0.02  # one query of each key
@@ -87,7 +89,9 @@ class Node(Generic[C]):
         self.loop.every(1.0, LinkWatch(self.drive, self.event).check)
         return self.drive
 
-    def event(self, name: str, level: Level, text: str, **about: str | float | bool | None) -> None:
+    def event(
+        self, name: EventName, level: Level, text: str, **about: str | float | bool | None
+    ) -> None:
         """Publish and log an event; texts are cut to the length that a message may have."""
         cut = {key: v[:MAX_TEXT] if isinstance(v, str) else v for key, v in about.items()}
         self._events.put(Event(name=name, level=level, text=text[:MAX_TEXT], about=cut))
@@ -192,7 +196,7 @@ def run_optional_service(
     try:
         with needs_extra(extra, name):
             build = getattr(import_module(module), attribute)
-    except RobotError as error:
+    except T2Error as error:
         print(error, file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG
     os.nice(NICENESS)

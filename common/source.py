@@ -5,11 +5,11 @@ from typing import Generic, TypeVar
 
 from msgspec.structs import replace
 
-from common import keys
 from common.bus.bus import Arrival, Bus
-from common.client import Access, request
-from common.keys import Topic
-from common.messages import Drive, EstopKeepalive, SafetyState, SourceMessage
+from t2 import keys
+from t2.client import Access, request
+from t2.keys import Topic
+from t2.messages import Drive, EstopKeepalive, SafetyState, SourceMessage
 
 M = TypeVar("M", bound=SourceMessage)
 

@@ -16,8 +16,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Mileage
 from common.motion import STANDING_MPS, STANDING_RADPS, STILL, Twist
+from t2.messages import Mileage
 
 AWAY_M, AWAY_RAD = 0.05, 0.05  # from the place of the standstill
 LEAK_S = 5.0  # time constant of the integrated velocities

@@ -15,10 +15,10 @@ from msgspec import Meta, Struct
 from common.config import DEFAULT, Setting, build, flatten, read_toml
 from common.errors import ConfigError
 from common.settings import Board, Section, Shared, Vehicle, Wire
-from common.text_file import expanded
 from sim.geometry import Rectangle
 from sim.model import Model
 from sim.world import Plan, World
+from t2.text_file import expanded
 
 F = TypeVar("F", bound=Struct)
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from common.motion import Command
 from common.settings import Section, Vehicle, Wire
+from t2.messages import Command
 
 Where = Literal["asked", "first", "second", "both"]  # of the PC's two ports
 Chance = Annotated[float, Meta(ge=0.0, le=1.0)]

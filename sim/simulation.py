@@ -15,7 +15,7 @@ from functools import singledispatchmethod
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.motion import STILL, Command
+from common.motion import STILL
 from common.wire import framing
 from common.wire import reports as r
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
@@ -32,6 +32,7 @@ from sim.requests import Asked
 from sim.sonar import Sonars
 from sim.vehicle import Motors, move, rebounded
 from sim.world import Plan, World
+from t2.messages import Command
 
 STEP_NS = NS_PER_S // 100
 STREAM_STEPS = 2  # velocity at 50 Hz

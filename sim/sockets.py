@@ -11,11 +11,11 @@ from collections.abc import Iterator
 
 import msgspec
 
-from common.errors import LinkError
 from common.settings import Board
 from sim.faults import Datagram
 from sim.requests import Asked
 from sim.simulation import Reply, Simulation
+from t2.errors import LinkError
 
 HOST = "127.0.0.1"  # of the control socket
 LARGEST = 65536

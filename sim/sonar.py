@@ -9,13 +9,13 @@ import math
 import random
 from collections.abc import Sequence
 
-from common.messages import SONAR_NAMES
 from common.settings import Mount, Vehicle, sonar_mounts
 from common.wire.reports import SONAR_FAULT_MM
 from sim import model
 from sim.geometry import Pose, in_cone, ray
 from sim.requests import Sonar
 from sim.world import World
+from t2.messages import SONAR_NAMES
 
 RAYS = 7
 TOO_NEAR_MM = 0

@@ -7,8 +7,8 @@ here and of messages there can be compared. SI units and radians, in the world's
 import msgspec
 from msgspec import Struct
 
-from common import motion
 from sim.requests import Asked
+from t2 import messages
 
 
 class Record(Struct, frozen=True, kw_only=True, tag_field="event"):
@@ -20,7 +20,7 @@ class Record(Struct, frozen=True, kw_only=True, tag_field="event"):
 class Command(Record, frozen=True, kw_only=True, tag="command"):
     """The board received a motion command; queries are only counted."""
 
-    kind: motion.Command
+    kind: messages.Command
     linear: float  # m/s
     angular: float  # rad/s
 

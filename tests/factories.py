@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from common.messages import Cause, Health, Limits, Link, Odometry, Release, SafetyState
+from t2.messages import Cause, Health, Limits, Link, Odometry, Release, SafetyState
 
 
 def safety_state(**fields: Any) -> SafetyState:

@@ -8,10 +8,10 @@ from msgspec import Struct
 from common import clock
 from common.bus.bus import Arrival, Bus
 from common.config import Loaded
-from common.keys import Call, Topic
-from common.messages import Message
 from common.service import Node
 from common.settings import Shared
+from t2.keys import Call, Topic
+from t2.messages import Message
 from verification.harness.bus import at
 
 C = TypeVar("C", bound=Shared)
@@ -76,7 +76,7 @@ class FakeNode(Node[C]):
         self.fake = FakeBus()
         return self.fake
 
-    def event(self, name: str, *args: Any, **about: Any) -> None:
+    def event(self, name: Any, *args: Any, **about: Any) -> None:
         """Record the name of an event, and publish it."""
         self.events.append(name)
         super().event(name, *args, **about)

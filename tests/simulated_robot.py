@@ -18,10 +18,10 @@ import t2.drive
 import t2.publisher
 import t2.robot
 import t2.stream
-from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from sim.config import load_plan
+from t2 import messages as m
 from verification.search.bus import MS, Envelope, Subscription
 from verification.search.stack import ASK_NS, Stack
 

@@ -28,7 +28,7 @@ GAP_MAX_S = 2.0  # as opposed to 10
 # Receives safety's motions as the bridge does; prints the longest gap between two of them.
 BRIDGE = """
 import sys, time
-from common import keys
+from t2 import keys
 from common.bus.bus import Bus
 from common.bus.drive import DriveLink
 from common.loop import Loop

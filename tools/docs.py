@@ -12,11 +12,11 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from common import keys
-from common import messages as m
 from services.metrics.samples import METRICS
 from services.safety.core.causes import RULES, Clears
-from tools import rights_table, sdk, settings_file
+from t2 import keys
+from t2 import messages as m
+from tools import rights_table, settings_file
 from tools.fields import fields_of
 from verification.harness.results import filled, table
 
@@ -60,7 +60,7 @@ def generated() -> dict[Path, str]:
     schemas = {DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()}
     filled_pages = {page: filled(current(page), tables) for page, tables in pages.items()}
     settings = {ROOT / "config" / "t2.toml": settings_file.text()}
-    return filled_pages | schemas | settings | sdk.generated()
+    return filled_pages | schemas | settings
 
 
 def kinds() -> list[type[Struct]]:

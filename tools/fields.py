@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, get_args, get_origin
 
 from msgspec import Struct
 
-from common import messages
+from t2 import messages
 
 FIELD = re.compile(
     r"    (?P<name>\w+): (?:Annotated\[(?=.+, Few\]))?(?P<type>.+?)(?:, Few\])?"

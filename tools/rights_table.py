@@ -8,9 +8,9 @@ from cli.keys import access
 from cli.keys.access import Rights, Verb
 from cli.keys.member_list import BOUND
 from cli.keys.members import OPERATORS_SOURCES, Profile, Role
-from common import keys
 from services.ros2 import names
 from services.ros2.config import Ros2
+from t2 import keys
 
 MINE, OTHER = "001", "002"  # a driver's robot, and another robot
 

@@ -13,10 +13,11 @@ from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
 from cli.inspect.session import one_robot, robot_sources
 from cli.settings import Everything
-from common import keys
 from common.cli_args import VERSION, add_sources, file_path
 from common.config import Loaded, load
-from common.errors import ConfigError, RobotError
+from common.errors import ConfigError
+from t2 import keys
+from t2.errors import T2Error
 
 NAMES = [step.name for step in STEPS]
 SECTIONS = {"bridge": ("wire", "board", "vehicle", "bridge"), "safety": ("safety",)}
@@ -99,7 +100,7 @@ def guide(report: Report, steps: Sequence[Step], session: CheckoutSession) -> No
         report.signed = name if typed.casefold() == name.casefold() else ""
     except KeyboardInterrupt:
         report.aborted = "interrupted by the operator"
-    except RobotError as error:
+    except T2Error as error:
         report.aborted = str(error)
     report.operator = name or "unknown"
     report.facts.append(("firmware", firmware or "unknown"))

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from cli.commission.report import Verdict, judged, seconds
 from common.freshness import NS_PER_S, Latest
-from common.messages import Motion, SafetyState
-from common.motion import Command
+from t2.messages import Command, Motion, SafetyState
 
 LIMIT_S = 0.5  # from the cause to the latch and to BRAKE, including a slow bus
 

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import mean, median
 
 from cli.commission.report import Verdict, judged
-from common import keys
 from common.freshness import NS_PER_S
-from common.messages import Link, Relay, Switches
+from t2 import keys
+from t2.messages import Link, Relay, Switches
 
 ENOUGH = 0.7  # of the requested rate: answers may be missing
 VELOCITY_HZ = 10.0  # sent unrequested; safety stops when it is older than 0.2 s

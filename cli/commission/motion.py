@@ -26,8 +26,8 @@ from statistics import mean
 
 from cli.commission.report import Row, Verdict, judged, seconds
 from common.freshness import NS_PER_S, Latest
-from common.messages import Mileage, Motion, SafetyState, Velocity
-from common.motion import Command, Twist
+from common.motion import Twist
+from t2.messages import Command, Mileage, Motion, SafetyState, Velocity
 
 SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; a margin for unknown vehicles
 WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps

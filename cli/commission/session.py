@@ -12,17 +12,18 @@ from cli.commission.motion import too_fast
 from cli.inspect.addressing import decode, topic_of
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import decoded
-from common import clock, keys
+from common import clock
 from common.bus.probe import Probe, probe
-from common.client import request, reset_request
-from common.codec import Sample
 from common.config import Setting
-from common.errors import LinkError, MessageError, RobotError
 from common.freshness import NS_PER_S, Latest
-from common.keys import Topic
-from common.messages import Message, ResetDone
 from common.motion import Twist
 from common.settings import Shared
+from t2 import keys
+from t2.client import request, reset_request
+from t2.codec import Sample
+from t2.errors import LinkError, MessageError, T2Error
+from t2.keys import Topic
+from t2.messages import Message, ResetDone
 
 SOURCE = "checkout"  # as in safety's settings
 STACK_S = 10.0
@@ -93,8 +94,8 @@ class CheckoutSession(SafetyClient):
             requested_ns = self.mark()
             answers = self.call(keys.RESET, reset_request(seen))
             if not self.is_reset(seen, answers):
-                raise RobotError("safety's state does not show it")
-        except RobotError as error:
+                raise T2Error("safety's state does not show it")
+        except T2Error as error:
             return Reset(requested_ns, False, str(error), self.latched())
         text = " ".join(done.text for done in decoded(answers, ResetDone))
         return Reset(requested_ns, True, text, self.latched())

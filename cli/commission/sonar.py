@@ -11,7 +11,7 @@ from statistics import median
 
 from cli.commission.report import Verdict, judged
 from common.freshness import NS_PER_S
-from common.messages import SONAR_NAMES, Ultrasonic
+from t2.messages import SONAR_NAMES, Ultrasonic
 
 NEAR_M = 0.6  # a hand is held at 0.2 to 0.4 m
 CLEARLY_M = 0.2  # below the range at rest: more than noise, less than the effect of a hand

@@ -20,11 +20,12 @@ from cli.commission.sonar import (
     resting_ranges,
     words,
 )
-from common import clock, keys
-from common.errors import RobotError
-from common.messages import SONAR_NAMES
-from common.motion import Command, Twist
+from common import clock
+from common.motion import Twist
 from common.text import printable
+from t2 import keys
+from t2.errors import T2Error
+from t2.messages import SONAR_NAMES, Command
 
 LINK_S = 10.0  # some 1000 frames; the ultrasonic ones prove the CRC: zeros have CRC 0 with any CRC
 REST_S = 1.0
@@ -48,7 +49,7 @@ def show(text: str) -> None:
 def prompt(question: str) -> str:
     """Return one stripped line; input typed before the question is discarded.
 
-    Raise ``RobotError`` at the end of the input.
+    Raise ``T2Error`` at the end of the input.
     """
     if sys.stdin.isatty():
         with suppress(termios.error):
@@ -57,9 +58,9 @@ def prompt(question: str) -> str:
     try:
         line = sys.stdin.readline()
     except UnicodeDecodeError:
-        raise RobotError("standard input is no UTF-8: save the answers as UTF-8") from None
+        raise T2Error("standard input is no UTF-8: save the answers as UTF-8") from None
     if not line:
-        raise RobotError("standard input has ended before all questions were answered")
+        raise T2Error("standard input has ended before all questions were answered")
     return line.removeprefix("\ufeff").strip()  # a file of answers may begin with a mark
 
 

@@ -10,10 +10,11 @@ from cli.inspect import output
 from cli.inspect.addressing import chunks
 from cli.recordings.info import open_recording
 from cli.settings import Everything
-from common import keys
-from common.errors import ConfigError, RobotError
+from common.errors import ConfigError
 from common.standstill import stopping_s
 from services.safety.config import Safety
+from t2 import keys
+from t2.errors import T2Error
 
 # Safety reckons from the reading of a sonar on, a stop begins with its command: between them are up
 # to one period of the sonars and one of the bridge's queries.
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace, config: Everything) -> int:
 def read(files: Sequence[Path], robot: str | None) -> tuple[list[Stop], Counter[str]]:
     """Return the stops of all recordings, and why others are left out.
 
-    Raise ``RobotError`` without any, and for several robots: ``robot`` chooses one.
+    Raise ``T2Error`` without any, and for several robots: ``robot`` chooses one.
     """
     robots: set[str] = set()
     stops: dict[tuple[object, ...], Stop] = {}
@@ -55,9 +56,9 @@ def read(files: Sequence[Path], robot: str | None) -> tuple[list[Stop], Counter[
             left_out["in two recordings"] += key in stops
             stops.setdefault(key, stop)
     if len(robots) > 1:
-        raise RobotError(f"recordings of {', '.join(sorted(robots))}: choose one with --robot")
+        raise T2Error(f"recordings of {', '.join(sorted(robots))}: choose one with --robot")
     if not stops:
-        raise RobotError(
+        raise T2Error(
             f"no stop to measure: a STOP or BRAKE from a steady speed, until standstill "
             f"({counted(left_out) or 'no RUN with speed ends'})"
         )
@@ -67,7 +68,7 @@ def read(files: Sequence[Path], robot: str | None) -> tuple[list[Stop], Counter[
 def read_streams(file: Path, robot: str | None, robots: set[str]) -> Streams:
     """Return a robot's messages in one recording, and add its robots to ``robots``.
 
-    Raise ``RobotError`` if it shows no stops.
+    Raise ``T2Error`` if it shows no stops.
     """
     streams = Streams()
     with open_recording(file) as reader:
@@ -79,7 +80,7 @@ def read_streams(file: Path, robot: str | None, robots: set[str]) -> Streams:
                 robots.add(name)
                 streams.add(message)
     if streams.problem:
-        raise RobotError(f"{file}: {streams.problem}")
+        raise T2Error(f"{file}: {streams.problem}")
     return streams
 
 

@@ -27,8 +27,8 @@ from statistics import linear_regression, median
 from typing import Literal
 
 from common.freshness import NS_PER_S
-from common.messages import Bumper, Message, Mileage, Motion, Velocity
-from common.motion import STANDING_MPS, STANDING_RADPS, Command, Twist
+from common.motion import STANDING_MPS, STANDING_RADPS, Twist
+from t2.messages import Bumper, Command, Message, Mileage, Motion, Velocity
 
 STEADY_S, STEADY = 0.2, 0.05  # before the command: time, and relative deviation
 LONGEST_GAP_S = 0.1  # between two velocities, and around the begin of a stop

@@ -19,8 +19,9 @@ from cli.settings import Everything
 from common import log
 from common.cli_args import add_sources, file_path, source_words, sources
 from common.config import load
-from common.errors import ConfigError, LinkError, RobotError
+from common.errors import ConfigError
 from sim.config import add_profiles, load_model, load_plan
+from t2.errors import LinkError, T2Error
 
 if TYPE_CHECKING:
     from t2.messages import Odometry
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         from cli.demo import plot
         from cli.demo.score import good, read, results
     except ImportError as error:
-        raise RobotError(
+        raise T2Error(
             f"the demo needs {error.name}; `make demo` installs it, or pip install -e '.[demo]'"
             " -e sdk"
         ) from None
@@ -89,7 +90,7 @@ def drive(options: argparse.Namespace, config: Everything, pace: float) -> "list
             if supervisor.look(time.monotonic()):
                 raise LinkError(f"a process cannot run; see {log_file}")
             if time.monotonic() > end_s:
-                raise RobotError(f"the lap takes longer than {TIMEOUT_S:g} s; see {log_file}")
+                raise T2Error(f"the lap takes longer than {TIMEOUT_S:g} s; see {log_file}")
 
         robot: t2.Robot | None = None
         while robot is None:  # until the router runs

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from common.freshness import NS_PER_S
-from common.motion import Command
 from sim import trace as t
+from t2.messages import Command
 
 Result = tuple[str, str, bool]  # quantity, value, whether it is within its limit
 

@@ -3,11 +3,11 @@
 import argparse
 import re
 
-from common import codec, keys
 from common.bus.probe import valid
-from common.codec import Sample
-from common.errors import MessageError
-from common.messages import Health, Message
+from t2 import codec, keys
+from t2.codec import Sample
+from t2.errors import MessageError
+from t2.messages import Health, Message
 
 # `**` does not match a chunk that begins with "@" (verbatim in Zenoh): both are needed for all.
 EVERYTHING = ("**", "@cmd/**")

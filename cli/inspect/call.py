@@ -13,11 +13,11 @@ from cli.inspect import output
 from cli.inspect.client import SafetyClient
 from cli.inspect.payload import read
 from cli.inspect.session import add_options, open_session
-from common import codec, keys
-from common.client import reset_request
-from common.errors import RobotError
-from common.keys import CALLS, Call
-from common.messages import SafetyState
+from t2 import codec, keys
+from t2.client import reset_request
+from t2.errors import T2Error
+from t2.keys import CALLS, Call
+from t2.messages import SafetyState
 
 Request = dict[str, Any]
 
@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace) -> None:
-    """Call and show the replies; raise ``RobotError`` if it failed or is unconfirmed."""
+    """Call and show the replies; raise ``T2Error`` if it failed or is unconfirmed."""
     request, seen = options.request, None
     if "echo" in call.request.__struct_fields__:
         seen = client.fresh_state()
@@ -69,7 +69,7 @@ def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace
     for answer in answers:
         output.value(read(answer.payload, answer.encoding).value, as_json=options.json)
     if seen and call is keys.RESET and not client.is_reset(seen, answers):
-        raise RobotError("not confirmed: safety's state does not show this reset; run `t2 doctor`")
+        raise T2Error("not confirmed: safety's state does not show this reset; run `t2 doctor`")
 
 
 def known(word: str) -> Call[Any, Any]:

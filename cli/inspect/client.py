@@ -1,4 +1,4 @@
-"""Client of safety for a tool: the state machines of ``common.client`` on a probe.
+"""Client of safety for a tool: the state machines of ``t2.client`` on a probe.
 
 Everything runs in the tool's own thread: messages are taken and the drive request of each tick is
 sent only inside ``until``. While a tool waits for its user nothing is sent, which is a release, and
@@ -16,18 +16,19 @@ from msgspec.structs import replace
 
 from cli.inspect.addressing import chunks
 from cli.inspect.session import decoded, services
-from common import clock, codec, keys
+from common import clock
 from common.bus.bus import no_answer, not_allowed
 from common.bus.probe import Answer, Probe
 from common.bus.publisher import host_id
-from common.client import DriveRequests, EstopRepetition, EstopStep, ResetCheck
-from common.codec import Sample
-from common.errors import RobotError
 from common.freshness import NS_PER_S
-from common.keys import Call, Topic
-from common.messages import Drive, Event, ResetDone, SafetyState, SourceMessage
+from t2 import codec, keys
+from t2.client import DriveRequests, EstopRepetition, EstopStep, ResetCheck
+from t2.codec import Sample
+from t2.errors import T2Error
+from t2.keys import Call, Topic
+from t2.messages import Drive, Event, ResetDone, SafetyState, SourceMessage
 
-TICK_S = 0.05  # as ``common.client`` expects
+TICK_S = 0.05  # as ``t2.client`` expects
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
 
 
@@ -138,22 +139,22 @@ class SafetyClient:
         self.states.clear()
 
     def fresh_state(self) -> SafetyState:
-        """Return a state that arrives from now on; raise ``RobotError`` without one."""
+        """Return a state that arrives from now on; raise ``T2Error`` without one."""
         self.forget()
         if not self.until(lambda: self.state, STATE_S) or self.state is None:
-            raise RobotError(
+            raise T2Error(
                 f"no state of safety within {STATE_S:g} s: is safety running? run `t2 doctor`"
             )
         return self.state
 
     def call(self, call: Call[Any, Any], request: Struct, timeout_s: float = 2.0) -> list[Answer]:
-        """Return the answers to a call; raise ``RobotError`` if it is refused or not answered."""
+        """Return the answers to a call; raise ``T2Error`` if it is refused or not answered."""
         key = call.on(self.robot)
         answers = self.probe.query(key, codec.encode(request), timeout_s)
         if not answers:
-            raise RobotError(f"{key}: {self._why_unanswered(call, key)}")
+            raise T2Error(f"{key}: {self._why_unanswered(call, key)}")
         if refusals := [answer.refusal for answer in answers if answer.refusal]:
-            raise RobotError(f"refused: {' '.join(refusals)}")
+            raise T2Error(f"refused: {' '.join(refusals)}")
         return answers
 
     def is_reset(self, seen: SafetyState, answers: Iterable[Answer]) -> bool:

@@ -9,9 +9,9 @@ from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from common import keys
-from common.messages import Health, Link, Relay, SafetyState
 from common.root_cause import FROM_LINK
+from t2 import keys
+from t2.messages import Health, Link, Relay, SafetyState
 
 Level = Literal["ok", "note", "wrong", "unknown"]
 

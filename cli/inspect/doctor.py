@@ -22,18 +22,18 @@ from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic
 from cli.inspect.diagnosis import Finding, Observation, diagnose
 from cli.inspect.estop import is_barred
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
-from common import keys
 from common.bus.probe import Probe, probe
 from common.bus.session import common_name
 from common.cli_args import VERSION, source_words, with_options
-from common.codec import Sample
-from common.errors import LinkError, MessageError
 from common.freshness import NS_PER_S
-from common.keys import Topic
-from common.messages import Health, Link, SafetyState
 from common.settings import BusSettings, Shared
 from common.text import printable
-from common.text_file import pem_problem
+from t2 import keys
+from t2.codec import Sample
+from t2.errors import LinkError, MessageError
+from t2.keys import Topic
+from t2.messages import Health, Link, SafetyState
+from t2.text_file import pem_problem
 
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
 CONNECT_S = 2.0

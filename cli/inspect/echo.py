@@ -8,11 +8,11 @@ from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
 from cli.inspect.session import add_duration, add_options, open_session, until_interrupt
-from common.codec import Sample
-from common.errors import RobotError
 from common.freshness import NS_PER_S
-from common.messages import Event
 from common.text import printable
+from t2.codec import Sample
+from t2.errors import T2Error
+from t2.messages import Event
 
 ONCE_S = 10.0  # for --once without --duration
 HEADER = ("seq", "boot", "t_ns", "mono_ns", "host")
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print messages; raise ``RobotError`` if none arrived."""
+    """Print messages; raise ``T2Error`` if none arrived."""
     shown = False
     duration_s = options.duration or (ONCE_S if options.once else None)
     with open_session(options) as session:
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
                     break
     if not shown:
         within = f" within {duration_s:g} s" if duration_s else ""
-        raise RobotError(f"no message on {wanted}{within}; `t2 ls` lists the active keys")
+        raise T2Error(f"no message on {wanted}{within}; `t2 ls` lists the active keys")
     return 0
 
 

@@ -21,14 +21,14 @@ from typing import TextIO
 from cli.inspect import output
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import add_options, open_session, services, until_interrupt
-from common import keys
 from common.bus.probe import Probe
 from common.cli_args import source_words
-from common.client import ESTOP_WAIT_S
-from common.errors import LinkError, RobotError
-from common.messages import EstopKeepalive, KeepaliveState, SafetyState
 from common.root_cause import WITHOUT_BRIDGE
 from common.text import printable
+from t2 import keys
+from t2.client import ESTOP_WAIT_S
+from t2.errors import LinkError, T2Error
+from t2.messages import EstopKeepalive, KeepaliveState, SafetyState
 
 RETRY_S = 0.2  # without a router
 KEEPALIVE_S = 0.1
@@ -177,7 +177,7 @@ def keep_alive(options: argparse.Namespace) -> int:
     """Keep an emergency stop alive until Ctrl-C; return 1 when safety does not expect its name."""
     with open_session(options) as session:
         if "*" in session.robot:
-            raise RobotError("--keepalive works on one robot at a time; name it")
+            raise T2Error("--keepalive works on one robot at a time; name it")
         name, robot = options.keepalive, session.robot
         client = SafetyClient(session.probe, robot, source=name)
         ours = kept(client.fresh_state(), name)
@@ -191,11 +191,11 @@ def keep_alive(options: argparse.Namespace) -> int:
 
 
 def kept(state: SafetyState, name: str) -> KeepaliveState:
-    """Return safety's state of this name; raise ``RobotError`` if it does not expect it."""
+    """Return safety's state of this name; raise ``T2Error`` if it does not expect it."""
     known = {one.source: one for one in state.estop_keepalives}
     if name not in known:
         names = f"it expects {', '.join(known)}" if known else "it expects no keepalive"
-        raise RobotError(f"safety does not expect {name!r}: {names}; see safety.estop_keepalive")
+        raise T2Error(f"safety does not expect {name!r}: {names}; see safety.estop_keepalive")
     return known[name]
 
 

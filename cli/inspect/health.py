@@ -12,9 +12,9 @@ import msgspec
 from cli.inspect import output
 from cli.inspect.addressing import chunks, decode
 from cli.inspect.session import BusSession, add_options, open_session, services
-from common import keys
-from common.errors import MessageError
-from common.messages import Health
+from t2 import keys
+from t2.errors import MessageError
+from t2.messages import Health
 
 ROUTER = "router"  # not a service of ours; it is healthy if it accepts a session
 LISTEN_S = 2.5  # two periods of the health messages, and a margin

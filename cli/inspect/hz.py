@@ -24,9 +24,9 @@ from cli.inspect.session import (
     open_session,
     until_interrupt,
 )
-from common.codec import Sample
-from common.errors import RobotError
 from common.freshness import NS_PER_S
+from t2.codec import Sample
+from t2.errors import T2Error
 
 REPORT_S = 1.0
 WINDOW = 10_000
@@ -87,7 +87,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Report once a second; raise ``RobotError`` if no message arrived."""
+    """Report once a second; raise ``T2Error`` if no message arrived."""
     streams: defaultdict[str, StreamStats] = defaultdict(StreamStats)
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
         with until_interrupt():
             follow(session, options, streams)
     if not streams:
-        raise RobotError(f"no message on {wanted}; `t2 ls` lists the active keys")
+        raise T2Error(f"no message on {wanted}; `t2 ls` lists the active keys")
     return 0
 
 

@@ -23,9 +23,9 @@ from cli.inspect.session import (
     open_session,
     until_interrupt,
 )
-from common import codec
 from common.bus.probe import Probe, intersects
-from common.errors import RobotError
+from t2 import codec
+from t2.errors import T2Error
 
 LISTEN_S = 2.0  # two periods of the slowest streams
 ROLES = {"publisher": "publishes", "subscriber": "reads", "queryable": "answers"}
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List the active keys, or the declarations; raise ``RobotError`` without any."""
+    """List the active keys, or the declarations; raise ``T2Error`` without any."""
     with open_session(options) as session:
         rows = declared(session) if options.services else active(session, options)
     output.rows(rows, as_json=options.json)
@@ -67,7 +67,7 @@ def active(session: BusSession, options: argparse.Namespace) -> list[dict[str, A
             kinds[sample.key] = codec.kind_of(sample.encoding) or named(sample.encoding)
     span_s = time.monotonic() - began_s
     if not counts:
-        raise RobotError(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
+        raise T2Error(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
     found = declarations(session.probe, session.robot)
     if not found:
         output.warn("t2 ls: the router shows no declarations (its admin space is closed)")
@@ -92,7 +92,7 @@ def declared(session: BusSession) -> list[dict[str, Any]]:
     """Return all declarations except those of this session."""
     found = declarations(session.probe, session.robot)
     if not found:
-        raise RobotError("no service found, or the router shows none; try `t2 doctor`")
+        raise T2Error("no service found, or the router shows none; try `t2 doctor`")
     return [
         {"session": each.session, "does": each.does, "key": short(each.key, session.robot)}
         for each in found

@@ -6,8 +6,8 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from common import codec, keys
-from common.errors import MessageError
+from t2 import codec, keys
+from t2.errors import MessageError
 
 _CALLED: list[type[Struct]] = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
 _PUBLISHED: list[type[Struct]] = [topic.message for topic in keys.TOPICS]

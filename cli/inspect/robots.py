@@ -11,9 +11,9 @@ from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import add_options, open_session, services
-from common import keys
-from common.errors import RobotError
-from common.messages import SafetyState
+from t2 import keys
+from t2.errors import T2Error
+from t2.messages import SafetyState
 
 LISTEN_S = 1.5  # at most; over a thin uplink a stream may have 1 Hz
 
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
         supervised = {name for name, has in found.items() if "safety" in has}
         client.until(lambda: client.states.keys() >= supervised, LISTEN_S)
     if not found:
-        raise RobotError("no robot found; try `t2 doctor`")
+        raise T2Error("no robot found; try `t2 doctor`")
     rows = [row(name, found[name], client.states.get(name)) for name in sorted(found)]
     output.rows(rows, as_json=options.json)
     return 1 if {"silent", "no safety"} & {each["verdict"] for each in rows} else 0

@@ -10,14 +10,14 @@ from msgspec.structs import replace
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT, chunks, parse_site
-from common import codec, keys
 from common.bus.probe import Answer, Probe, probe
 from common.bus.session import operator_name
 from common.cli_args import add_sources, sources
-from common.codec import Sample
 from common.config import Sources, load
-from common.errors import MessageError
 from common.settings import Shared
+from t2 import codec, keys
+from t2.codec import Sample
+from t2.errors import MessageError
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Access rules of the bus by role, for Zenoh's access control. Pure.
 
-A role has rights: a verb on key expressions, of ``common/keys.py`` and of ROS 2. A verb stands for
+A role has rights: a verb on key expressions, of ``sdk/t2/keys.py`` and of ROS 2. A verb stands for
 a set of Zenoh messages in each direction. The router drops all other messages without notice; see
 ``docs/security.md``.
 """
@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 from cli.keys.members import OPERATORS_SOURCES, Member, Profile
-from common import keys
 from services.ros2 import names, parameters
 from services.ros2.config import Ros2
+from t2 import keys
 
 Verb = Literal["read", "know", "recall", "keep", "write", "ask", "serve", "live"]
 Rights = Mapping[Verb, Sequence[str]]

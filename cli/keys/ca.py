@@ -24,7 +24,7 @@ from msgspec.structs import asdict
 
 from cli.keys.member_list import Span, common_name, is_ip
 from cli.keys.members import Member, Profile
-from common.errors import RobotError
+from t2.errors import T2Error
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,16 +59,16 @@ class CertificateAuthority:
     ) -> "CertificateAuthority":
         """Read the authority from PEM; call ``passphrase`` if the key is encrypted.
 
-        Raise ``RobotError`` if the passphrase is wrong, or key and certificate do not match.
+        Raise ``T2Error`` if the passphrase is wrong, or key and certificate do not match.
         """
         loaded = certificate_from(certificate)
         try:
             private = load_pem_private_key(key, passphrase() if b"ENCRYPTED" in key else None)
         except ValueError:
-            raise RobotError("cannot read the CA's key: wrong passphrase, or not a key") from None
+            raise T2Error("cannot read the CA's key: wrong passphrase, or not a key") from None
         matches = private.public_key() == loaded.public_key()
         if not matches or not isinstance(private, ec.EllipticCurvePrivateKey):
-            raise RobotError("the CA's key does not match the certificate in ca.pem")
+            raise T2Error("the CA's key does not match the certificate in ca.pem")
         return cls(loaded, private)
 
     def issue(self, profile: Profile, span: Span) -> Issued:
@@ -92,11 +92,11 @@ class CertificateAuthority:
 
 
 def certificate_from(pem: bytes) -> x509.Certificate:
-    """Read a certificate; raise ``RobotError`` if it is invalid."""
+    """Read a certificate; raise ``T2Error`` if it is invalid."""
     try:
         return x509.load_pem_x509_certificate(pem)
     except ValueError as error:
-        raise RobotError(f"invalid certificate: {error}") from None
+        raise T2Error(f"invalid certificate: {error}") from None
 
 
 def certificate_pem(certificate: x509.Certificate) -> bytes:

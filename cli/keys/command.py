@@ -19,7 +19,8 @@ from cli.keys import instructions, member_list
 from cli.keys.member_list import BOUND, CA_DAYS, DAY_S, DAYS, EARLY_S
 from cli.keys.members import OPERATORS_SOURCES, ROLES, Members, Profile
 from common.cli_args import file_path, needs_extra
-from common.errors import ConfigError, RobotError
+from common.errors import ConfigError
+from t2.errors import T2Error
 
 if TYPE_CHECKING:
     from cli.keys.store import Folder
@@ -138,7 +139,7 @@ def new_passphrase() -> bytes:
 
 def _ask(prompt: str) -> bytes:
     if not sys.stdin.isatty():
-        raise RobotError("the CA's key needs its passphrase: run it in a terminal")
+        raise T2Error("the CA's key needs its passphrase: run it in a terminal")
     return getpass(prompt).encode()
 
 

@@ -15,8 +15,9 @@ from msgspec.structs import replace
 
 from cli.inspect import output
 from cli.keys.members import OPERATORS_SOURCES, Member, Members, Profile, Role
-from common.errors import ConfigError, RobotError
+from common.errors import ConfigError
 from common.settings import Name, SourceName
+from t2.errors import T2Error
 
 DAY_S = 86_400
 CA_DAYS = 3650
@@ -72,7 +73,7 @@ def span(now_s: float, days: int, authority_ends_s: float) -> Span:
     """Return the validity of a new certificate; it never exceeds the authority's."""
     left = int((authority_ends_s - now_s) // DAY_S)
     if left < 1:
-        raise RobotError(
+        raise T2Error(
             "the CA has expired; `t2 keys init --folder NEW` creates another, and every "
             "certificate must be issued again"
         )
@@ -127,10 +128,10 @@ def _addresses(role: Role, given: Sequence[str]) -> Sequence[str]:
 
 
 def newest(members: Members, role: Role, name: str) -> Member:
-    """Return the latest certificate of a member; raise ``RobotError`` without one."""
+    """Return the latest certificate of a member; raise ``T2Error`` without one."""
     found = _newest(members).get((role, name))
     if found is None:
-        raise RobotError(
+        raise T2Error(
             f"{role} {name} has no certificate, or a revoked one; "
             f"`t2 keys issue {role} {name}` makes one"
         )
@@ -143,10 +144,10 @@ def routers(members: Members) -> list[Member]:
 
 
 def check_free(members: Members, role: Role, name: str, now_s: float) -> None:
-    """Raise ``RobotError`` if a member of that name has a valid certificate."""
+    """Raise ``T2Error`` if a member of that name has a valid certificate."""
     for each in reversed(members.welcome):
         if (each.role, each.name) == (role, name) and each.expires.timestamp() > now_s:
-            raise RobotError(
+            raise T2Error(
                 f"{role} {name} has a certificate until {each.expires:%Y-%m-%d}; "
                 f"`t2 keys renew {role} {name}` makes another, `revoke` revokes it"
             )
@@ -165,7 +166,7 @@ def revoked(
     ]
     if not matching:
         with_serial = "" if serial is None else f" with the serial {serial!r}"
-        raise RobotError(f"{role} {name} has no certificate{with_serial} that could be revoked")
+        raise T2Error(f"{role} {name} has no certificate{with_serial} that could be revoked")
     left = tuple(
         replace(each, revoked=True) if each in matching else each for each in members.members
     )

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from common.errors import ConfigError
 from common.settings import Name, SourceName
-from common.text_file import read_text
+from t2.text_file import read_text
 
 Role = Literal["robot", "driver", "device", "viewer", "fleet", "site", "ros"]
 ROLES: tuple[Role, ...] = ("robot", "driver", "device", "viewer", "fleet", "site", "ros")

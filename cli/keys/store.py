@@ -18,13 +18,13 @@ from cli.keys import members as member_files
 from cli.keys.ca import CertificateAuthority, Issued, certificate_from, certificate_pem, key_pem
 from cli.keys.machine_settings import CA, CERTIFICATE, MEMBERS, PRIVATE_KEY, SETTINGS, bus_toml
 from cli.keys.members import Members
-from common.errors import RobotError
+from t2.errors import T2Error
 
 SECRET, PUBLIC = 0o600, 0o644
 
 
 class Folder:
-    """Reads and writes the files; raises ``RobotError`` with the name of the file."""
+    """Reads and writes the files; raises ``T2Error`` with the name of the file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -35,10 +35,10 @@ class Folder:
     def create_authority(
         self, authority: CertificateAuthority, members: Members, passphrase: bytes
     ) -> None:
-        """Write a new authority; raise ``RobotError`` if there is one already."""
+        """Write a new authority; raise ``T2Error`` if there is one already."""
         for file in (self.ca, self.ca_key, self.members):
             if file.exists():
-                raise RobotError(
+                raise T2Error(
                     f"{file} exists: another CA would invalidate all certificates; "
                     "`--folder NEW` creates one in another folder"
                 )
@@ -49,7 +49,7 @@ class Folder:
     def authority(self, passphrase: Callable[[], bytes]) -> CertificateAuthority:
         """Return the authority."""
         if not self.ca_key.exists():
-            raise RobotError(
+            raise T2Error(
                 f"{self.ca_key} not found: it is needed to sign; "
                 "if it is stored elsewhere, make it a link"
             )
@@ -58,7 +58,7 @@ class Folder:
     def certificate(self) -> bytes:
         """Return the certificate of the authority."""
         if not self.ca.exists():
-            raise RobotError(f"{self.path} has no CA; `t2 keys init` creates one")
+            raise T2Error(f"{self.path} has no CA; `t2 keys init` creates one")
         return _read(self.ca)
 
     def ends_s(self) -> float:
@@ -99,7 +99,7 @@ def locked(path: Path, *, create: bool = False) -> Iterator[Folder]:
         if create:
             path.mkdir(mode=0o700, parents=True, exist_ok=True)
         elif not path.is_dir():
-            raise RobotError(f"{path} has no CA; `t2 keys init` creates one")
+            raise T2Error(f"{path} has no CA; `t2 keys init` creates one")
         descriptor = os.open(path, os.O_RDONLY)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX)
@@ -138,4 +138,4 @@ def _os_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise RobotError(f"{error.filename or path}: {error.strerror}") from None
+        raise T2Error(f"{error.filename or path}: {error.strerror}") from None

@@ -8,9 +8,9 @@ from cli.inspect.addressing import EVERYTHING, expression
 from cli.inspect.session import add_options, open_session, until_interrupt
 from common.cli_args import needs_extra, sources
 from common.config import load
-from common.errors import LinkError
 from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Channel, Encoder
+from t2.errors import LinkError
 
 if TYPE_CHECKING:
     from foxglove import Channel as FoxgloveChannel

@@ -11,8 +11,8 @@ from cli.inspect.addressing import chunks
 from cli.recordings.timeline import Timeline
 from common.cli_args import file_path, needs_extra
 from common.freshness import NS_PER_S
-from common.keys import ROOT
 from common.text import printable
+from t2.keys import ROOT
 
 if TYPE_CHECKING:
     from services.recorder.reader import Reader
@@ -35,14 +35,14 @@ def run(options: argparse.Namespace) -> int:
 
 
 def open_recording(path: Path) -> "Reader":
-    """Open a recording; raise ``RobotError`` if it cannot be read or the library is missing."""
+    """Open a recording; raise ``T2Error`` if it cannot be read or the library is missing."""
     with needs_extra("record", "a recording"):
         from services.recorder.reader import Reader
     return Reader(path)
 
 
 def timeline_of(reader: "Reader") -> Timeline:
-    """Return the timeline of a recording; raise ``RobotError`` if it is not a recording."""
+    """Return the timeline of a recording; raise ``T2Error`` if it is not a recording."""
     timeline = Timeline()
     for each in reader:
         timeline.add(each.key, each.kind, each.message, each.log_ns)

@@ -21,12 +21,12 @@ from cli.inspect.session import (
     until_interrupt,
 )
 from cli.recordings.info import open_recording
-from common import keys
 from common.bus.probe import intersects
 from common.cli_args import file_path
-from common.codec import Sample
-from common.errors import RobotError
 from common.freshness import NS_PER_S
+from t2 import keys
+from t2.codec import Sample
+from t2.errors import T2Error
 
 CHECK_S = 1.0  # between two checks of the running services
 
@@ -70,7 +70,7 @@ class Player:
     """Plays messages at their pace to a robot without a running bridge or safety service."""
 
     def __init__(self, session: BusSession, rate: float) -> None:
-        """Raise ``RobotError`` if one of them is running."""
+        """Raise ``T2Error`` if one of them is running."""
         self._probe, self._robot, self._rate = session.probe, session.robot, rate
         self._start: tuple[float, int] | None = None  # our clock, the recording's clock
         self._checked_s = time.monotonic()
@@ -102,10 +102,10 @@ class Player:
         return True
 
     def _check(self) -> set[str]:
-        """Return the running services; raise ``RobotError`` if bridge or safety is among them."""
+        """Return the running services; raise ``T2Error`` if bridge or safety is among them."""
         alive = {service for _, service in services(self._probe, self._robot)}
         if running := " and ".join(name for name in MOVES if name in alive):
-            raise RobotError(
+            raise T2Error(
                 f"robot {self._robot} has a running {running}: others would take replayed messages "
                 "for the real ones. Stop it, or replay as another robot: --robot replay"
             )

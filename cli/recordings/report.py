@@ -12,8 +12,8 @@ from cli.inspect.addressing import chunks
 from cli.recordings.info import clock, open_recording, summary, timeline_of, warnings
 from cli.recordings.timeline import Timeline
 from common.cli_args import file_path, needs_extra
-from common.errors import RobotError
 from common.text import printable
+from t2.errors import T2Error
 
 if TYPE_CHECKING:
     from services.recorder.reader import Reader
@@ -35,10 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a report for each file and print its path; raise ``RobotError`` on the first error."""
+    """Write a report for each file and print its path; raise ``T2Error`` on the first error."""
     files: list[Path] = options.files
     if options.out and len(files) > 1:
-        raise RobotError(f"--out is for one recording, and there are {len(files)} recordings")
+        raise T2Error(f"--out is for one recording, and there are {len(files)} recordings")
     for file in files:
         out = options.out or file.with_suffix(".html")
         write_report(file, out)
@@ -49,16 +49,16 @@ def run(options: argparse.Namespace) -> int:
 def write_report(file: Path, out: Path) -> None:
     """Write the report of one recording."""
     if out.exists() and file.exists() and out.samefile(file):
-        raise RobotError(f"{out}: is the recording itself; choose another file with --out")
+        raise T2Error(f"{out}: is the recording itself; choose another file with --out")
     with open_recording(file) as reader:
         timeline = timeline_of(reader)
         if timeline.began_ns is None:
-            raise RobotError(f"{file}: contains no messages of the bus")
+            raise T2Error(f"{file}: contains no messages of the bus")
         text = printable(page(timeline, reader), "\n")
     try:
         out.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise RobotError(f"{out}: cannot be written: {error.strerror}") from None
+        raise T2Error(f"{out}: cannot be written: {error.strerror}") from None
 
 
 def page(timeline: Timeline, reader: "Reader") -> str:

@@ -15,9 +15,9 @@ from datetime import UTC, datetime
 from itertools import pairwise
 
 from cli.inspect.addressing import chunks, topic_of
-from common import keys
 from common.freshness import NS_PER_S
-from common.messages import (
+from t2 import keys
+from t2.messages import (
     Cause,
     Drive,
     Event,

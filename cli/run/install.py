@@ -14,7 +14,7 @@ from pathlib import Path
 from cli.settings import Everything
 from common.cli_args import file_path
 from common.config import DEFAULT_FILE, Sources, load
-from common.errors import RobotError
+from t2.errors import T2Error
 
 TEMPLATES = Path(__file__).parents[2] / "deploy" / "systemd"
 UNITS = Path("/usr/local/lib/systemd/system")
@@ -94,7 +94,7 @@ def here() -> Path:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the files, and print the next commands; raise ``RobotError`` before."""
+    """Write the files, and print the next commands; raise ``T2Error`` before."""
     host = Host(options.root.absolute(), options.dry_run)
     check_rights(host, options.prefix)
     check_prefix(options.prefix)
@@ -168,19 +168,19 @@ def settings(sim: bool) -> str:
 
 
 def check_rights(host: Host, prefix: Path) -> None:
-    """Raise ``RobotError`` if the files cannot be written."""
+    """Raise ``T2Error`` if the files cannot be written."""
     if host.root == Path("/") and os.geteuid() != 0 and not host.dry:
-        raise RobotError(
+        raise T2Error(
             f"needs root for {UNITS} and {SETTINGS.parent}: run `sudo {prefix}/bin/t2 install`; "
             "--dry-run or --root DIR shows the changes"
         )
 
 
 def check_prefix(prefix: Path) -> None:
-    """Raise ``RobotError`` if the sandboxed services could not access T2."""
+    """Raise ``T2Error`` if the sandboxed services could not access T2."""
     for place in HIDDEN:
         if prefix.is_relative_to(place):
-            raise RobotError(
+            raise T2Error(
                 f"services cannot access {place}, and T2 is in {prefix}: install it elsewhere, "
                 "as deploy/t2-install.sh does"
             )

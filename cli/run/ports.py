@@ -14,8 +14,8 @@ from contextlib import ExitStack
 from typing import NamedTuple
 
 from cli.settings import Everything
-from common.errors import LinkError
 from common.settings import protocol
+from t2.errors import LinkError
 
 PATIENCE_S = 5.0  # children of a killed supervisor may still be stopping the vehicle
 LOOK_S = 0.1

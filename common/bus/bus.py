@@ -12,14 +12,15 @@ import zenoh
 import zenoh.ext
 from msgspec import Struct
 
-from common import clock, codec, settings
+from common import clock, settings
 from common.bus.publisher import QUERY_CONGESTION, Publisher, host_id, qos
 from common.bus.session import Session, client
-from common.codec import Sample
-from common.errors import MessageError
-from common.keys import ESTOP_CLASS, Call, Topic, estop_key
 from common.loop import Post
-from common.messages import Message
+from t2 import codec
+from t2.codec import Sample
+from t2.errors import MessageError
+from t2.keys import ESTOP_CLASS, Call, Topic, estop_key
+from t2.messages import Message
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)

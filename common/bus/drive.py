@@ -14,9 +14,9 @@ from common.bus.publisher import Publisher
 from common.bus.session import WARN_PERIOD_S, Session, drive_config
 from common.drive_socket import check_router, prepare, socket_path
 from common.freshness import NS_PER_S
-from common.keys import Topic
 from common.log import Logger
-from common.messages import Level, Message
+from t2.keys import Topic
+from t2.messages import EventName, Level, Message
 
 M = TypeVar("M", bound=Message)
 
@@ -70,7 +70,7 @@ class DriveLink:
 class LinkWatch:
     """Reports that the other end of a drive link is missing, lost or back."""
 
-    def __init__(self, link: DriveLink, event: Callable[[str, Level, str], None]) -> None:
+    def __init__(self, link: DriveLink, event: Callable[[EventName, Level, str], None]) -> None:
         self._link = link
         self._event = event
         self._was_up: bool | None = None  # None until the first connection

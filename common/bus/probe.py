@@ -18,10 +18,10 @@ from common import clock
 from common.bus.bus import copied, is_timeout, refusal_of
 from common.bus.publisher import QUERY_CONGESTION, qos
 from common.bus.session import check_files, client_config
-from common.codec import Sample
-from common.errors import LinkError
-from common.keys import ClassOfService
 from common.settings import BusSettings
+from t2.codec import Sample
+from t2.errors import LinkError
+from t2.keys import ClassOfService
 
 MATCH_TIMEOUT_S = 1.0  # until the router has reported matching declarations
 QUEUE_MAX = 20_000  # samples queued for a slow reader; the oldest ones are dropped

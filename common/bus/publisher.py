@@ -10,9 +10,10 @@ import msgspec
 import zenoh
 import zenoh.ext
 
-from common import clock, codec
-from common.keys import ClassOfService, Topic
-from common.messages import Message
+from common import clock
+from t2 import codec
+from t2.keys import ClassOfService, Topic
+from t2.messages import Message
 
 M = TypeVar("M", bound=Message)
 

@@ -17,12 +17,13 @@ from typing import Any
 import zenoh
 from msgspec.structs import replace
 
-from common.errors import ConfigError, LinkError
-from common.keys import FAST, MOTION, TOPICS
+from common.errors import ConfigError
 from common.log import Logger
 from common.loop import Post
 from common.settings import BusSettings, is_encrypted
-from common.text_file import pem_problem
+from t2.errors import LinkError
+from t2.keys import FAST, MOTION, TOPICS
+from t2.text_file import pem_problem
 
 RETRY_PERIOD_S = 0.5  # between two attempts to connect
 WARN_PERIOD_S = 5.0  # between two warnings
@@ -46,7 +47,7 @@ RUNTIME_ENV = "ZENOH_RUNTIME"  # Zenoh reads it once, when the first session ope
 # host may wait this long for an attempt from the old address.
 OPEN_MS = 4_000
 # Zenoh drops a larger received message, and keeps the link. By default any member could fill 1 GiB
-# of memory for each priority. Our messages are far smaller (``common/messages.py`` bounds them). A
+# of memory for each priority. Our messages are far smaller (``sdk/t2/messages.py`` bounds them). A
 # router also forwards messages of others: an uncompressed image of 1920 x 1080 pixels has 6 MB.
 CLIENT_MAX, ROUTER_MAX = 8 * 2**20, 16 * 2**20
 # In a certificate, first the issuer's and then the subject's: object id 2.5.4.3, then a text as its

@@ -13,8 +13,9 @@ if ls $wheels/*.whl >/dev/null 2>&1; then
   export PIP_NO_INDEX=1 PIP_FIND_LINKS=$wheels
 fi
 if [ "$1" = t2 ]; then
-  own=$(ls $wheels/t2-*.whl 2>/dev/null || echo $source)
-  set -- --no-deps "$own"
+  own=$(ls $wheels/t2-*.whl $wheels/t2_sdk-*.whl 2>/dev/null || echo $source $source/sdk)
+  # shellcheck disable=SC2086 # two packages
+  set -- --no-deps $own
 else
   set -- --require-hashes -r "$source/$1"
 fi

@@ -1,4 +1,42 @@
-"""Client of safety; generated from ``common/client.py``, do not edit."""
+"""Client of safety: how a program drives, stops and resets, and how it knows that it may not. Pure.
+
+**Drive requests.** On every tick, 20 times a second, at most one request is sent:
+
+========== =================== =========================================
+phase      tick with a request tick without a request
+========== =================== =========================================
+SILENT     zero; DRIVING       nothing
+DRIVING    the request         zero; RELEASING, two zeros remain
+RELEASING  zero; DRIVING       zero; SILENT after the last one
+========== =================== =========================================
+
+A request is a twist, or a release off a pressed bumper. The zero before it is the neutral request
+that arms safety and the bridge; it is sent again when a release begins, ends or changes its
+direction. ``stop`` leads to RELEASING with three zeros from any phase. Each message echoes the
+newest heartbeat of safety, which bounds its age without synchronized clocks.
+
+**Denied.** A router whose access rules forbid a message drops it without an error, and announces
+no subscriber of safety either. A client is denied after ``DENIED_AFTER`` states of safety without.
+
+**Overruled.** A client is overruled after ``OVERRULED_TICKS`` of requests while another source
+drives.
+
+**Emergency stop.** It is repeated on every tick until safety reports ``estop`` as latched. A latch
+that may be an earlier one has to last for ``KEPT_TICKS``: its reset may be under way. After
+``ESTOP_TICKS`` the stop counts as not confirmed; clients on a link that may be down repeat it for
+``ESTOP_WAIT_S``.
+
+**Reset.** Any program on the bus may answer the call. Only safety's own state shows the effect:
+
+======== ================================ =====================================
+phase    event                            outcome
+======== ================================ =====================================
+sent     refusal, or no answer            refused, with the reason
+sent     answer                           wait for a state, at most ``CONFIRM_S``
+answered a state that confirms            confirmed
+answered ``CONFIRM_S`` without such state not confirmed
+======== ================================ =====================================
+"""
 
 from enum import Enum
 

@@ -10,7 +10,11 @@ class T2Error(Exception):
 
 
 class LinkError(T2Error):
-    """No router answers, its settings are invalid, or the robot was closed."""
+    """A router, socket or peer cannot be reached, or the robot was closed."""
+
+
+class MessageError(T2Error):
+    """A message that violates the bus contract."""
 
 
 class NoData(T2Error):

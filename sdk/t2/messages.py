@@ -1,14 +1,14 @@
-"""Messages and keys; generated from the stack's own by ``make docs``, do not edit.
+"""Messages on the bus: frozen structs, SI units and radians, ``None`` for unknown.
 
-Frozen structs, SI units and radians, ``None`` for unknown. Frames follow REP-103 and REP-105: x
-forward, y left, counter-clockwise positive. Readers ignore unknown fields.
+Frames follow REP-103 and REP-105: x forward, y left, counter-clockwise positive; ``odom`` is the
+start pose of odometry, ``base_link`` is the vehicle. Every message has the header of ``Message``,
+set by the publisher. Readers ignore unknown fields.
 """
 
+from enum import Enum
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from msgspec import Meta, Struct
-
-Command = Literal["run", "stop", "brake"]
 
 VERSION = "0.1.0"  # of the stack, the client library and their packages
 
@@ -72,6 +72,16 @@ Covariance2 = Annotated[tuple[Number, ...], Meta(min_length=4, max_length=4)]
 Cap = Annotated[float, Meta(ge=0.0, le=MAX_NUMBER)]
 MAX_REASON = 80  # characters
 Reason = Annotated[str, Meta(max_length=MAX_REASON)]
+
+
+class Command(str, Enum):
+    """A motion command (manual 2.2); a frame spells BRAKE as the manual does."""
+
+    RUN = "run"  # follow the velocities
+    STOP = "stop"  # ramp down to standstill
+    BRAKE = "brake"  # stop at once
+
+    __str__ = str.__str__
 
 
 class Message(Struct, frozen=True, kw_only=True):
@@ -377,30 +387,3 @@ class ResetDone(Done, frozen=True, kw_only=True):
 
     heartbeat: int = 0  # the first ``SafetyState.heartbeat`` that shows the effect
     cleared: Annotated[tuple[int, ...], Few] = ()  # ``Cause.id`` of each cause that was cleared
-
-
-# --- keys -----------------------------------------------------------------------------------
-
-ROOT = "t2/v1"
-
-# The services that make a robot.
-ON_BOARD = ("safety", "bridge", "odom")
-
-# By name: the path below the robot, and the type of the message.
-TOPICS: dict[str, tuple[str, type[Message]]] = {
-    "velocity": ("tel/bridge/velocity", Velocity),
-    "mileage": ("tel/bridge/mileage", Mileage),
-    "ultrasonic": ("tel/bridge/ultrasonic", Ultrasonic),
-    "bumper": ("tel/bridge/bumper", Bumper),
-    "driver": ("tel/bridge/driver/{side}", Driver),
-    "switches": ("tel/bridge/switches", Switches),
-    "link": ("tel/bridge/link", Link),
-    "odometry": ("tel/odom/odometry", Odometry),
-    "safety": ("tel/safety/state", SafetyState),
-    "health": ("tel/{service}/health", Health),
-    "events": ("evt/{service}", Event),
-    "drive": ("@cmd/drive/{source}", Drive),
-    "limit": ("@cmd/limit/{source}", Limit),
-    "estop_keepalive": ("@cmd/estop_keepalive/{source}", EstopKeepalive),
-    "motion": ("@cmd/motion", Motion),
-}

@@ -11,6 +11,7 @@ import msgspec
 import zenoh
 
 from t2.client import Access, DriveRequests
+from t2.codec import encode, encoding
 from t2.messages import Drive, SafetyState, SourceMessage
 from t2.stream import Stream
 
@@ -33,7 +34,11 @@ class SourcePublisher:
     """Sends a source's messages with the heartbeat of safety that was received last."""
 
     def __init__(
-        self, session: zenoh.Session, key: str, kind: str, safety: Stream[SafetyState]
+        self,
+        session: zenoh.Session,
+        key: str,
+        kind: type[SourceMessage],
+        safety: Stream[SafetyState],
     ) -> None:
         safety.open()
         self._safety = safety
@@ -41,9 +46,7 @@ class SourcePublisher:
         self._seqs = SEQS[key]
         self._access = Access()
         self._seen: SafetyState | None = None
-        self._encoder = msgspec.msgpack.Encoder()
-        encoding = f"application/msgpack;t2.v1.{kind}"
-        self._publisher: Any = session.declare_publisher(key, encoding=encoding, **QOS)
+        self._publisher: Any = session.declare_publisher(key, encoding=encoding(kind), **QOS)
 
     @property
     def denied(self) -> bool:
@@ -69,7 +72,7 @@ class SourcePublisher:
             mono_ns=time.monotonic_ns(),
             echo=self._access.echo,
         )
-        self._publisher.put(self._encoder.encode(filled))
+        self._publisher.put(encode(filled))
 
     def close(self) -> None:
         """Send no more."""
@@ -80,7 +83,7 @@ class DrivePublisher(SourcePublisher):
     """Sends drive requests, each drive between zeros."""
 
     def __init__(self, session: zenoh.Session, key: str, safety: Stream[SafetyState]) -> None:
-        super().__init__(session, key, "Drive", safety)
+        super().__init__(session, key, Drive, safety)
         self._requests = DriveRequests()
 
     def tick(self, requested: Drive | None) -> bool:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import pytest
 
-from t2.sim import SimulatedRobot, sim
+from t2.simulator import SimulatedRobot, sim
 
 Scope = Literal["session", "package", "module", "class", "function"]
 

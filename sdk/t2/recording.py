@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 import msgspec
 
 from t2.errors import T2Error
-from t2.messages import ROOT, TOPICS, Message
+from t2.keys import ROOT, TOPICS
+from t2.messages import Message
 
 MAGIC = b"\x89MCAP0\r\n"  # at the beginning of each file
-KINDS = {kind.__name__: kind for _, kind in TOPICS.values()}
+KINDS = {topic.message.__name__: topic.message for topic in TOPICS}
 
 
 class Entry(NamedTuple):

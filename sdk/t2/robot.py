@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import msgspec
 import zenoh
 
+from t2 import keys
 from t2 import messages as m
 from t2.client import (
     ESTOP_TICKS,
@@ -19,6 +20,7 @@ from t2.client import (
     request,
     reset_request,
 )
+from t2.codec import decode, encode
 from t2.drive import Drive, attended_s, dropped
 from t2.errors import (
     Late,
@@ -30,7 +32,6 @@ from t2.errors import (
     Refused,
     T2Error,
 )
-from t2.messages import ROOT, TOPICS
 from t2.motion import check_word, finite
 from t2.publisher import PERIOD_S, DrivePublisher
 from t2.stream import LIVE_S, Stream, check_process, now_s, stack_version
@@ -38,6 +39,7 @@ from t2.third_party import Keepalive, SpeedLimit
 
 A = TypeVar("A", bound=msgspec.Struct)
 R = TypeVar("R", bound="Robot")
+M = TypeVar("M", bound=m.Message)
 
 EVENTS_DEPTH = 100  # events that wait for a slow reader
 CALL_S = 2.0
@@ -98,15 +100,17 @@ class Robot:
         self._limits: dict[str, SpeedLimit] = {}
         self._keepalives: dict[str, Keepalive] = {}
         self._streams: list[Stream[Any]] = []
-        self.odometry: Stream[m.Odometry] = self._stream("odometry")
-        self.safety: Stream[m.SafetyState] = self._stream("safety")
-        self.velocity: Stream[m.Velocity] = self._stream("velocity")
-        self.mileage: Stream[m.Mileage] = self._stream("mileage")
-        self.ultrasonic: Stream[m.Ultrasonic] = self._stream("ultrasonic")
-        self.bumper: Stream[m.Bumper] = self._stream("bumper")
-        self.switches: Stream[m.Switches] = self._stream("switches")
-        self.link: Stream[m.Link] = self._stream("link")
-        self.events: Stream[m.Event] = self._stream("events", EVENTS_DEPTH, service="*")
+        self.odometry: Stream[m.Odometry] = self._stream("odometry", keys.ODOMETRY)
+        self.safety: Stream[m.SafetyState] = self._stream("safety", keys.SAFETY)
+        self.velocity: Stream[m.Velocity] = self._stream("velocity", keys.VELOCITY)
+        self.mileage: Stream[m.Mileage] = self._stream("mileage", keys.MILEAGE)
+        self.ultrasonic: Stream[m.Ultrasonic] = self._stream("ultrasonic", keys.ULTRASONIC)
+        self.bumper: Stream[m.Bumper] = self._stream("bumper", keys.BUMPER)
+        self.switches: Stream[m.Switches] = self._stream("switches", keys.SWITCHES)
+        self.link: Stream[m.Link] = self._stream("link", keys.LINK)
+        self.events: Stream[m.Event] = self._stream(
+            "events", keys.EVENTS, EVENTS_DEPTH, service="*"
+        )
         OPEN.add(self)
         if ending.is_set():
             self.close()
@@ -151,7 +155,7 @@ class Robot:
         ``safety.sources`` lists the sources with their priorities.
         """
         self._drives = [each for each in self._drives if each.is_open]
-        drive = Drive(self._session, self._source_key("drive", source), source, self)
+        drive = Drive(self._session, self._source_key(keys.DRIVE, source), source, self)
         self._drives.append(drive)
         return drive
 
@@ -173,7 +177,7 @@ class Robot:
         ``TypeError``, and ``NoData`` without safety.
         """
         if source not in self._limits or self._limits[source].has_ended:
-            key = self._source_key("limit", source)
+            key = self._source_key(keys.LIMIT, source)
             self._limits[source] = SpeedLimit(self._session, key, source, self.safety)
         self._limits[source].set(linear, angular, reason, seconds=seconds)
         return self._limits[source]
@@ -187,7 +191,7 @@ class Robot:
         ``safety.estop_keepalive`` must list the name. Raises as ``limit``.
         """
         if source not in self._keepalives or self._keepalives[source].has_ended:
-            key = self._source_key("estop_keepalive", source)
+            key = self._source_key(keys.ESTOP_KEEPALIVE, source)
             self._keepalives[source] = Keepalive(self._session, key, source, self.safety)
         self._keepalives[source].renew(seconds=seconds)
         return self._keepalives[source]
@@ -217,7 +221,7 @@ class Robot:
         """Send one emergency stop, without waiting for safety; ``estop`` confirms it."""
         self.safety.check()
         self._session.put(
-            f"{ROOT}/{self.name}/estop",
+            keys.estop_key(self.name),
             b"",
             priority=zenoh.Priority.REAL_TIME,
             congestion_control=zenoh.CongestionControl.DROP,
@@ -232,7 +236,7 @@ class Robot:
         """
         seen = self.safety.latest()
         check = ResetCheck(seen)
-        done = self._call("srv/safety/reset", reset_request(seen), m.ResetDone)
+        done = self._call(keys.RESET, reset_request(seen))
         check.answer(done)
         while (is_confirmed := check.outcome(self.safety.latest(), time.monotonic_ns())) is None:
             time.sleep(PERIOD_S)
@@ -256,7 +260,7 @@ class Robot:
         ``NotConfirmed`` after ``timeout`` s, ``NoData``, and ``ValueError``.
         """
         check_word(direction, m.Direction)
-        publisher = DrivePublisher(self._session, self._source_key("drive", source), self.safety)
+        publisher = DrivePublisher(self._session, self._source_key(keys.DRIVE, source), self.safety)
         begin_s, is_known = now_s(), False
         try:
             while (passed_s := now_s() - begin_s) < timeout:
@@ -289,33 +293,33 @@ class Robot:
 
         Raises ``Refused`` and ``TypeError``.
         """
-        self._call("srv/bridge/led", m.LedRequest(channel=channel, mode=mode, **settings), m.Done)
+        self._call(keys.SET_LED, m.LedRequest(channel=channel, mode=mode, **settings))
 
     def set_pose(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Set the pose of odometry in ``odom``: m, m, rad. Raises ``Refused``."""
         echo = self.safety.latest().heartbeat
         request = m.PoseRequest(x=finite(x), y=finite(y), heading=finite(heading), echo=echo)
-        self._call("srv/odom/reset", request, m.Done)
+        self._call(keys.SET_POSE, request)
 
-    def _call(self, path: str, request: msgspec.Struct, reply: type[A]) -> A:
+    def _call(self, call: keys.Call[Any, A], request: msgspec.Struct) -> A:
         self.safety.check()
-        key = f"{ROOT}/{self.name}/{path}"
-        payload = msgspec.msgpack.encode(request)
+        key = call.on(self.name)
+        payload = encode(request)
         for answer in self._session.get(
             key, payload=payload, timeout=CALL_S, congestion_control=zenoh.CongestionControl.DROP
         ):
             if answer.ok is not None:
-                return msgspec.msgpack.decode(answer.ok.payload.to_bytes(), type=reply)
+                return decode(answer.ok.payload.to_bytes(), call.reply)
             text = answer.err.payload.to_bytes().decode(errors="replace") if answer.err else ""
             if text != "Timeout":  # Zenoh's own
                 raise Refused(text)
-        raise self._unanswered(key, path.split("/")[1])
+        raise self._unanswered(key, call.server)
 
     def _unanswered(self, key: str, service: str) -> T2Error:
         """Return why: the router announces no queryable to a certificate that may not call it."""
         querier: Any = self._session.declare_querier(key)
         try:
-            token = f"{ROOT}/{self.name}/live/{service}/*"
+            token = keys.live_key(self.name, service, "*")
             found = self._session.liveliness().get(token, timeout=LIVE_S)
             runs = any(it.ok is not None for it in found)
             end_s = now_s() + MATCH_S
@@ -351,7 +355,7 @@ class Robot:
 
     def _settings(self, service: str) -> dict[str, Any]:
         """Return the running settings of a service by path; none without an answer."""
-        key = f"{ROOT}/{self.name}/info/{service}/config"
+        key = keys.info_key(self.name, service, "config")
         for answer in self._session.get(key, timeout=SLOW_S):
             if answer.ok is not None:
                 with suppress(msgspec.MsgspecError):
@@ -360,19 +364,16 @@ class Robot:
                     )
         return {}
 
-    def _stream(self, name: str, depth: int = 1, **names: str) -> Stream[Any]:
-        kind = TOPICS[name][1]
-        made: Stream[Any] = Stream(self._session, self._key(name, **names), kind, name, depth)
+    def _stream(self, what: str, topic: keys.Topic[M], depth: int = 1, **names: str) -> Stream[M]:
+        key = topic.on(self.name, **names)
+        made = Stream(self._session, key, topic.message, what, depth)
         self._streams.append(made)
         return made
 
-    def _source_key(self, name: str, source: str) -> str:
+    def _source_key(self, topic: keys.Topic[Any], source: str) -> str:
         if not SOURCE.fullmatch(source):
             raise NotAllowed(
                 f"{source!r} cannot be a source: its name has 1 to 32 characters of a-z, 0-9, _ "
                 "and -, and begins with a letter"
             )
-        return self._key(name, source=source)
-
-    def _key(self, name: str, **names: str) -> str:
-        return f"{ROOT}/{self.name}/{TOPICS[name][0].format(**names)}"
+        return topic.on(self.name, source=source)

@@ -15,8 +15,10 @@ from typing import Any, Generic, TypeVar
 import msgspec
 import zenoh
 
-from t2.errors import Incompatible, LinkError, NoData, T2Error
-from t2.messages import ON_BOARD, ROOT, VERSION, Message
+from t2.codec import decode
+from t2.errors import Incompatible, LinkError, MessageError, NoData, T2Error
+from t2.keys import HEALTH, ON_BOARD, ROOT, live_key
+from t2.messages import VERSION, Message
 
 M = TypeVar("M", bound=Message)
 
@@ -38,7 +40,7 @@ def now_s() -> float:
 
 def robots_of(session: zenoh.Session) -> list[str]:
     """Return the ids of the robots of which a service on board runs; laptops have some, too."""
-    tokens = session.liveliness().get(f"{ROOT}/*/live/*/*", timeout=LIVE_S)
+    tokens = session.liveliness().get(live_key("*", "*", "*"), timeout=LIVE_S)
     keys = [str(it.ok.key_expr).split("/") for it in tokens if it.ok is not None]
     return sorted({key[2] for key in keys if key[4] in ON_BOARD})
 
@@ -60,7 +62,7 @@ def stack_version(session: zenoh.Session, robot: str) -> str:
             found = msgspec.msgpack.decode(sample.payload.to_bytes(), type=Versioned).version
             received.set()
 
-    with session.declare_subscriber(f"{ROOT}/{robot}/tel/safety/health", on_sample):
+    with session.declare_subscriber(HEALTH.on(robot, service="safety"), on_sample):
         received.wait(HEALTH_S)
     return found
 
@@ -115,7 +117,7 @@ class Stream(Generic[M]):
         self.invalid: int = 0
         self.dropped: int = 0
         self._session = session
-        self._decoder: msgspec.msgpack.Decoder[M] = msgspec.msgpack.Decoder(kind)
+        self._kind = kind
         self._what = what
         self.depth: int = depth
         self.closed: bool = False
@@ -226,11 +228,11 @@ class Stream(Generic[M]):
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         try:
-            message = self._decoder.decode(sample.payload.to_bytes())
-        except msgspec.MsgspecError as error:
+            message = decode(sample.payload.to_bytes(), self._kind)
+        except MessageError as error:
             self.invalid, self._invalid_s = self.invalid + 1, now_s()
             if self.invalid == 1:
-                logger.warning("%s: not a message of this package: %s", self.key, error)
+                logger.warning("%s: %s", self.key, error)
             return
         with self._changed:
             self._newest, self._received_s = message, now_s()

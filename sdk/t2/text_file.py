@@ -1,4 +1,4 @@
-"""Files that people wrote; generated from ``common/text_file.py``, do not edit."""
+"""Files that people wrote, with whatever editor: settings, tokens, keys. Errors name the remedy."""
 
 import codecs
 import re

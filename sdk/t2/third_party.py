@@ -9,7 +9,14 @@ from typing import ClassVar, TypeVar
 import zenoh
 
 from t2.errors import NotAllowed, T2Error
-from t2.messages import EstopKeepalive, KeepaliveState, Limit, LimitState, SafetyState
+from t2.messages import (
+    EstopKeepalive,
+    KeepaliveState,
+    Limit,
+    LimitState,
+    SafetyState,
+    SourceMessage,
+)
 from t2.motion import not_negative
 from t2.publisher import SourcePublisher
 from t2.stream import Stream, now_s
@@ -23,7 +30,7 @@ SHOWN_S, POLL_S = 1.0, 0.01  # until safety's state shows a message; its period 
 class Repetition:
     """The messages of one source; a thread repeats the last one, 10 times a second."""
 
-    kind: ClassVar[str]  # of the message
+    kind: ClassVar[type[SourceMessage]]
     what: ClassVar[str]  # for texts
 
     def __init__(
@@ -104,7 +111,7 @@ class SpeedLimit(Repetition):
     >>> limit.end()
     """
 
-    kind: ClassVar[str] = "Limit"
+    kind: ClassVar[type[SourceMessage]] = Limit
     what: ClassVar[str] = "limit"
 
     def set(
@@ -141,7 +148,7 @@ class Keepalive(Repetition):
     >>> pendant.renew(seconds=0.5)  # doctest: +SKIP
     """
 
-    kind: ClassVar[str] = "EstopKeepalive"
+    kind: ClassVar[type[SourceMessage]] = EstopKeepalive
     what: ClassVar[str] = "keepalive"
 
     def renew(self, *, seconds: float) -> None:

@@ -8,11 +8,12 @@ from common import child_process, log, realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, arguments, sources
 from common.config import load
 from common.drive_socket import check_router, prepare, socket_path
-from common.errors import ConfigError, LinkError
+from common.errors import ConfigError
 from common.settings import Board
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard
 from services.bridge.udp import Sockets
+from t2.errors import LinkError
 
 # A bridge whose guard was killed keeps the ports until standstill.
 BIND_TIMEOUT_S = 4.0

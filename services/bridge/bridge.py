@@ -14,8 +14,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from common import clock, keys, realtime
-from common import messages as m
+from common import clock, realtime
 from common.bus.bus import Arrival, Caller
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
@@ -26,6 +25,8 @@ from services.bridge.core.core import TICK_S, Core
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
 from services.bridge.guard import BRAKES_ENV, DESCRIPTORS_ENV, Heartbeat
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
+from t2 import keys
+from t2 import messages as m
 
 MOTIONS = 8  # queue length
 LATE_NS = round(1.5 * TICK_S * NS_PER_S)  # of a tick after a stall

@@ -6,9 +6,9 @@ import time
 from collections.abc import Iterator, Sequence
 
 from common import clock
-from common.errors import LinkError
 from common.freshness import NS_PER_S
 from common.settings import Board
+from t2.errors import LinkError
 
 DATAGRAM_MAX = 2048
 # Limits of a round for each port, so that a flood does not delay the loop's timers: datagrams, and

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve until SIGINT or SIGTERM; raise ``RobotError`` if the dashboard cannot start."""
+    """Serve until SIGINT or SIGTERM; raise ``T2Error`` if the dashboard cannot start."""
     loaded = load(DashboardConfig, sources(options))
     with needs_extra("dashboard", "the page"):
         from services.dashboard.host import Host

@@ -8,8 +8,8 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from common.messages import Direction, Number
 from services.dashboard.config import GEARS
+from t2.messages import Direction, Number
 
 NAME_MAX = 40  # characters, of a viewer
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"

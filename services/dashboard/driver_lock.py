@@ -27,8 +27,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Direction, SafetyState
 from common.motion import clamp
+from t2.messages import Direction, SafetyState
 
 HOLD_S = 0.35  # safety refuses an echo of over 0.4 s
 

@@ -7,7 +7,7 @@ they are to show.
 import re
 import threading
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.service import Node
@@ -15,6 +15,7 @@ from services.dashboard import client_messages as client
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import DashboardConfig
 from services.dashboard.robot_page import RobotPage, Send, notice
+from t2 import keys
 
 PERIOD_S = 0.05
 IDLE_S = 30.0  # after which the page of a robot without viewers is closed

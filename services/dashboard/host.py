@@ -18,12 +18,12 @@ from common.config import Loaded
 from common.errors import ConfigError
 from common.service import STOP_TIMEOUT_S, Node
 from common.systemd import Systemd
-from common.text_file import pem_problem, read_text
 from services.dashboard.auth import TOKEN_MIN, Credentials
 from services.dashboard.config import Dashboard, DashboardConfig
 from services.dashboard.fleet import Fleet
 from services.dashboard.server import listen, page, reachable, serving
 from services.dashboard.websocket_hub import WebSocketHub
+from t2.text_file import pem_problem, read_text
 
 
 class Host:

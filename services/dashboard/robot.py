@@ -6,11 +6,19 @@ Each robot has a bus session of its own, which opens with the first viewer of it
 from collections.abc import Callable
 from typing import Any
 
-from common import clock, keys
-from common import messages as m
+from common import clock
 from common.bus.bus import Arrival, Bus
 from common.bus.session import common_name, is_viewer
-from common.client import (
+from common.freshness import NS_PER_S
+from common.log import Logger
+from common.source import DriveSource, KeepalivePublisher
+from services.dashboard.config import Dashboard
+from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
+from services.dashboard.snapshot import DriverState
+from services.dashboard.telemetry_cache import EVENTS_DEPTH, TelemetryCache, path_of
+from t2 import keys
+from t2 import messages as m
+from t2.client import (
     Contest,
     DriveRequests,
     EstopRepetition,
@@ -20,14 +28,7 @@ from common.client import (
     request,
     reset_request,
 )
-from common.freshness import NS_PER_S
-from common.keys import Topic
-from common.log import Logger
-from common.source import DriveSource, KeepalivePublisher
-from services.dashboard.config import Dashboard
-from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
-from services.dashboard.snapshot import DriverState
-from services.dashboard.telemetry_cache import EVENTS_DEPTH, TelemetryCache, path_of
+from t2.keys import Topic
 
 # Takes the level, the text or its key in ``i18n``, and the key of the result that it explains.
 Notify = Callable[[m.Level, str, str], None]
@@ -121,7 +122,7 @@ class Robot:
         if self.driver_lock.driver is not None:
             self.driver_lock.leave(self.driver_lock.driver)
 
-    def event(self, name: str, level: m.Level, text: str) -> None:
+    def event(self, name: m.EventName, level: m.Level, text: str) -> None:
         """Publish and log what a viewer did, with the certificate of this dashboard."""
         by = common_name(self.bus.where)
         text = f"{text} ({by})" if by else text

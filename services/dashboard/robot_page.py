@@ -12,12 +12,12 @@ from common import clock
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.heartbeat import MAX_CALL_AGE_NS
-from common.messages import Level
 from services.dashboard import client_messages as client
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import HOLD_S, Push
 from services.dashboard.robot import Robot
 from services.dashboard.snapshot import fast_snapshot, slow_snapshot
+from t2.messages import Level
 
 SLOW_TICKS = 10  # between two slow snapshots
 

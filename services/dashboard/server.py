@@ -20,13 +20,13 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
-from common.errors import LinkError
 from services.dashboard.auth import AuthMiddleware, Credentials
 from services.dashboard.client_messages import NAME_MAX, ROBOT
 from services.dashboard.config import Dashboard
 from services.dashboard.i18n import phrases, table
 from services.dashboard.listener import BACKLOG, Listener
 from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub
+from t2.errors import LinkError
 
 SHUTDOWN_S = 1  # for browsers to disconnect
 STATIC = Path(__file__).parent / "static"

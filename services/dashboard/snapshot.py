@@ -10,8 +10,11 @@ from typing import Literal
 
 from msgspec import Struct
 
-from common import keys
-from common.messages import (
+from common.root_cause import RootCause, root_cause
+from services.dashboard.driver_lock import HoldState
+from services.dashboard.telemetry_cache import TelemetryCache
+from t2 import keys
+from t2.messages import (
     SONAR_NAMES,
     Cause,
     Driver,
@@ -21,9 +24,6 @@ from common.messages import (
     Switches,
     Ultrasonic,
 )
-from common.root_cause import RootCause, root_cause
-from services.dashboard.driver_lock import HoldState
-from services.dashboard.telemetry_cache import TelemetryCache
 
 Tone = Literal["dark", "clear", "slow", "stop", "fault"]  # of a sonar sector
 WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")

@@ -9,11 +9,11 @@ from typing import NamedTuple, TypeVar
 
 from msgspec import Struct
 
-from common import keys
 from common.freshness import Latest, fresh
-from common.keys import Topic
-from common.messages import Event, Message, SafetyState
 from common.text import line
+from t2 import keys
+from t2.keys import Topic
+from t2.messages import Event, Message, SafetyState
 
 M = TypeVar("M", bound=Message)
 

@@ -12,14 +12,15 @@ from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import Metric
 from prometheus_client.registry import Collector
 
-from common import clock, keys
-from common import messages as m
+from common import clock
 from common.bus.bus import Arrival, Bus
-from common.errors import LinkError
 from common.service import Node
 from services.metrics.config import MetricsConfig
 from services.metrics.robot import RobotState, prune
 from services.metrics.samples import STREAMS, metric_families
+from t2 import keys
+from t2 import messages as m
+from t2.errors import LinkError
 
 HOST = "127.0.0.1"  # without authentication: Prometheus runs here, the bus crosses the network
 DEPTH = 2000  # pending samples of one stream, for all robots

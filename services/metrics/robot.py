@@ -8,9 +8,9 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from common import keys
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Event
+from t2 import keys
+from t2.messages import Event
 
 FRESH_S = 3.0  # a value is exported for so long: the slowest streams have 1 Hz
 EXPIRY_S = 24 * 3600.0  # until an absent robot is removed: fleets change
@@ -44,7 +44,7 @@ class RobotState:
 
     def on_event(self, service: str, event: Event) -> None:
         """Count an event."""
-        key = service, event.name, event.level
+        key: tuple[str, str, str] = service, event.name, event.level
         if key not in self.events and len(self.events) >= EVENT_NAMES_MAX:
             key = service, "other", event.level
         self.events[key] += 1

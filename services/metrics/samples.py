@@ -12,9 +12,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
-from common import keys
-from common.messages import Durations, LinkState, Message, Verdict
 from services.metrics.robot import RobotState
+from t2 import keys
+from t2.messages import Durations, LinkState, Message, Verdict
 
 STREAMS: dict[str, keys.Topic[Any]] = {
     "safety": keys.SAFETY,

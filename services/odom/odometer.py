@@ -4,8 +4,7 @@ An estimate follows each counter sample, or each velocity while counters are mis
 Zenoh sends nothing to the router without a subscriber.
 """
 
-from common import clock, keys
-from common import messages as m
+from common import clock
 from common.bus.bus import Arrival, Caller
 from common.freshness import NS_PER_S
 from common.heartbeat import Echoes
@@ -13,6 +12,8 @@ from common.service import Node
 from services.odom.config import OdomConfig
 from services.odom.core.estimator import Estimator
 from services.odom.core.pose import Pose
+from t2 import keys
+from t2 import messages as m
 
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
 CHECK_S = 0.25  # between two checks for that

@@ -12,9 +12,9 @@ from itertools import islice
 from math import inf
 from typing import TYPE_CHECKING
 
-from common.codec import Sample
 from common.freshness import NS_PER_S
-from common.messages import SafetyState
+from t2.codec import Sample
+from t2.messages import SafetyState
 
 if TYPE_CHECKING:
     from services.recorder.writer import RecordingWriter

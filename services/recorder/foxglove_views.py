@@ -16,8 +16,8 @@ from typing import Any
 import msgspec
 
 from common.freshness import NS_PER_S
-from common.messages import SONAR_NAMES, Event, Message, Odometry, Ultrasonic
 from common.settings import Vehicle, sonar_mounts
+from t2.messages import SONAR_NAMES, Event, Message, Odometry, Ultrasonic
 
 CONE = 0.5  # rad, for display only: the manual does not specify the sensors' opening angle
 POINTS = 5  # of the displayed arc

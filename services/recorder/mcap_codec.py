@@ -17,12 +17,12 @@ from typing import Any
 
 import msgspec
 
-from common import codec, keys
-from common.codec import Sample
-from common.errors import MessageError
-from common.messages import Message
 from common.settings import Vehicle
 from services.recorder.foxglove_views import FoxgloveViews, Schema, schema_of
+from t2 import codec, keys
+from t2.codec import Sample
+from t2.errors import MessageError
+from t2.messages import Message
 
 RAW, PAYLOAD, DELETED = RESERVED = ("_raw", "_payload", "_deleted")
 JSON = "application/json"

@@ -18,9 +18,9 @@ from mcap.exceptions import McapError
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
-from common.errors import RobotError
-from common.keys import ROOT
 from services.recorder.mcap_codec import Channel, Entry
+from t2.errors import T2Error
+from t2.keys import ROOT
 
 # Raised by the MCAP library for missing or wrong bytes.
 DAMAGE = (McapError, struct.error, ValueError, RuntimeError, EOFError, OverflowError, MemoryError)
@@ -31,11 +31,11 @@ class Reader:
     """Yields the messages of the bus in the order of their arrival, once."""
 
     def __init__(self, path: Path) -> None:
-        """Open a file; raise ``RobotError`` if it cannot be read."""
+        """Open a file; raise ``T2Error`` if it cannot be read."""
         try:
             self._file = path.open("rb")
         except OSError as error:
-            raise RobotError(f"{path}: cannot be read: {error.strerror}") from None
+            raise T2Error(f"{path}: cannot be read: {error.strerror}") from None
         self.path = path
         self.size = path.stat().st_size
         self.cut = False  # truncated: the writer was killed, or is still writing
@@ -49,7 +49,7 @@ class Reader:
         self._file.close()
 
     def __iter__(self) -> Iterator[Entry]:
-        """Yield all messages; raise ``RobotError`` if the file is not an MCAP file."""
+        """Yield all messages; raise ``T2Error`` if the file is not an MCAP file."""
         for record in self._records():
             if isinstance(record, records.Channel):
                 encoding = record.metadata.get("encoding", "")
@@ -69,7 +69,7 @@ class Reader:
                 yield from self._unpacked(record)
         except DAMAGE:
             if not has_begun:
-                raise RobotError(f"{self.path}: is not an MCAP file") from None
+                raise T2Error(f"{self.path}: is not an MCAP file") from None
             self.cut = True
 
     def _unpacked(self, record: records.McapRecord) -> list[records.McapRecord]:

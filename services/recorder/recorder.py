@@ -4,16 +4,17 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
-from common import clock, codec, keys
-from common.codec import Sample
-from common.errors import MessageError
-from common.messages import SafetyState
+from common import clock
 from common.service import Node
 from services.recorder.blackbox import BlackBox
 from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Encoder
 from services.recorder.storage import MB, Storage, StoredFile
 from services.recorder.writer import RecordingWriter, RollingWriter
+from t2 import codec, keys
+from t2.codec import Sample
+from t2.errors import MessageError
+from t2.messages import SafetyState
 
 # `**` does not match chunks that begin with "@": two expressions cover all keys.
 EVERYTHING = ("**", "@cmd/**")

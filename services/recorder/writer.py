@@ -10,10 +10,10 @@ from pathlib import Path
 
 from mcap.writer import Writer
 
-from common.codec import Sample
 from common.freshness import NS_PER_S
 from services.recorder.blackbox import CloseRecording, OpenRecording
 from services.recorder.mcap_codec import Channel, Encoder, Entry
+from t2.codec import Sample
 
 SIZE_MAX, TIME_MAX_NS = 200_000_000, 600 * NS_PER_S  # of a file of a continuous recording
 

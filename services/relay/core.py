@@ -28,7 +28,7 @@ from collections import Counter
 
 from .wire import BRAKE, bumper_samples, is_neutral, motions
 
-VERSION = "0.1.0"  # as of common/messages.py, which is not there
+VERSION = "0.1.0"  # as of sdk/t2/messages.py, which is not there
 NS_PER_S = 1_000_000_000
 LEASE_NS = NS_PER_S // 5
 BRAKE_PERIOD_NS = NS_PER_S // 20

@@ -10,15 +10,16 @@ import time
 from collections.abc import Callable
 from functools import partial
 
-from common import clock, keys
-from common import messages as m
-from common.client import ResetCheck, reset_request
+from common import clock
 from common.freshness import NS_PER_S
 from common.service import Node
 from services.ros2 import names, parameters
 from services.ros2.cdr import Attachment, Value
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Answer, Endpoints
+from t2 import keys
+from t2 import messages as m
+from t2.client import ResetCheck, reset_request
 
 CONFIRM_NS, REPEAT_S = 3 * NS_PER_S, 0.05
 FRESH_NS = NS_PER_S // 2  # age of safety's state; older, and safety counts as silent

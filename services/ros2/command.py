@@ -37,10 +37,10 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from common.client import Contest
 from common.freshness import NS_PER_S
-from common.messages import MAX_NUMBER, SafetyState
 from services.ros2.cdr import Attachment
+from t2.client import Contest
+from t2.messages import MAX_NUMBER, SafetyState
 
 HELD_BACK_NS = NS_PER_S // 5
 SETTLE_NS = NS_PER_S // 2

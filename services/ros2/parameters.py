@@ -6,9 +6,9 @@ read-only. Without these services ``ros2 param list`` waits 7 s for the node.
 
 from collections.abc import Callable, Iterator, Mapping
 
-from common.messages import Limits
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2Config
+from t2.messages import Limits
 
 Scalar = bool | int | float | str
 Parameters = Mapping[str, Scalar]

@@ -5,8 +5,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from common import keys
-from common import messages as m
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S, Latest
 from common.service import Node
@@ -15,6 +13,8 @@ from services.ros2 import translate
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Publisher
+from t2 import keys
+from t2 import messages as m
 
 SIDES = ("left", "right")
 Declare = Callable[..., Publisher]  # topic, interface, latched

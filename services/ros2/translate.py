@@ -7,12 +7,12 @@ measured becomes the value that ROS defines for its reason.
 import math
 from collections.abc import Mapping
 
-from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Mount, Vehicle, sonar_mounts
 from common.text import printable
 from services.ros2.cdr import Value
 from services.ros2.config import Ros2Config
+from t2 import messages as m
 
 ULTRASOUND = 0
 SONAR_HEIGHT, BODY_HEIGHT, CLEARANCE = 0.35, 0.35, 0.15  # m, for display: the settings have none

@@ -1,30 +1,36 @@
 """Reports: the published state with its texts, and transitions as events."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.messages import (
-    SONAR_NAMES,
-    Cause,
-    Direction,
-    Level,
-    Limits,
-    Release,
-    SafetyState,
-)
 from common.motion import RUN, Twist
 from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched, ordered
 from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, spent
 from services.safety.core.policy import Policy
 from services.safety.core.sonars import UNSEEN, Sonar
 from services.safety.core.state import State
+from t2.messages import (
+    SONAR_NAMES,
+    Cause,
+    CauseName,
+    Direction,
+    EventName,
+    Level,
+    Limits,
+    Release,
+    SafetyState,
+)
 
 MOVING = ("run", "slow")
 OPPOSITE: dict[Direction | None, Direction] = {"forward": "backward", "backward": "forward"}
 # Event names that differ from the cause's name.
-EVENT_NAMES = {"driver_left": "driver_fault", "driver_right": "driver_fault"}
+EVENT_NAMES: dict[CauseName, EventName] = {
+    "driver_left": "driver_fault",
+    "driver_right": "driver_fault",
+}
 # What the operator does about a latched cause that is still present, before a reset.
 STILL_PRESENT = {
     "estop": "It is still pressed or requested: release it, then reset.",
@@ -37,7 +43,7 @@ RESET_OTHERS = "It is still pressed: reset first, then move off."
 class Transition(Struct, frozen=True):
     """One transition, published as an event."""
 
-    name: str
+    name: EventName
     level: Level
     text: str
     about: dict[str, str | None]
@@ -104,7 +110,7 @@ def _way_off(state: State, *, by_hand: bool) -> str:
     return RESET_OTHERS if len(latched(state.latches)) > 1 else MOVE_OFF
 
 
-def text(state: State, name: str) -> str:
+def text(state: State, name: CauseName) -> str:
     """Return the text of a held cause; that of the newest decision for a cause of planning."""
     verdict, default = state.verdict, state.latches[name].text
     match name:
@@ -179,7 +185,7 @@ def transitions(before: State, after: State) -> Iterator[Transition]:
     old, new = before.verdict, after.verdict
     tripped = [name for name in latched(after.latches) if _is_new(before, after, name)]
     for name in tripped:
-        event = EVENT_NAMES.get(name, name)
+        event: Any = EVENT_NAMES.get(name, name)  # a latched cause has an event of its name
         yield Transition(event, "error", after.latches[name].text, {"cause": name})
     worst = next(iter(ordered(after.latches)), None)
     # A cause that latches, and a release, have events of their own.
@@ -204,7 +210,7 @@ def transitions(before: State, after: State) -> Iterator[Transition]:
             yield Transition("reset_refused", "warning", reply.text, {})
 
 
-def _is_new(before: State, after: State, name: str) -> bool:
+def _is_new(before: State, after: State, name: CauseName) -> bool:
     """Return whether this occurrence of a cause began with this decision.
 
     A program repeats its emergency stop: while one is latched, another one is no transition.

@@ -12,19 +12,10 @@ from typing import TypeVar
 
 from msgspec.structs import replace
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Arrival, Bus, Caller
 from common.freshness import NS_PER_S, Latest
 from common.heartbeat import Heartbeat
-from common.keys import Topic
-from common.messages import (
-    Bumper,
-    Message,
-    Motion,
-    ResetDone,
-    ResetRequest,
-    SafetyState,
-)
 from common.motion import BRAKE, RUN, STOP
 from common.service import Node
 from services.safety.config import SafetyConfig
@@ -39,6 +30,16 @@ from services.safety.core.inputs import (
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, State
 from services.safety.report import signature, state_message, transitions
+from t2 import keys
+from t2.keys import Topic
+from t2.messages import (
+    Bumper,
+    Message,
+    Motion,
+    ResetDone,
+    ResetRequest,
+    SafetyState,
+)
 
 M = TypeVar("M", bound=Message)
 

@@ -24,12 +24,12 @@ from common.cli_args import (
     sources,
 )
 from common.config import Loaded, load
-from common.errors import RobotError
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
 from services.teleop.gamepad import find
 from services.teleop.view import EventLog
+from t2.errors import T2Error
 
 EXIT_HANGUP = 128 + signal.SIGHUP
 TERMINAL_POLL_S = 0.2
@@ -49,10 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Drive until the operator quits; raise ``RobotError`` if teleop cannot start."""
+    """Drive until the operator quits; raise ``T2Error`` if teleop cannot start."""
     loaded = load(TeleopConfig, sources(options))
     if not terminal_is_there():
-        raise RobotError("driving needs a terminal on standard input and output")
+        raise T2Error("driving needs a terminal on standard input and output")
     return TeleopProcess(loaded, source_words(options)).run()
 
 
@@ -93,7 +93,7 @@ class TeleopProcess:
         if self._error:
             raise self._error
         if text := self._controller.unconfirmed:
-            raise RobotError(text)
+            raise T2Error(text)
         return 0
 
     def _serve(self) -> None:

@@ -10,21 +10,11 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Arrival, no_answer, not_allowed
 from common.bus.session import is_viewer, operator_name
 from common.cli_args import with_options
-from common.client import (
-    ESTOP_TICKS,
-    ESTOP_WAIT_S,
-    Contest,
-    EstopRepetition,
-    EstopStep,
-    ResetCheck,
-    reset_request,
-)
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Drive, Event, ResetDone, SafetyState
 from common.root_cause import MAY_MOVE, TEXTS, root_cause
 from common.service import Node
 from common.source import DriveSource
@@ -42,6 +32,17 @@ from services.teleop.core.keystroke import no_function
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import LINES, EventLog, View
+from t2 import keys
+from t2.client import (
+    ESTOP_TICKS,
+    ESTOP_WAIT_S,
+    Contest,
+    EstopRepetition,
+    EstopStep,
+    ResetCheck,
+    reset_request,
+)
+from t2.messages import Drive, Event, EventName, ResetDone, SafetyState
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 WAIT_TICKS = round(ESTOP_WAIT_S / PERIOD_S) + 1  # its age ends it first
@@ -189,14 +190,14 @@ class Controller:
             self._controls.enforce("terminal_slow", now_ns)
             self._report_slow(reason)
 
-    def _enforce(self, rule: str, is_broken: bool, text: str, now_ns: int) -> None:
+    def _enforce(self, rule: EventName, is_broken: bool, text: str, now_ns: int) -> None:
         if is_broken:
             self._controls.enforce(rule, now_ns)
             self._report(rule, text)
         else:
             self._reported.discard(rule)
 
-    def _report(self, rule: str, text: str) -> None:
+    def _report(self, rule: EventName, text: str) -> None:
         """Report a rule once, until it holds again."""
         if rule not in self._reported:
             self._reported.add(rule)
@@ -266,7 +267,7 @@ class Controller:
     def _report_unconfirmed(self) -> None:
         if not self._unconfirmed:
             self._unconfirmed = True
-            name = "estop_denied" if self._source.denied else "estop_unconfirmed"
+            name: EventName = "estop_denied" if self._source.denied else "estop_unconfirmed"
             self._node.event(name, "error", self.unconfirmed)
 
     @property

@@ -6,7 +6,10 @@ from textwrap import wrap
 
 from rich.text import Text
 
-from common.messages import (
+from common.root_cause import TEXTS, RootCause, root_cause
+from services.teleop.core.round_trip import ADVICE
+from services.teleop.view import Line, View
+from t2.messages import (
     SONAR_NAMES,
     Cause,
     Direction,
@@ -16,9 +19,6 @@ from common.messages import (
     Ultrasonic,
     Verdict,
 )
-from common.root_cause import TEXTS, RootCause, root_cause
-from services.teleop.core.round_trip import ADVICE
-from services.teleop.view import Line, View
 
 Part = tuple[str, str]  # text and its style
 

@@ -10,7 +10,10 @@ from dataclasses import dataclass, replace
 
 from common import clock, log
 from common.freshness import NS_PER_S
-from common.messages import (
+from common.motion import Twist
+from common.settings import Log, LogLevel
+from common.text import line, printable
+from t2.messages import (
     Bumper,
     Drive,
     Driver,
@@ -22,9 +25,6 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.motion import Twist
-from common.settings import Log, LogLevel
-from common.text import line, printable
 
 LINES = 40  # of the event log: more than a screen has
 HISTORY_NS = 2 * NS_PER_S  # in which all services send theirs

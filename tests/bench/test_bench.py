@@ -11,9 +11,9 @@ from bench.figures import Figures, compared
 from bench.fleet import answers_ns
 from bench.processes import MissingError
 from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, ZENOH
-from common import motion
 from common.freshness import NS_PER_S
 from sim.trace import Command
+from t2 import messages
 
 CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 MS = 1_000_000
@@ -72,7 +72,7 @@ def test_the_one_process_has_the_frames_of_the_bridge() -> None:
 
 def test_a_request_is_answered_by_the_next_frame_with_its_speed() -> None:
     def frame(at_ns: int, linear: float) -> Command:
-        return Command(mono_ns=at_ns, kind=motion.Command.RUN, linear=linear, angular=0.0)
+        return Command(mono_ns=at_ns, kind=messages.Command.RUN, linear=linear, angular=0.0)
 
     requests = [(10 * MS, 0.301), (60 * MS, 0.302), (110 * MS, 0.303)]
     late = 110 * MS + NS_PER_S

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from common import keys
-from common import messages as m
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink
 from common.bus.publisher import Publisher
 from common.loop import Loop
-from common.motion import Command
 from common.wire.commands import MotionKind
+from t2 import keys
+from t2 import messages as m
+from t2.messages import Command
 from tests.factories import safety_state
 from verification.harness.bus import bus_on, running, set_options
 from verification.harness.fake_board import Board, board

@@ -12,16 +12,16 @@ from typing import Any
 
 import pytest
 
-from common import codec, keys
-from common import messages as m
 from common.config import Sources, load
 from common.loop import Loop
-from common.motion import Command
 from common.service import Node, serve
 from common.wire import framing, reports
 from common.wire.commands import MotionKind
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
+from t2 import codec, keys
+from t2 import messages as m
+from t2.messages import Command
 from tests.bridge.conftest import BridgeFixture, bridge_command
 from verification.harness.bus import bus_on, running
 from verification.harness.fake_board import Board, board

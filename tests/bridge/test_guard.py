@@ -18,7 +18,6 @@ import pytest
 
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
 from common.config import Sources, load
-from common.errors import LinkError
 from common.settings import Board as BoardSettings
 from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
@@ -26,6 +25,7 @@ from services.bridge import guard as guard_module
 from services.bridge.config import BridgeConfig
 from services.bridge.guard import Guard, Heartbeat, Start
 from services.bridge.udp import Sockets
+from t2.errors import LinkError
 from tests.common.rights import needs_right
 from tests.common.systemd_manager import PATIENCE_US, Manager
 from verification.harness.fake_board import Board, board

@@ -8,14 +8,13 @@ import pytest
 from common import clock
 from common.bus.bus import Arrival
 from common.config import Sources, load
-from common.messages import Link, Motion
-from common.motion import Command
 from common.service import Node
 from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.reports import BumperReport
 from services.bridge.bridge import Bridge
 from services.bridge.config import BridgeConfig
+from t2.messages import Command, Link, Motion
 from verification.harness.fake_board import Board, board
 from verification.harness.waiting import wait_until
 

@@ -11,7 +11,8 @@ import pytest
 
 from cli.__main__ import COMMANDS, main
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.errors import ConfigError, LinkError, RobotError
+from common.errors import ConfigError
+from t2.errors import LinkError, T2Error
 from tests.cli.processes import PATIENCE_S
 
 
@@ -49,8 +50,8 @@ def test_command_lines(
     [
         (ConfigError("a setting is wrong"), EXIT_CONFIG, "t2 config: a setting is wrong\n"),
         (LinkError("a port is taken"), EXIT_LINK, "t2 config: a port is taken\n"),
-        (RobotError("something is missing"), 1, "t2 config: something is missing\n"),
-        (RobotError("`t2 doctor` or `t2 keys list`"), 1,
+        (T2Error("something is missing"), 1, "t2 config: something is missing\n"),
+        (T2Error("`t2 doctor` or `t2 keys list`"), 1,
          "t2 config: `t2 doctor --config 'a b.toml' --set x=1` or `t2 keys list`\n"),
         (KeyboardInterrupt(), 130, ""),  # before the command handles it
     ],

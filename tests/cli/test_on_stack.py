@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from common.messages import SONAR_NAMES
 from sim.requests import Bumper, Sonar
+from t2.messages import SONAR_NAMES
 from tests.cli.inspect.tool import Tool
 from tests.cli.processes import PATIENCE_S, sets, t2
 from verification.harness.stack import RunningStack, running_stack

@@ -17,13 +17,14 @@ COMPANY = "import nothing_that_exists\n"
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with the content of the wheel, as an installation writes it."""
+    """Return a folder with the content of both wheels, as an installation writes it."""
     folder = tmp_path_factory.mktemp("wheel")
     command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
-    (built,) = folder.glob("*.whl")
-    with zipfile.ZipFile(built) as archive:
-        archive.extractall(folder / "site")
+    for project in (ROOT, ROOT / "sdk"):
+        subprocess.run(command, cwd=project, check=True, capture_output=True)
+    for built in folder.glob("*.whl"):
+        with zipfile.ZipFile(built) as archive:
+            archive.extractall(folder / "site")
     return folder / "site"
 
 
@@ -68,6 +69,7 @@ def test_an_environment_of_its_own_is_accepted(site: Path) -> None:
         ("services/safety/core/motion.py", "is in a package of T2, but not of T2"),
         ("common/acme/client.py", "is in a package of T2, but not of T2"),
         ("sim/__init__.py", "is not the file of T2"),
+        ("t2/messages.py", "is not the file of T2"),
         ("cli/__init__.py", "is not the file of T2"),
     ],
 )

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 
 from cli.__main__ import main
 from cli.wire import as_text, datagrams, from_pcap, parts
-from common.errors import RobotError
 from common.wire import commands as c
 from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Frame, Side
 from common.wire.framing import Rejected
+from t2.errors import T2Error
 from verification.harness.frame_examples import COMMANDS, REPORTS
 
 RUN = framing.pack(c.MotionCommand(c.MotionKind.RUN, 500, 300))
@@ -60,7 +60,7 @@ def test_hex_formats(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["no/such/file", "zz", ""])
 def test_neither_hex_nor_file(text: str) -> None:
-    with pytest.raises(RobotError, match="is neither hex nor a file"):
+    with pytest.raises(T2Error, match="is neither hex nor a file"):
         datagrams(text)
 
 
@@ -76,7 +76,7 @@ def test_neither_hex_nor_file(text: str) -> None:
 def test_unsuitable_content(content: bytes, reason: str, tmp_path: Path) -> None:
     file = tmp_path / "trip"
     file.write_bytes(content)
-    with pytest.raises(RobotError, match=reason):
+    with pytest.raises(T2Error, match=reason):
         datagrams(str(file))
 
 

@@ -5,11 +5,11 @@ KINDs are plain, restless (never at rest), failing (once it is connected) and re
 
 import sys
 
-from common import keys
-from common.errors import LinkError
-from common.messages import Bumper
 from common.service import Node, run
 from common.settings import Shared
+from t2 import keys
+from t2.errors import LinkError
+from t2.messages import Bumper
 
 
 def build(node: Node[Shared]) -> None:
@@ -27,7 +27,7 @@ def build(node: Node[Shared]) -> None:
     node.loop.every(0.05, tick)
     node.is_stopped = lambda: kind != "restless"
     node.counters["resets"] += 1
-    node.event("built", "info", "all is built", count=3)
+    node.event("gamepad", "info", "all is built", count=3)
 
 
 if __name__ == "__main__":

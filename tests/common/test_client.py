@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, rule
 from msgspec import structs
 
-from common.client import (
+from common.freshness import NS_PER_S
+from t2.client import (
     ESTOP_TICKS,
     KEPT_TICKS,
     NEUTRAL,
@@ -22,8 +23,7 @@ from common.client import (
     request,
     reset_request,
 )
-from common.freshness import NS_PER_S
-from common.messages import Cause, Drive, Limits, ResetDone, SafetyState
+from t2.messages import Cause, Drive, Limits, ResetDone, SafetyState
 
 CONTACT = Cause(name="contact", action="brake", age=1.0, text="", id=41)
 ESTOP = Cause(name="estop", action="brake", age=1.0, text="", id=42)

@@ -5,24 +5,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.codec import decode, encode
-from common.errors import MessageError
-from common.messages import (
+from t2.codec import decode, encode
+from t2.errors import MessageError
+from t2.messages import (
     Bumper,
     Cause,
+    Command,
     Limits,
     Motion,
     PoseRequest,
     SafetyState,
 )
-from common.motion import Command
 
 STATE = SafetyState(
     seq=3,
     boot=2**63 - 1,
     verdict="slow",
     latched=("contact",),
-    causes=(Cause(name="zone", action="slow", age=0.5, text="etwas ist nah: 近"),),
+    causes=(Cause(name="obstacle", action="slow", age=0.5, text="etwas ist nah: 近"),),
     source=None,
     limits=Limits(forward=0.1, backward=1.0, angular=0.5),
     heartbeat=7,

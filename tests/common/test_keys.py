@@ -3,9 +3,9 @@
 import pytest
 import zenoh
 
-from common import keys, messages
-from common.keys import CALLS, TOPICS, Call, Topic
-from common.messages import Message
+from t2 import keys, messages
+from t2.keys import CALLS, TOPICS, Call, Topic
+from t2.messages import Message
 
 NAMES = {"side": "left", "service": "bridge", "source": "web"}
 

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 import pytest
 from msgspec import Struct, inspect
 
-from common.codec import decode, encode
-from common.errors import MessageError
-from common.keys import CALLS, TOPICS
-from common.messages import (
+from t2.codec import decode, encode
+from t2.errors import MessageError
+from t2.keys import CALLS, TOPICS
+from t2.messages import (
     MAX_TEXT,
+    Command,
     Drive,
     Event,
     Limit,
@@ -20,7 +21,6 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.motion import Command
 
 
 def unbounded(kind: inspect.Type, at: str) -> Iterator[str]:

@@ -2,13 +2,13 @@
 
 import pytest
 
-from common.messages import Cause, Link, Relay, SafetyState
 from common.root_cause import FROM_LINK, Part, RootCause, root_cause
 from services.safety.core.causes import BY_NAME, Clears
+from t2.messages import Cause, CauseName, Link, Relay, SafetyState
 from tests.factories import link, safety_state
 
 
-def state(*names: str) -> SafetyState:
+def state(*names: CauseName) -> SafetyState:
     causes = tuple(Cause(name=name, action="stop", age=1.0, text=name) for name in names)
     return safety_state(causes=causes)
 
@@ -33,7 +33,7 @@ FOLDED = ("bumper", "silent")
 )
 def test_the_first_missing_part_and_what_follows(
     connected: bool, safety: SafetyState | None, known: Link | None, part: Part,
-    folded: tuple[str, ...],
+    folded: tuple[CauseName, ...],
 ) -> None:  # fmt: skip
     assert root_cause(connected, safety, known) == RootCause(part, folded)
 

@@ -13,14 +13,14 @@ import msgspec
 import pytest
 import zenoh
 
-from common import codec, keys
 from common.bus.bus import Bus
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.config import Sources, load
-from common.messages import MAX_TEXT, Event, Health
 from common.service import Node, run, serve
 from common.settings import Shared
+from t2 import codec, keys
+from t2.messages import MAX_TEXT, Event, Health
 from tests.cli.processes import running
 from tests.common.bus_fixture import BusFixture
 from tests.common.systemd_manager import Manager
@@ -130,7 +130,7 @@ def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
     witness = Witness(buses.robot)
     buses.bus(witness.declare)
     wait_until(lambda: witness.events, "the event")
-    assert witness.events[0].name == "built"
+    assert witness.events[0].name == "gamepad"
     assert witness.events[0].about == {"count": 3}
     logged = [json.loads(line) for line in log.read_text().splitlines() if "event_name" in line]
     assert [(e["event"], e["event_name"], e["level"]) for e in logged] == [
@@ -231,7 +231,7 @@ def test_systemd_learns_that_it_is_ready_and_lives_from_its_loop_and_that_it_sto
 
 
 def test_a_long_text_of_an_event_is_cut(node: Node[Shared]) -> None:
-    node.event("lost", "error", "x" * 5000, folder="y" * 5000)
+    node.event("disk_full", "error", "x" * 5000, folder="y" * 5000)
     (sent,) = (each.last for each in node.bus.publishers if isinstance(each.last, Event))
     assert codec.decode(codec.encode(sent), Event) == sent
     assert (len(sent.text), sent.about) == (MAX_TEXT, {"folder": "y" * MAX_TEXT})

@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 import msgspec
 import pytest
 
-from common.messages import SONAR_NAMES
 from common.settings import (
     Board,
     BusSettings,
@@ -17,6 +16,7 @@ from common.settings import (
     recess,
     sonar_mounts,
 )
+from t2.messages import SONAR_NAMES
 
 
 class Guarded(ProtectedSection, frozen=True, kw_only=True):

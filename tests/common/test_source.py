@@ -2,12 +2,12 @@
 
 import pytest
 
-from common import keys
 from common.bus.bus import Bus
 from common.bus.publisher import Publisher
-from common.client import DENIED_AFTER
 from common.loop import Loop
 from common.source import DriveSource
+from t2 import keys
+from t2.client import DENIED_AFTER
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
 from verification.harness.bus import bus_on, running

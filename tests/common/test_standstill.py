@@ -6,7 +6,6 @@ import random
 import pytest
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Mileage
 from common.motion import STANDING_MPS, STANDING_RADPS, STILL, Twist
 from common.standstill import (
     AWAY_M,
@@ -17,6 +16,7 @@ from common.standstill import (
     comparable,
     stopping_ns,
 )
+from t2.messages import Mileage
 
 TICK_NS = NS_PER_S // 50
 TICK_S = TICK_NS / NS_PER_S

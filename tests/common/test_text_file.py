@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from common.text_file import LARGEST, decoded, expanded, pem_problem, read_text, typographic
+from t2.text_file import LARGEST, decoded, expanded, pem_problem, read_text, typographic
 
 
 @pytest.mark.parametrize(

@@ -3,11 +3,12 @@
 import time
 from typing import Any
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import Cause, Drive, EstopKeepalive, KeepaliveState, Release
+from t2 import keys
+from t2.messages import Cause, Drive, EstopKeepalive, KeepaliveState, Release
 from tests.dashboard.viewer import Client
 from tests.factories import safety_state
 from verification.harness.waiting import PATIENCE_S, wait_until

@@ -4,10 +4,11 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Bus, Caller
 from common.loop import Loop
-from common.messages import (
+from t2 import keys
+from t2.messages import (
     Cause,
     Direction,
     Release,

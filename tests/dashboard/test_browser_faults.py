@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from common.loop import Loop
-from common.messages import KeepaliveState
+from t2.messages import KeepaliveState
 from tests.dashboard.bus_fixture import Peer
 from tests.dashboard.page import BROWSER_MARKS, center_of, take_control, text, wait_for_text
 from tests.dashboard.servers import FREE, NEWER, CallServers

@@ -3,7 +3,6 @@
 import pytest
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import KeepaliveState, SafetyState
 from services.dashboard.driver_lock import (
     HOLD_S,
     DriverLock,
@@ -12,6 +11,7 @@ from services.dashboard.driver_lock import (
     Push,
     Shown,
 )
+from t2.messages import KeepaliveState, SafetyState
 from tests.factories import safety_state
 
 AHEAD = Push(1.0, 0.0)

@@ -7,16 +7,17 @@ from unittest.mock import Mock
 
 import pytest
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.messages import Event
 from services.dashboard import client_messages as client
 from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.fleet import IDLE_S, KNOWN_MAX, PAGES_MAX, Fleet
 from services.dashboard.robot_page import SLOW_TICKS
+from t2 import keys
+from t2.messages import Event
 from tests.factories import safety_state
 from verification.harness.waiting import wait_until
 

@@ -8,7 +8,6 @@ from typing import get_args
 
 import pytest
 
-from common.messages import Direction, FaultName, LinkState, Verdict
 from common.root_cause import MAY_MOVE
 from common.root_cause import TEXTS as ROOT_TEXTS
 from services.bridge.core.lease import WAITING
@@ -16,6 +15,7 @@ from services.dashboard import server
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.i18n import EVENTS, PHRASES, TEXTS, phrases
 from services.safety.core.causes import RULES
+from t2.messages import Direction, FaultName, LinkState, Verdict
 from tools.docs import DOCS
 
 CODE = Path(server.__file__).parent

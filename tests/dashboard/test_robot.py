@@ -4,14 +4,15 @@ import math
 
 import pytest
 
-from common import clock, keys
+from common import clock
 from common.bus.publisher import Publisher
-from common.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
 from common.freshness import NS_PER_S
-from common.messages import Direction, Drive, Event, ResetDone, ResetRequest
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
 from services.dashboard.robot import ESTOP_KEPT_S, Robot
+from t2 import keys
+from t2.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
+from t2.messages import Direction, Drive, Event, ResetDone, ResetRequest
 from tests.dashboard.servers import CONTACT, NEWER
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus

@@ -1,13 +1,20 @@
 """Snapshots from telemetry."""
 
+from typing import Any
+
 import pytest
 
-from common import keys
 from common.freshness import NS_PER_S
-from common.messages import (
+from services.dashboard import snapshot
+from services.dashboard.driver_lock import HoldState
+from services.dashboard.telemetry_cache import TelemetryCache
+from services.safety import report
+from t2 import keys
+from t2.messages import (
     SONAR_NAMES,
     Bumper,
     Cause,
+    Command,
     Drive,
     Driver,
     Motion,
@@ -16,11 +23,6 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.motion import Command
-from services.dashboard import snapshot
-from services.dashboard.driver_lock import HoldState
-from services.dashboard.telemetry_cache import TelemetryCache
-from services.safety import report
 from tests import factories
 from tests.safety.core.policy_fixture import PolicyFixture
 
@@ -108,7 +110,7 @@ def test_the_slow_snapshot() -> None:
         ("fault", "contact", "", "fault"),
     ],
 )
-def test_the_tone_of_a_sector(status: RangeStatus, cause: str, text: str, tone: str) -> None:
+def test_the_tone_of_a_sector(status: RangeStatus, cause: Any, text: str, tone: str) -> None:
     sonar = Ultrasonic(ranges=(4.0,) * 8, status=(status,) * 8)
     causes = [Cause(name=cause, action="slow", age=1.0, text=text)]
     assert snapshot.tones(sonar, causes)[SONAR_NAMES.index("front")] == tone

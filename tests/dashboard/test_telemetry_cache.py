@@ -2,9 +2,7 @@
 
 from msgspec.structs import replace
 
-from common import keys
 from common.freshness import NS_PER_S, Latest
-from common.messages import Bumper, Drive, Driver, Event, Velocity
 from services.dashboard.telemetry_cache import (
     EVENTS_MAX,
     FIXED,
@@ -13,13 +11,15 @@ from services.dashboard.telemetry_cache import (
     STATES_MAX,
     TelemetryCache,
 )
+from t2 import keys
+from t2.messages import Bumper, Drive, Driver, Event, Velocity
 from tests.factories import health, safety_state
 
 BUMPER = "tel/bridge/bumper"
 
 
 def event(number: int) -> Event:
-    return Event(name="n", level="info", text=str(number), t_ns=number)
+    return Event(name="stop", level="info", text=str(number), t_ns=number)
 
 
 def test_the_newest_message_until_it_is_too_old() -> None:

@@ -17,10 +17,10 @@ from typing import Any
 
 import pytest
 
-from common import codec, keys
 from common.bus.bus import Bus
 from common.loop import Loop
-from common.messages import Odometry
+from t2 import codec, keys
+from t2.messages import Odometry
 from tests.cli.processes import ran, sets
 from tests.drive_source import ConstantSource, drive_until_moving, moves_since
 from verification.harness.bus import at, bus_on, joined, running

@@ -4,9 +4,9 @@ from typing import Any
 
 from prometheus_client.core import Metric
 
-from common import messages as m
 from common.freshness import NS_PER_S
 from services.metrics.robot import RobotState
+from t2 import messages as m
 from tests import factories
 from tests.factories import health, odometry
 
@@ -20,13 +20,13 @@ def link(**fields: Any) -> m.Link:
     return factories.link(epoch=2, rejected={"crc": 3}, **fields)
 
 
-def safety(*latched: str, **fields: Any) -> m.SafetyState:
+def safety(*latched: Any, **fields: Any) -> m.SafetyState:
     causes = tuple(m.Cause(name=name, action="brake", age=1.0, text=name) for name in latched)
     verdict = "brake" if latched else "run"
     return factories.safety_state(verdict=verdict, latched=latched, causes=causes, **fields)
 
 
-def event(name: str) -> m.Event:
+def event(name: Any) -> m.Event:
     return m.Event(name=name, level="error", text=name)
 
 

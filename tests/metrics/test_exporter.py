@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from common import codec, keys
-from common import messages as m
 from common.cli_args import EXIT_LINK
-from common.keys import Topic
 from services.metrics import exporter
 from services.metrics.exporter import Exporter
+from t2 import codec, keys
+from t2 import messages as m
+from t2.keys import Topic
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
 from tests.factories import health, odometry

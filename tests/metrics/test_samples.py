@@ -3,9 +3,9 @@
 import re
 
 from common.freshness import NS_PER_S
-from common.messages import Durations
 from services.metrics.robot import FRESH_S, RobotState
 from services.metrics.samples import metric_families
+from t2.messages import Durations
 from tests.factories import health, odometry
 from tests.metrics.robots import (
     LINK,

@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 
-from common import clock, keys
-from common import messages as m
+from common import clock
 from common.freshness import NS_PER_S
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
+from t2 import keys
+from t2 import messages as m
 from tests.factories import safety_state
 from tests.fake_bus import FakeNode
 

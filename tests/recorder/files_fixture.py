@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from common.codec import Sample
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.reader import Reader
 from services.recorder.storage import MB, Storage, StoredFile
 from services.recorder.writer import RecordingWriter
+from t2.codec import Sample
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, MONO_NS, sample
 

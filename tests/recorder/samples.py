@@ -1,9 +1,9 @@
 """Samples as received from the bus."""
 
-from common import codec
-from common import messages as m
-from common.codec import Sample
 from common.freshness import NS_PER_S
+from t2 import codec
+from t2 import messages as m
+from t2.codec import Sample
 from tests import factories
 
 ROOT = "t2/v1/001"

@@ -7,7 +7,6 @@ from typing import Any
 import msgspec
 import pytest
 
-from common.messages import SONAR_NAMES, Event, Message
 from common.settings import Vehicle
 from services.recorder.foxglove_views import (
     LOG,
@@ -18,6 +17,7 @@ from services.recorder.foxglove_views import (
     schema_of,
 )
 from services.recorder.mcap_codec import MESSAGE_TYPES
+from t2.messages import SONAR_NAMES, Event, Message
 from tests.recorder import samples
 
 VEHICLE = Vehicle(length=1.0, width=0.6)
@@ -33,7 +33,7 @@ def views_of(message: Message, service: str = "") -> dict[str, tuple[Schema, dic
 
 @pytest.mark.parametrize(
     "message",
-    [samples.odometry(), samples.ultrasonic(), Event(name="a", level="info", text="b")],
+    [samples.odometry(), samples.ultrasonic(), Event(name="stop", level="info", text="b")],
 )
 def test_views_match_their_schemas(message: Message) -> None:
     assert views_of(message)

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common import codec
-from common.codec import Sample
-from common.errors import MessageError
-from common.messages import Velocity
 from common.settings import Vehicle
 from services.recorder.mcap_codec import JSON, Channel, Encoder, Entry
+from t2 import codec
+from t2.codec import Sample
+from t2.errors import MessageError
+from t2.messages import Velocity
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 

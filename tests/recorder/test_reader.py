@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from common.errors import RobotError
 from common.freshness import NS_PER_S
-from common.messages import Odometry, Velocity
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder, Entry
 from services.recorder.reader import Reader
 from services.recorder.writer import RecordingWriter
+from t2.errors import T2Error
+from t2.messages import Odometry, Velocity
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, bare, sample
 
@@ -105,7 +105,7 @@ def test_a_damaged_chunk_is_skipped(path: Path) -> None:
 def test_other_files_are_rejected(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.mcap"
     path.write_bytes(content)
-    with pytest.raises(RobotError, match=r"x\.mcap: is not an MCAP file"):
+    with pytest.raises(T2Error, match=r"x\.mcap: is not an MCAP file"):
         read(path)
 
 

@@ -15,11 +15,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from common import codec, keys
-from common import messages as m
 from common.config import Sources, load
 from common.freshness import NS_PER_S
-from common.messages import Event
 from common.service import Node
 from services.recorder import recorder as recorder_module
 from services.recorder.blackbox import BlackBox
@@ -29,6 +26,9 @@ from services.recorder.reader import Reader
 from services.recorder.recorder import Recorder
 from services.recorder.storage import MB
 from services.recorder.writer import RecordingWriter
+from t2 import codec, keys
+from t2 import messages as m
+from t2.messages import Event
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
 from tests.recorder import samples

@@ -6,20 +6,21 @@ from typing import Any
 
 import pytest
 
-from common.client import CONFIRM_S
 from common.freshness import NS_PER_S
-from common.messages import Cause, ResetDone, SafetyState
 from services.ros2.calls import TOLERANCE_S, Calls, reset_refusal
 from services.ros2.cdr import Attachment
 from services.ros2.config import Ros2Config
+from t2.client import CONFIRM_S
+from t2.messages import Cause, ResetDone, SafetyState
 from tests.factories import safety_state
 
 NOW_NS = 1_700_000_000 * NS_PER_S
 
 
 def state(**ages_s: float) -> SafetyState:
-    causes = [Cause(name=name, action="brake", age=age, text="") for name, age in ages_s.items()]
-    latched = tuple(name for name in ages_s if name != "no_request")
+    ages: dict[Any, float] = ages_s
+    causes = [Cause(name=name, action="brake", age=age, text="") for name, age in ages.items()]
+    latched = tuple(name for name in ages if name != "no_request")
     return safety_state(causes=tuple(causes), latched=latched)
 
 

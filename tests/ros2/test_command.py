@@ -7,8 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.client import OVERRULED_TICKS
-from common.messages import MAX_NUMBER, Cause, SafetyState
 from services.ros2.cdr import Attachment
 from services.ros2.command import (
     BEGINS,
@@ -29,6 +27,8 @@ from services.ros2.command import (
     bars_motion,
 )
 from services.safety.core.causes import BY_NAME, RULES, Clears
+from t2.client import OVERRULED_TICKS
+from t2.messages import MAX_NUMBER, Cause, CauseName, SafetyState
 from tests import factories
 
 S = 10**9
@@ -170,7 +170,7 @@ def test_what_a_network_holds_back_across_a_reset_is_motion() -> None:
     assert sender.stream(1.35, 1.0) == {"not_paused"}
 
 
-def state(*causes: str, source: str | None = "ros2") -> SafetyState:
+def state(*causes: CauseName, source: str | None = "ros2") -> SafetyState:
     """Return a state with these causes, in which this source is in control."""
     rows = [BY_NAME[name] for name in causes]
     held = tuple(Cause(name=row.name, action=row.action, age=1.0, text=row.text) for row in rows)

@@ -11,10 +11,11 @@ from xml.etree import ElementTree
 import pytest
 import zenoh
 
-from common import child_process, codec, keys
+from common import child_process
 from common.bus.session import client_config
 from services.ros2.definitions import HASHES
 from sim.requests import Bumper
+from t2 import codec, keys
 from tests import factories
 from tests.ros2.peer import LATCHED, RosPeer, peer
 from verification.harness.bus import at, set_options

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from common.messages import Limits
 from services.ros2 import cdr, parameters
 from services.ros2.config import Ros2Config
 from services.ros2.parameters import NOT_SET, READ_ONLY, SERVICES
+from t2.messages import Limits
 from tests.ros2 import oracle
 
 LIMITS = Limits(forward=0.5, backward=0.25, angular=1.0)

@@ -6,10 +6,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from common import messages as m
 from common.settings import Vehicle, sonar_mounts
 from services.ros2 import translate
 from services.ros2.config import Ros2, Ros2Config
+from t2 import messages as m
 from tests import factories
 
 T_NS = 1_700_000_000_250_000_000

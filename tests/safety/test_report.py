@@ -6,8 +6,6 @@ import pytest
 from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
-from common.codec import decode, encode
-from common.messages import MAX_REASON, MAX_TEXT, SONAR_NAMES, Limits, ResetRequest, SafetyState
 from services.safety.config import LimitSource, Safety, Source
 from services.safety.core.operator_requests import BUMPER_FREE
 from services.safety.report import (
@@ -15,6 +13,8 @@ from services.safety.report import (
     signature,
     transitions,
 )
+from t2.codec import decode, encode
+from t2.messages import MAX_REASON, MAX_TEXT, SONAR_NAMES, Limits, ResetRequest, SafetyState
 from tests.safety.core.policy_fixture import PolicyFixture
 
 

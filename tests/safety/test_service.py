@@ -10,21 +10,22 @@ import pytest
 import zenoh
 from msgspec.structs import replace
 
-from common import clock, keys, realtime
+from common import clock, realtime
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink
 from common.bus.session import client_config
-from common.client import reset_request
 from common.config import Sources, load
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import Bumper, Drive, Motion, ResetRequest, SafetyState, Velocity
 from common.motion import BRAKE, RUN, STOP
 from common.service import Node
 from services.safety import __main__ as program
 from services.safety.config import SafetyConfig
 from services.safety.core.inputs import DriveRequest
 from services.safety.service import SafetyService
+from t2 import keys
+from t2.client import reset_request
+from t2.messages import Bumper, Drive, Motion, ResetRequest, SafetyState, Velocity
 from tests.common.bus_fixture import until_received
 from tests.factories import safety_state
 from verification.harness.bus import at, joined, router_process, running

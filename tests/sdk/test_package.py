@@ -9,10 +9,11 @@ import msgspec
 import pytest
 
 import t2
-from common import cli_args, messages
+from common import cli_args
 from services.relay import core as relay
+from t2 import messages
 from t2.messages import Cause, Event
-from tools import sdk
+from tools.docs import ROOT
 
 
 def imported(tree: ast.Module) -> Iterator[str]:
@@ -26,7 +27,7 @@ def imported(tree: ast.Module) -> Iterator[str]:
 
 def test_it_is_python_3_10_and_imports_nothing_of_the_stack() -> None:
     allowed = {*sys.stdlib_module_names, "msgspec", "t2", "zenoh", "pytest", "mcap"}
-    for file in sdk.SDK.glob("*.py"):
+    for file in (ROOT / "sdk" / "t2").glob("*.py"):
         tree = ast.parse(file.read_text(encoding="utf-8"), feature_version=(3, 10))
         assert set(imported(tree)) <= allowed, file
 
@@ -54,10 +55,11 @@ def test_it_shows_its_public_names_only() -> None:
 
 def test_one_version_is_everywhere() -> None:
     assert t2.__version__ == cli_args.VERSION == relay.VERSION == messages.VERSION
-    for project in (sdk.ROOT, sdk.ROOT / "sdk"):
+    for project in (ROOT, ROOT / "sdk"):
         text = (project / "pyproject.toml").read_text("utf-8")
         assert 'dynamic = ["version"]' in text
         assert 'messages.py"\n' in text.partition("[tool.hatch.version]")[2]
+    assert f'"t2-sdk=={messages.VERSION}"' in (ROOT / "pyproject.toml").read_text("utf-8")
 
 
 def test_a_message_with_a_name_of_a_later_version_is_decoded() -> None:

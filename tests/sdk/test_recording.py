@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 import t2
-from common.messages import Velocity
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
+from t2.messages import Velocity
 from tests.recorder import samples
 from tests.recorder.samples import BEGIN_NS, bare, sample
 

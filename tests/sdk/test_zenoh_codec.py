@@ -6,8 +6,8 @@ import math
 import msgpack
 import pytest
 
-from common import codec
-from common.messages import Drive, PoseRequest
+from t2 import codec
+from t2.messages import Drive, PoseRequest
 from t2.zenoh_codec import decode, encode
 
 KEY = "t2/v1/001/@cmd/drive/web"

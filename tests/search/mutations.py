@@ -10,11 +10,10 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from common import heartbeat, keys
-from common import messages as m
+from common import heartbeat
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.motion import Command, Twist
+from common.motion import Twist
 from common.standstill import Displacement
 from common.wire import framing
 from common.wire.frame import Frame, Side
@@ -33,6 +32,9 @@ from services.safety.core.sonars import Axis, SonarOverrides
 from services.safety.core.sources import Arbiter
 from services.safety.core.state import State
 from services.safety.service import SafetyService
+from t2 import keys
+from t2 import messages as m
+from t2.messages import Command
 from tests.search.scripted_stack import FAULT_MM
 from tests.search.scripted_stack import ScriptedStack as Stack
 from verification.search import bus

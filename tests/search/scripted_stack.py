@@ -4,8 +4,6 @@ from typing import Any, Literal
 
 import pytest
 
-from common import keys
-from common import messages as m
 from common.motion import Twist
 from common.wire.reports import VelocityReport
 from services.ros2.command import SOURCE
@@ -14,6 +12,8 @@ from sim.board import Board
 from sim.faults import Datagram
 from sim.model import Model
 from sim.sonar import Ranges
+from t2 import keys
+from t2 import messages as m
 from verification.search.bus import MS, ROBOT, Disturbance
 from verification.search.ros import RosSource
 from verification.search.stack import Stack

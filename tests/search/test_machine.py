@@ -22,10 +22,10 @@ from hypothesis.stateful import (
 )
 from msgspec.structs import replace
 
-from common import keys
-from common import messages as m
-from common.motion import Command
 from sim import requests as q
+from t2 import keys
+from t2 import messages as m
+from t2.messages import Command
 from tests.search.scripted_stack import ALL_SONARS, FAULT_MM, NO_ECHO_MM, ScriptedStack
 from verification.search.bus import CLEAR, ECHO_MS, HOLD_MS, Disturbance
 from verification.search.condition_books import IGNORED, NEEDED

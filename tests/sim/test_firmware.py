@@ -3,11 +3,11 @@
 import msgspec
 import pytest
 
-from common.motion import Command
 from common.wire import commands as c
 from common.wire import framing
 from common.wire import reports as r
 from sim import requests as q
+from t2.messages import Command
 from tests.sim.sim_fixture import SimFixture, model
 
 

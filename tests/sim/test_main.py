@@ -13,7 +13,6 @@ import pytest
 
 from common import realtime
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.errors import LinkError, MessageError
 from common.wire import framing
 from common.wire.commands import BumperQuery, MotionCommand, MotionKind
 from common.wire.framing import Received
@@ -21,6 +20,7 @@ from common.wire.reports import FROM_BOARD, BumperReport, VelocityReport
 from sim.__main__ import main
 from sim.requests import Bumper, Place, PowerCycle
 from sim.trace import read
+from t2.errors import LinkError, MessageError
 from tests.common.rights import needs_right
 from verification.harness.ports import free_port
 from verification.harness.stack import Control

@@ -4,13 +4,13 @@ from typing import Any
 
 import pytest
 
-from common.messages import SONAR_NAMES
 from common.settings import Vehicle
 from sim import model
 from sim.geometry import Pose
 from sim.requests import Sonar, SonarName
 from sim.sonar import Echoes, Sonars
 from sim.world import World
+from t2.messages import SONAR_NAMES
 from tests.sim.sim_fixture import room
 
 VEHICLE = Vehicle(length=1.0, width=0.6, sonar_min=0.05, sonar_max=4.0)

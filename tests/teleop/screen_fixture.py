@@ -9,12 +9,12 @@ from contextlib import asynccontextmanager
 from textual.events import CursorPosition
 from textual.pilot import Pilot
 
-from common import keys
 from common.freshness import NS_PER_S
 from common.loop import Post
 from services.teleop.app import Panel, TeleopApp
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
+from t2 import keys
 from tests.factories import contact_state
 from tests.teleop.inputs import answer
 from tests.teleop.support import TeleopNode

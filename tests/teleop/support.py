@@ -2,9 +2,7 @@
 
 from typing import Any
 
-from common import keys
 from common.freshness import NS_PER_S
-from common.messages import Drive, SafetyState
 from common.motion import Twist
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
@@ -12,6 +10,8 @@ from services.teleop.core.controls import Stick
 from services.teleop.core.hold import Press
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import EventLog, View
+from t2 import keys
+from t2.messages import Drive, SafetyState
 from tests.factories import contact_state, safety_state
 from tests.fake_bus import FakeNode
 from tests.teleop.inputs import PERIOD_NS, answer

@@ -8,10 +8,10 @@ from msgspec.structs import replace
 from textual.events import AppBlur, Key
 from textual.pilot import Pilot
 
-from common import keys
 from common.freshness import NS_PER_S
-from common.messages import Cause, ResetRequest, Ultrasonic
 from services.teleop.app import Panel
+from t2 import keys
+from t2.messages import Cause, ResetRequest, Ultrasonic
 from tests.factories import contact_state, link, safety_state
 from tests.teleop.screen_fixture import LocalTerminalApp, Screen, play, until
 

@@ -3,12 +3,12 @@
 import pytest
 from msgspec import structs
 
-from common import keys
 from common.bus.bus import no_answer, not_allowed
 from common.bus.publisher import Publisher
-from common.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
-from common.messages import Driver, Event, ResetDone, ResetRequest
 from common.root_cause import MAY_MOVE
+from t2 import keys
+from t2.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
+from t2.messages import Driver, Event, ResetDone, ResetRequest
 from tests.factories import link, safety_state
 from tests.fake_bus import FakeBus
 from tests.teleop.inputs import answer, stick

@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Arrival, Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
-from common.messages import Drive, Event, Health
 from services.teleop import __main__ as teleop
+from t2 import keys
+from t2.messages import Drive, Event, Health
 from tests.teleop.terminal import STRICT, TELEOP, Terminal, terminal
 from verification.harness.bus import bus_on, running
 from verification.harness.ports import free_port

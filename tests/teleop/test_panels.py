@@ -4,8 +4,9 @@ from typing import Any
 
 import pytest
 
-from common.client import request
-from common.messages import (
+from services.teleop import panels
+from t2.client import request
+from t2.messages import (
     Bumper,
     Cause,
     Drive,
@@ -13,7 +14,6 @@ from common.messages import (
     Limits,
     Velocity,
 )
-from services.teleop import panels
 from tests.factories import contact_state, link, odometry, release, safety_state
 from tests.teleop.support import view
 

@@ -7,9 +7,9 @@ import pytest
 from common import clock
 from common.freshness import NS_PER_S
 from common.log import Logger
-from common.messages import Event
 from common.settings import Log
 from services.teleop.view import LINES, EventLog
+from t2.messages import Event
 
 
 def test_log_lines_go_to_the_event_log_and_not_to_the_terminal(
@@ -40,7 +40,7 @@ def test_a_line_is_printable_and_has_a_greatest_length() -> None:
 
 
 def told(log: EventLog, text: str, **header: Any) -> None:
-    log.add("safety", "info", text, Event(name="x", level="info", text=text, **header))
+    log.add("safety", "info", text, Event(name="stop", level="info", text=text, **header))
 
 
 def test_arrival_orders_lines_whatever_their_wall_clocks_are() -> None:

@@ -11,8 +11,8 @@ from functools import partial
 
 from zenoh import CongestionControl
 
-from common.motion import Command
 from sim.requests import Driver, Firmware, Flood, Freeze, Mute, PowerCycle, Sonar, Wire
+from t2.messages import Command
 from verification.faults import injectors
 from verification.faults.fault import NOTICE_S, Fault, Outcome, by_limit, within
 from verification.faults.independent_client import BUMPER, MOTION, VELOCITY, Client

@@ -16,9 +16,10 @@ from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 import msgpack
 import zenoh
 
-from common import clock, keys
+from common import clock
 from common.freshness import NS_PER_S
 from sim.requests import Asked, Bumper
+from t2 import keys
 from verification.faults.fault import Injector
 from verification.faults.independent_client import ROOT, VELOCITY, Client, Map, session
 from verification.faults.namespaces import step_clock

@@ -14,14 +14,15 @@ from typing import Any
 from msgspec import Struct
 
 from cli.settings import Everything
-from common import keys
-from common.codec import decode, encode
 from common.config import Sources, flatten, load
-from common.errors import ConfigError, MessageError
+from common.errors import ConfigError
 from common.wire import framing
 from common.wire.commands import TO_BOARD
 from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD
+from t2 import keys
+from t2.codec import decode, encode
+from t2.errors import MessageError
 
 TABLES = FROM_BOARD, TO_BOARD
 CALLED = [kind for call in keys.CALLS for kind in (call.request, call.reply)]

@@ -20,11 +20,11 @@ from cli.settings import Everything
 from common import clock
 from common.cli_args import source_words
 from common.config import Sources, load
-from common.errors import LinkError, MessageError
 from sim.requests import Asked, GetTruth
 from sim.simulation import Reply
 from sim.sockets import HOST, LARGEST
 from sim.trace import Truth
+from t2.errors import LinkError, MessageError
 from verification.harness.bus import set_options
 from verification.harness.ports import free_port, udp_ports
 from verification.harness.waiting import wait_until

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from common.freshness import NS_PER_S
-from common.messages import Motion
 from common.wire import reports as r
 from common.wire.frame import Frame
+from t2.messages import Motion
 
 LEASE_NS, SILENCE_NS = NS_PER_S // 5, NS_PER_S // 5
 SLACK_NS = NS_PER_S // 40  # the bridge looks every 10 ms

@@ -15,9 +15,9 @@ from msgspec.structs import replace
 
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.keys import SAFETY, Call, Topic
 from common.loop import Timer
-from common.messages import Message, SourceMessage
+from t2.keys import SAFETY, Call, Topic
+from t2.messages import Message, SourceMessage
 
 MS = NS_PER_S // 1000
 ECHO_MS, HOLD_MS = 30, 45  # later than the first copy; later than its neighbours

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from common.freshness import NS_PER_S
-from common.messages import Drive, Limit, Motion, ReleaseRequest, SourceMessage, Velocity
+from t2.messages import Drive, Limit, Motion, ReleaseRequest, SourceMessage, Velocity
 
 LEASE_S, ECHO_AGE_S, RIVAL_S = 0.5, 0.4, 0.5
 NEEDED, IGNORED = "lidar", "fleet"  # whose silence stops; whose silence has no effect

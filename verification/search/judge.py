@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import Struct
 
-from common import messages as m
 from common.freshness import NS_PER_S
 from sim.geometry import Pose
 from sim.trace import Truth
+from t2 import messages as m
 
 # A wall nearer than this justifies a stop: safety's margin of 0.20 m, its reaction at 1 m/s, the
 # hysteresis of 0.05 m and the errors of the sonars.

@@ -9,12 +9,12 @@ from typing import Any
 
 from msgspec import Struct
 
-from common import keys
-from common import messages as m
 from common.freshness import NS_PER_S
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
 from services.teleop.core.hold import Press
+from t2 import keys
+from t2 import messages as m
 from verification.search.bus import MS, Source
 from verification.search.draw import Draw
 from verification.search.stack import Stack as Robot

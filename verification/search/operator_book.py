@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from common.freshness import NS_PER_S
-from common.messages import Bumper, Direction, Motion, ResetRequest, SafetyState
+from t2.messages import Bumper, Direction, Motion, ResetRequest, SafetyState
 
 CALL_AGE_S = 1.0
 CREEP_MPS, CREEP_M = 0.1, 0.15

@@ -9,7 +9,6 @@ is dropped with its last holder: the safety case accepts that for two processes 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from common import messages as m
 from common.freshness import NS_PER_S
 from common.wire import framing
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
@@ -17,6 +16,7 @@ from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD
 from sim import requests as q
 from sim import trace as t
+from t2 import messages as m
 from verification.search.bridge_book import BridgeBook
 from verification.search.bus import MS, Envelope, Process
 from verification.search.condition_books import BRAKING_RADPS2, StandstillBook

@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from common import keys
-from common import messages as m
 from common.freshness import NS_PER_S
 from services.ros2.cdr import Attachment
 from services.ros2.command import BEGINS, SETTLES, SOURCE, Commands, Request, Twist
+from t2 import keys
+from t2 import messages as m
 from verification.search.bus import Process, Source
 
 TICKS = 60  # of 50 ms, until a pattern repeats

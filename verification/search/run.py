@@ -11,10 +11,10 @@ from typing import Any
 
 from msgspec import Struct
 
-from common import keys
-from common import messages as m
 from common.freshness import NS_PER_S
 from sim import requests as q
+from t2 import keys
+from t2 import messages as m
 from verification.search.bus import MS, Disturbance
 from verification.search.condition_books import BRAKING_RADPS2
 from verification.search.draw import TURN_BRAKING, Draw, Value, room

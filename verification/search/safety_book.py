@@ -9,8 +9,8 @@ from collections import Counter, deque
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
-from common import messages as m
 from common.freshness import NS_PER_S
+from t2 import messages as m
 from verification.search.condition_books import (
     BRAKING_MPS2,
     BRAKING_RADPS2,

@@ -8,8 +8,6 @@ from unittest.mock import patch
 
 from msgspec.structs import replace
 
-from common import keys
-from common import messages as m
 from common.freshness import NS_PER_S
 from common.settings import Board
 from common.wire import framing
@@ -26,6 +24,8 @@ from sim.model import Model
 from sim.requests import Asked
 from sim.simulation import Simulation
 from sim.world import Plan
+from t2 import keys
+from t2 import messages as m
 from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
 from verification.search.condition_books import BRAKING_RADPS2, IGNORED, LEASE_S, NEEDED
 from verification.search.oracle import STEP_NS, Oracle

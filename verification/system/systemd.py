@@ -7,7 +7,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-from common.errors import LinkError
+from t2.errors import LinkError
 from verification.harness.waiting import wait_until
 from verification.system.frame import (
     PATIENCE_S,

@@ -10,13 +10,13 @@ from typing import Any
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from common import messages as m
 from common.freshness import NS_PER_S
 from common.heartbeat import Echoes
 from common.wire.commands import LedSet
 from common.wire.frame import Frame
 from services.bridge.core.output import Outputs, Refuse, Reply, Send
 from services.bridge.core.readiness import Readiness
+from t2 import messages as m
 
 
 class Pending(Struct, frozen=True):

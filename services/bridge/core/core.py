@@ -26,8 +26,6 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from common import keys
-from common import messages as m
 from common.errors import WireError
 from common.freshness import NS_PER_S, Latest
 from common.wire import commands, framing, reports
@@ -41,6 +39,8 @@ from services.bridge.core.polling import Polling
 from services.bridge.core.ports import Ports
 from services.bridge.core.readiness import Readiness
 from services.bridge.core.translate import BumperFilter, Translator, driver, restarted
+from t2 import keys
+from t2 import messages as m
 
 Handler = Callable[[Any, bytes, int], Outputs]  # frame, raw bytes, receive time
 

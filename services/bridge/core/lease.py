@@ -45,8 +45,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Motion
-from common.motion import BRAKE, RUN, STOP, Command
+from common.motion import BRAKE, RUN, STOP
+from t2.messages import Command, Motion
 
 STOP_PERIOD_NS = NS_PER_S * 3 // 100  # at the second tick of 20 ms: about 25 Hz
 BEGIN_NS = 3 * NS_PER_S  # longer than a restart of safety

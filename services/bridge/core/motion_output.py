@@ -17,8 +17,7 @@ The first BRAKE lasts until standstill, the second one until safety has latched 
 from collections import Counter
 
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Mileage, Motion, Velocity
-from common.motion import BRAKE, RUN, STOP, Command, Twist
+from common.motion import BRAKE, RUN, STOP, Twist
 from common.standstill import Displacement, stopping_ns
 from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
@@ -27,6 +26,7 @@ from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease, Refusal
 from services.bridge.core.output import Event, Outputs, Reacted, Send
 from services.bridge.core.translate import Translator
+from t2.messages import Command, Mileage, Motion, Velocity
 
 # Packed once: BRAKE must not wait for it.
 RESTING = {

@@ -5,8 +5,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from common.messages import Level, Message
-from common.motion import Command
+from t2.messages import Command, EventName, Level, Message
 
 
 class Send(Struct, frozen=True):
@@ -28,7 +27,7 @@ class Publish(Struct, frozen=True):
 class Event(Struct, frozen=True):
     """A transition, for the bus and the log."""
 
-    name: str
+    name: EventName
     level: Level
     text: str
     about: dict[str, str | float | bool | None] = {}

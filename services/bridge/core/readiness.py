@@ -31,14 +31,14 @@ from typing import Annotated
 
 import msgspec
 
-from common import messages as m
 from common.freshness import NS_PER_S
-from common.messages import Few, Name
 from common.settings import Board
 from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
 from common.wire.frame import Frame
 from services.bridge.config import Bridge as Settings
 from services.bridge.core.output import Event, Outputs, Publish
+from t2 import messages as m
+from t2.messages import Few, Name
 
 # Half a tick less than 0.1 and 0.2 s: the tick that is due may come early.
 ASK_NS = NS_PER_S * 9 // 100

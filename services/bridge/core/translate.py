@@ -8,7 +8,6 @@ millimetres and tenths of a degree (manual 2.2 to 2.7). Implausible values are r
 import math
 
 from common.errors import WireError
-from common.messages import Driver, Mileage, Motion, RangeStatus, Ultrasonic, Velocity
 from common.motion import Twist, clamp
 from common.settings import Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
@@ -20,6 +19,7 @@ from common.wire.reports import (
     UltrasonicReport,
     VelocityReport,
 )
+from t2.messages import Driver, Mileage, Motion, RangeStatus, Ultrasonic, Velocity
 
 MM = 1000.0
 PER_RADIAN = {"decidegree": 1800.0 / math.pi, "milliradian": 1000.0}

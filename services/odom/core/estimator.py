@@ -26,7 +26,6 @@ from collections import deque
 
 from msgspec.structs import replace
 
-from common import messages as m
 from common.freshness import NS_PER_S, Latest, fresh
 from common.standstill import comparable
 from services.odom.config import Odom
@@ -40,6 +39,7 @@ from services.odom.core.pose import (
     halved,
     total,
 )
+from t2 import messages as m
 
 SEGMENTS_MAX = 512  # five seconds without counters; above that, segments are merged in pairs
 COMPARED_NS = NS_PER_S  # window of slip detection

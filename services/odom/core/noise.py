@@ -19,9 +19,9 @@ most; a vehicle that creeps leaves its place step by step, and so adds all of it
 import math
 from collections.abc import Sequence
 
-from common.messages import Mileage
 from services.odom.config import Odom
 from services.odom.core.pose import ArcSegment, ProcessNoise
+from t2.messages import Mileage
 
 COUNTER_STEP_M = 0.001  # manual 2.3
 COUNTER_STEP_RAD = math.radians(0.1)

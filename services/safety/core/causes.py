@@ -34,7 +34,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Action
+from t2.messages import Action, CauseName
 
 
 class Clears(Enum):
@@ -49,7 +49,7 @@ class Clears(Enum):
 class Rule(Struct, frozen=True):
     """One row: the action of a cause, how it clears, and its text for the operator."""
 
-    name: str
+    name: CauseName
     action: Action
     clears: Clears
     text: str
@@ -108,7 +108,7 @@ BY_NAME = {rule.name: rule for rule in RULES}
 _ROW = {rule.name: row for row, rule in enumerate(RULES)}  # the worst first
 
 
-def clears(name: str) -> Clears:
+def clears(name: CauseName) -> Clears:
     """Return how a cause clears."""
     return BY_NAME[name].clears
 
@@ -127,7 +127,7 @@ REFILL_PER_S = 0.1  # ten good seconds refill one failure
 class Observation(Struct, frozen=True):
     """Whether a sample shows a cause, with a text for the operator."""
 
-    name: str
+    name: CauseName
     present: bool
     token: Token | None = None  # None: this decision, without a sample
     text: str = ""
@@ -144,12 +144,12 @@ class Held(Struct, frozen=True):
     id: int = 0  # of this occurrence
 
 
-Latches = Mapping[str, Held]
+Latches = Mapping[CauseName, Held]
 
 
 def observe(
     held: Latches, seen: Iterable[Observation], now_ns: int, settle_ns: int = 0, decision: int = 0
-) -> dict[str, Held]:
+) -> dict[CauseName, Held]:
     """Return the held causes after these observations; unobserved causes stay held.
 
     ``settle_ns`` applies to causes that clear by ``SETTLED``. ``decision`` is the number of this
@@ -172,39 +172,39 @@ def observe(
     return result
 
 
-def _is_over(name: str, old: Held, now_ns: int, settle_ns: int) -> bool:
+def _is_over(name: CauseName, old: Held, now_ns: int, settle_ns: int) -> bool:
     how = clears(name)
     if how is Clears.SETTLED:
         return now_ns - old.bad_ns >= settle_ns
     return how is not Clears.RESET
 
 
-def latched(held: Latches) -> tuple[str, ...]:
+def latched(held: Latches) -> tuple[CauseName, ...]:
     """Return the names of the causes that require a reset, worst first."""
     return ordered(name for name in held if clears(name) is Clears.RESET)
 
 
-def ordered(names: Iterable[str]) -> tuple[str, ...]:
+def ordered(names: Iterable[CauseName]) -> tuple[CauseName, ...]:
     """Return the names, worst first."""
     return tuple(sorted(names, key=_ROW.__getitem__))
 
 
-def still_present(held: Latches) -> tuple[str, ...]:
+def still_present(held: Latches) -> tuple[CauseName, ...]:
     """Return the names of the latched causes that are still present, worst first."""
     return tuple(name for name in latched(held) if held[name].good < GOOD_SAMPLES)
 
 
-def begun(held: Latches, decision: int) -> tuple[str, ...]:
+def begun(held: Latches, decision: int) -> tuple[CauseName, ...]:
     """Return the names of the latched causes that began in this decision, worst first."""
     return tuple(name for name in latched(held) if held[name].id // len(RULES) == decision)
 
 
-def named(held: Latches, ids: Container[int]) -> tuple[str, ...]:
+def named(held: Latches, ids: Container[int]) -> tuple[CauseName, ...]:
     """Return the names of the latched causes with these identities, worst first."""
     return tuple(name for name in latched(held) if held[name].id in ids)
 
 
-def reset(held: Latches, ids: Container[int]) -> dict[str, Held]:
+def reset(held: Latches, ids: Container[int]) -> dict[CauseName, Held]:
     """Return the held causes after clearing these identities, except those still present."""
     cleared = set(named(held, ids)).difference(still_present(held))
     return {name: one for name, one in held.items() if name not in cleared}

@@ -4,12 +4,12 @@ from collections.abc import Iterator
 from typing import Any, TypeVar
 
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import Driver
 from services.safety.config import Safety
 from services.safety.core.causes import Observation, Token
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.state import State
+from t2.messages import CauseName, Driver
 
 T = TypeVar("T")
 
@@ -35,8 +35,8 @@ def observe_inputs(
     if state.keepalives.names:
         yield state.keepalives.observation(now_ns)
     yield _estop_reader(inputs, state, now_ns)
-    yield _driver("left", inputs.left)
-    yield _driver("right", inputs.right)
+    yield _driver("driver_left", "left", inputs.left)
+    yield _driver("driver_right", "right", inputs.right)
     yield Observation("leaving", inputs.leaving)
     yield _starting(inputs, settings, state.keepalives.missing)
     yield from _link(inputs)
@@ -78,14 +78,14 @@ def _stalled(state: State, age_s: float, now_ns: int) -> bool:
     return state.decided_ns is not None and now_ns - state.decided_ns > age_s * NS_PER_S
 
 
-def _driver(side: str, latest: Latest[Driver] | None) -> Observation:
+def _driver(name: CauseName, side: str, latest: Latest[Driver] | None) -> Observation:
     if latest is None:
-        return Observation(f"driver_{side}", False)
+        return Observation(name, False)
     sample = latest.value
     faulty = bool(sample.bits or sample.faults)
     names = ", ".join(sample.faults) or f"bits {sample.bits:#x}"
     text = f"The {side} motor driver reports: {names.replace('_', ' ')}."
-    return Observation(f"driver_{side}", faulty, (sample.boot, sample.seq), text)
+    return Observation(name, faulty, (sample.boot, sample.seq), text)
 
 
 def _starting(inputs: Inputs, settings: Safety, keepalives: list[str]) -> Observation:

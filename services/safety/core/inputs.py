@@ -5,7 +5,8 @@ from typing import Generic, TypeVar
 from msgspec import Struct
 
 from common.freshness import Latest, fresh
-from common.messages import (
+from common.motion import Twist
+from t2.messages import (
     Bumper,
     Drive,
     Driver,
@@ -20,7 +21,6 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.motion import Twist
 
 M = TypeVar("M", bound=SourceMessage)
 

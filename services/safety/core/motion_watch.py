@@ -34,10 +34,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Mileage
 from common.motion import STILL, Twist
 from common.standstill import Displacement, stopping_ns
 from services.safety.config import Safety
+from t2.messages import Mileage
 
 GOOD_PER_BAD = 0.5  # a good second subtracts half a bad second
 FASTER_MPS = 0.3  # than commanded

@@ -8,7 +8,6 @@ and the release that frees it needs the reset. Causes that the reset does not na
 
 from msgspec.structs import replace
 
-from common.messages import ResetRequest
 from services.safety.config import Safety
 from services.safety.core.causes import (
     BARRING,
@@ -24,6 +23,7 @@ from services.safety.core.inputs import Inputs
 from services.safety.core.release import SIGN, Release, stopping_distance
 from services.safety.core.sources import DriveChannel
 from services.safety.core.state import Reply, State
+from t2.messages import ResetRequest
 
 BY_HAND = "Push the vehicle off by hand, then reset."
 BUMPER_FREE = "The bumper is free. Next: reset."

@@ -23,6 +23,7 @@ from services.safety.core.causes import BARRING, Latches, Observation
 from services.safety.core.release import stopping_distance, sweep
 from services.safety.core.sonars import Axis, axes
 from services.safety.core.state import State
+from t2.messages import CauseName
 
 GRAZING = 1e-6  # m/s, m; below this is rounding: cos(90 deg) is not exactly 0
 MEASURED_EXCESS_MPS = 0.2  # tolerance over the allowed speed, for lag and noise
@@ -227,7 +228,7 @@ def observations(
     state: State, requested: RequestedTwist | None, plan: Plan
 ) -> Iterator[Observation]:
     """Yield the causes that depend on a request, present or not."""
-    present = {
+    present: dict[CauseName, bool] = {
         "no_request": requested is None,
         "neutral": _neutral_is_due(state, requested),
         "release": requested is not None and requested.is_release,

@@ -20,9 +20,7 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Motion
-from common.messages import Verdict as VerdictName
-from common.motion import BRAKE, RUN, STILL, STOP, Command
+from common.motion import BRAKE, RUN, STILL, STOP
 from common.settings import Vehicle
 from services.safety.config import Safety
 from services.safety.core.causes import (
@@ -44,6 +42,8 @@ from services.safety.core.planning import Plan, Planner, observations
 from services.safety.core.sonars import SonarFilter
 from services.safety.core.sources import Admission, Arbiter, Keepalives, SpeedLimits
 from services.safety.core.state import State, Verdict
+from t2.messages import CauseName, Command, Motion
+from t2.messages import Verdict as VerdictName
 
 SETTLE_NS = NS_PER_S // 2  # of good inputs until a cause clears
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not skip ahead
@@ -229,7 +229,7 @@ def _motion(verdict: Verdict, inputs: Inputs, estop: int | None, *, is_latched: 
     )
 
 
-def _worst(names: Iterable[str]) -> VerdictName:
+def _worst(names: Iterable[CauseName]) -> VerdictName:
     """Return the worst action of these causes; "run" without any."""
     first = next(iter(ordered(names)), None)
     return BY_NAME[first].action if first else "run"
@@ -242,7 +242,7 @@ def _name(worst: VerdictName, held: Latches) -> VerdictName:
     return "inhibited" if _settling(held) or "neutral" in held else "stop"
 
 
-def _settling(held: Iterable[str]) -> bool:
+def _settling(held: Iterable[CauseName]) -> bool:
     return any(clears(name) is Clears.SETTLED for name in held)
 
 

@@ -23,10 +23,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Direction, Mileage
 from common.motion import STILL, Twist
 from common.standstill import comparable
 from services.safety.core.causes import Held
+from t2.messages import Direction, Mileage
 
 COAST_NS = (
     NS_PER_S // 2

@@ -36,10 +36,10 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest, fresh
-from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 from common.motion import STILL, Twist
 from common.settings import Mount, Vehicle, recess, sonar_mounts
 from services.safety.core.causes import Token
+from t2.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 
 FARTHER_SAMPLES = 3
 CHANGED_SAMPLES = 3

@@ -48,7 +48,12 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
-from common.messages import (
+from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
+from common.text import printable
+from services.safety.config import LimitSource, Source
+from services.safety.core.causes import Observation
+from services.safety.core.inputs import DriveRequest, KeepaliveRequest, LimitRequest
+from t2.messages import (
     MAX_REASON,
     Drive,
     KeepaliveState,
@@ -56,11 +61,6 @@ from common.messages import (
     ReleaseRequest,
     SourceMessage,
 )
-from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
-from common.text import printable
-from services.safety.config import LimitSource, Source
-from services.safety.core.causes import Observation
-from services.safety.core.inputs import DriveRequest, KeepaliveRequest, LimitRequest
 
 C = TypeVar("C", bound="Channel")
 

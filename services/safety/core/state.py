@@ -3,13 +3,14 @@
 from msgspec import Struct
 
 from common.heartbeat import Heartbeat
-from common.messages import Verdict as VerdictName
-from common.motion import STILL, STOP, Command, Twist
+from common.motion import STILL, STOP, Twist
 from services.safety.core.causes import FaultBudget, Latches, Token
 from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.release import Leg, Release
 from services.safety.core.sonars import SonarArray, SonarOverrides
 from services.safety.core.sources import Arbiter, Keepalives, SpeedLimits
+from t2.messages import Command
+from t2.messages import Verdict as VerdictName
 
 
 class Reply(Struct, frozen=True):

@@ -25,12 +25,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from common.client import DriveRequests, Phase, request
-from common.messages import Direction, Drive
 from common.motion import Twist, clamp
 from services.teleop.config import Teleop
 from services.teleop.core.hold import RULES, Deadman, Keys, Press
 from services.teleop.core.round_trip import RoundTrip
+from t2.client import DriveRequests, Phase, request
+from t2.messages import Direction, Drive
 
 MAX_PRESS_AGE_S = 0.5
 ESTOP, RESET, STOP, ACKNOWLEDGE = "e", "r", "space", "enter"

@@ -39,7 +39,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from common.freshness import NS_PER_S
-from common.messages import SafetyState
+from t2.messages import SafetyState
 
 
 class Again(Enum):

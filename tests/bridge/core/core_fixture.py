@@ -7,10 +7,9 @@ from typing import Any
 
 from msgspec import Struct
 
-from common import messages as m
 from common.config import Sources, load
 from common.freshness import NS_PER_S
-from common.motion import RUN, STOP, Command
+from common.motion import RUN, STOP
 from common.wire import framing, reports
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.frame import Frame
@@ -19,6 +18,8 @@ from common.wire.reports import BumperReport, DistanceReport, VelocityReport
 from services.bridge.config import BridgeConfig
 from services.bridge.core.core import Core
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
+from t2 import messages as m
+from t2.messages import Command
 
 MS = NS_PER_S // 1000
 NOW = 1_000 * NS_PER_S

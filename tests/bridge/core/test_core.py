@@ -6,15 +6,16 @@ from collections.abc import Callable
 import msgspec
 import pytest
 
-from common import messages as m
 from common.freshness import NS_PER_S
-from common.motion import BRAKE, STOP, Command
+from common.motion import BRAKE, STOP
 from common.wire import commands, framing, reports
 from common.wire.commands import MotionKind
 from common.wire.frame import HEADER, Frame, Side
 from common.wire.framing import checksum
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Send
+from t2 import messages as m
+from t2.messages import Command
 from tests.bridge.core.core_fixture import (
     BOOT,
     CLEAR,

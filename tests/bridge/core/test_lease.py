@@ -9,8 +9,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Motion
-from common.motion import BRAKE, RUN, STOP, Command
+from common.motion import BRAKE, RUN, STOP
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import (
     Lease,
@@ -22,6 +21,7 @@ from services.bridge.core.lease import (
     on_tick,
     on_uncommanded,
 )
+from t2.messages import Command, Motion
 
 MS = NS_PER_S // 1000
 LEASE, COAST, BEGIN = 200 * MS, 1000 * MS, 3000 * MS

@@ -5,8 +5,7 @@ from collections import Counter
 import pytest
 
 from common.freshness import NS_PER_S
-from common.messages import Mileage, Motion, Velocity
-from common.motion import BRAKE, STOP, Command
+from common.motion import BRAKE, STOP
 from common.settings import Vehicle, Wire
 from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
@@ -15,6 +14,7 @@ from services.bridge.core.lease import Lease
 from services.bridge.core.motion_output import MotionOutput
 from services.bridge.core.output import Event, Send
 from services.bridge.core.translate import Translator
+from t2.messages import Command, Mileage, Motion, Velocity
 from tests.bridge.core.core_fixture import BOOT, MS, NOW, SAFETY
 
 SETTINGS = Bridge(deceleration=0.6, angular_deceleration=2.0)

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from common import messages as m
 from common.freshness import NS_PER_S
 from common.motion import STOP
 from common.wire import reports
@@ -20,6 +19,7 @@ from services.bridge.core.readiness import (
     RelayStatus,
 )
 from services.relay.core import REPORT, Relay
+from t2 import messages as m
 from tests.bridge.core.core_fixture import MS, STANDS, Bench, events, frames, motions, published
 
 SILENCE = 200 * MS

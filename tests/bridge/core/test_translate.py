@@ -7,8 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.errors import WireError
-from common.messages import Mileage, Motion
-from common.motion import Command
 from common.settings import AngularUnit, Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Side
@@ -27,6 +25,7 @@ from services.bridge.core.translate import (
     driver,
     restarted,
 )
+from t2.messages import Command, Mileage, Motion
 
 
 @pytest.fixture

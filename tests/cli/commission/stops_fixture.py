@@ -7,8 +7,7 @@ import msgspec
 
 from cli.commission.stops import Streams
 from common.freshness import NS_PER_S
-from common.messages import Message, Mileage, Motion, Velocity
-from common.motion import Command
+from t2.messages import Command, Message, Mileage, Motion, Velocity
 
 
 def at(message: Message, seconds: float, begin_s: float = 10.0) -> Message:

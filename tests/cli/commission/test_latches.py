@@ -4,8 +4,7 @@ import pytest
 
 from cli.commission.latches import LIMIT_S, LatchTest, Reset, judge_latch
 from common.freshness import NS_PER_S, Latest
-from common.messages import Motion, SafetyState
-from common.motion import Command
+from t2.messages import Command, Motion, SafetyState
 from tests.factories import safety_state
 
 T = 100 * NS_PER_S

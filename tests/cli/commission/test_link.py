@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from cli.commission.link import EXPECTED_HZ, judge_link, rejected
 from cli.commission.report import Verdict
 from common.freshness import NS_PER_S
-from common.messages import Link, Relay, Switches
+from t2.messages import Link, Relay, Switches
 from tests import factories
 
 ON = Switches(ultrasonic_brake=True, bumper_brake=True)

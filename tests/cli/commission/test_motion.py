@@ -17,8 +17,8 @@ from cli.commission.motion import (
     too_fast,
 )
 from common.freshness import NS_PER_S, Latest
-from common.messages import Mileage, Motion, Velocity
-from common.motion import Command, Twist
+from common.motion import Twist
+from t2.messages import Command, Mileage, Motion, Velocity
 from tests.factories import safety_state
 
 FORWARD, LEFT = Twist(linear=0.1), Twist(angular=0.2)

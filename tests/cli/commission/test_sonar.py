@@ -13,7 +13,7 @@ from cli.commission.sonar import (
     obstructions,
     resting_ranges,
 )
-from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
+from t2.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 
 FREE: Rest = (math.inf,) * 8
 

@@ -8,14 +8,13 @@ from msgspec.structs import replace
 
 from cli.__main__ import main
 from cli.commission.stops import Streams
-from common import codec
 from common.cli_args import EXIT_CONFIG
 from common.freshness import NS_PER_S
-from common.messages import Message
-from common.motion import Command
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
+from t2 import codec
+from t2.messages import Command, Message
 from tests.cli.commission.stops_fixture import streams
 from tests.recorder.samples import bare
 

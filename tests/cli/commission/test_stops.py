@@ -14,8 +14,8 @@ from cli.commission.stops import (
     slope,
 )
 from common.freshness import NS_PER_S
-from common.messages import Bumper, Health, Message, Mileage, Motion, Velocity
-from common.motion import Command, Twist
+from common.motion import Twist
+from t2.messages import Bumper, Command, Health, Message, Mileage, Motion, Velocity
 from tests.cli.commission.stops_fixture import at, changed, speed_at, streams
 
 

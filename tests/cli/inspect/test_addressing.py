@@ -5,7 +5,7 @@ import argparse
 import pytest
 
 from cli.inspect.addressing import expression, parse_key, topic_of
-from common import keys
+from t2 import keys
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import pytest
 import zenoh
 
 from cli.inspect import client
-from common import codec, keys
-from common import messages as m
 from common.bus.bus import Bus, Caller
+from t2 import codec, keys
+from t2 import messages as m
 from tests.cli.inspect.tool import FakeSafety, Tool, pretend
 from tests.common.bus_fixture import BusFixture
 

@@ -14,16 +14,16 @@ import pytest
 from cli.__main__ import main
 from cli.inspect import estop
 from cli.inspect.client import SafetyClient
-from common import client as machine
-from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
 from common.bus.session import operator_name
-from common.errors import RobotError
 from common.loop import Loop
-from common.messages import Drive, Event, ResetRequest
 from common.settings import BusSettings as Where
 from common.source import DriveSource
+from t2 import client as machine
+from t2 import keys
+from t2.errors import T2Error
+from t2.messages import Drive, Event, ResetRequest
 from tests.factories import safety_state
 from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site, connecting
@@ -194,7 +194,7 @@ def test_t2_call_reports_why_no_service_answers(site: Site, join: Join) -> None:
     def reason(role: str, name: str, robot: str = "001") -> str:
         with (
             probe(connecting(site.settings(role, name), secured)) as session,
-            pytest.raises(RobotError) as error,
+            pytest.raises(T2Error) as error,
         ):
             SafetyClient(session, robot).call(keys.RESET, ResetRequest(), timeout_s=0.3)
         return str(error.value)

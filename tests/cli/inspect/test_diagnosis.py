@@ -8,10 +8,10 @@ import pytest
 
 from cli.inspect import diagnosis as d
 from cli.inspect.diagnosis import Finding, Observation, diagnose
-from common import keys
-from common import messages as m
 from common.root_cause import FROM_LINK
 from services.safety.core.causes import RULES
+from t2 import keys
+from t2 import messages as m
 from tests import factories
 from tests.factories import health
 
@@ -28,7 +28,7 @@ def relay(state: Any = "up", **given: Any) -> m.Link:
     return link(relay=m.Relay(state=state, **(usual | given)))
 
 
-def state(*names: str, latched: tuple[str, ...] = ()) -> m.SafetyState:
+def state(*names: Any, latched: tuple[Any, ...] = ()) -> m.SafetyState:
     texts = {rule.name: (rule.action, rule.text) for rule in RULES}
     found = [(name, *texts.get(name, ("stop", name))) for name in names]
     causes = tuple(m.Cause(name=n, action=action, age=1.0, text=text) for n, action, text in found)

@@ -17,11 +17,11 @@ from cli.__main__ import main
 from cli.inspect import doctor
 from cli.inspect.diagnosis import START, STRANGER, Finding, diagnose
 from cli.inspect.doctor import connect, findings
-from common import keys
 from common.bus.bus import Bus
 from common.bus.probe import probe
-from common.messages import Bumper
 from common.settings import BusSettings, Shared
+from t2 import keys
+from t2.messages import Bumper
 from tests.cli.inspect.tool import Result, Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from tests.factories import health, safety_state

@@ -11,9 +11,9 @@ import msgspec
 import pytest
 
 from cli.inspect import echo
-from common import codec, keys
 from common.bus.bus import Bus
-from common.messages import Bumper, Event
+from t2 import codec, keys
+from t2.messages import Bumper, Event
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, running, sets, t2
 from tests.common.bus_fixture import BusFixture
@@ -77,7 +77,7 @@ def test_control_characters_are_escaped(buses: BusFixture, tool: Tool) -> None:
 def test_earlier_events_are_shown(buses: BusFixture, tool: Tool) -> None:
     def publish(bus: Bus) -> None:
         bus.publisher(keys.EVENTS, service="mine").put(
-            Event(name="x", level="info", text="long ago")
+            Event(name="stop", level="info", text="long ago")
         )
 
     buses.bus(publish)

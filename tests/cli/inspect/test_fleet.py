@@ -9,12 +9,12 @@ import pytest
 
 from cli.inspect import estop, robots
 from cli.inspect.client import SafetyClient
-from common import client as machine
-from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.session import operator_name
 from common.cli_args import EXIT_LINK
-from common.messages import Cause, Event
+from t2 import client as machine
+from t2 import keys
+from t2.messages import Cause, Event
 from tests.cli.inspect.tool import FakeSafety, Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import at, router_process

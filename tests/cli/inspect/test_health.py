@@ -5,8 +5,8 @@ from functools import partial
 import pytest
 
 from cli.inspect import health as command
-from common import keys
-from common.messages import Durations
+from t2 import keys
+from t2.messages import Durations
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from tests.factories import health

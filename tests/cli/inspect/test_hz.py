@@ -5,8 +5,8 @@ import pytest
 
 from cli.inspect import hz
 from cli.inspect.hz import StreamStats, quantile
-from common.codec import Sample
 from common.freshness import NS_PER_S
+from t2.codec import Sample
 
 
 def sample(message: object, received_ns: int = 15, padding: int = 0) -> Sample:

@@ -7,9 +7,9 @@ import sys
 import pytest
 
 from cli.inspect.estop import described
-from common import keys
 from common.bus.bus import Arrival, Bus
-from common.messages import EstopKeepalive, KeepaliveState
+from t2 import keys
+from t2.messages import EstopKeepalive, KeepaliveState
 from tests.cli.inspect.tool import FakeSafety, Tool
 from tests.common.bus_fixture import BusFixture
 from tests.factories import safety_state

@@ -3,10 +3,10 @@
 import pytest
 
 from cli.inspect import hz, ls
-from common import keys
 from common.bus.bus import Bus
 from common.bus.session import router
-from common.messages import Bumper, Velocity
+from t2 import keys
+from t2.messages import Bumper, Velocity
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import listening

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from cli.inspect import output
 from cli.inspect.payload import Reading, at, read
-from common import codec
-from common.errors import MessageError
-from common.messages import Bumper
+from t2 import codec
+from t2.errors import MessageError
+from t2.messages import Bumper
 
 TYPED = codec.encoding(Bumper)
 

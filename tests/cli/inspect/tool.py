@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from cli.__main__ import main
-from common import keys
 from common.bus.bus import Bus
-from common.keys import Topic
-from common.messages import Message, SafetyState
+from t2 import keys
+from t2.keys import Topic
+from t2.messages import Message, SafetyState
 from tests.common.bus_fixture import BusFixture
 from tests.factories import safety_state
 

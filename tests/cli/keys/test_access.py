@@ -10,11 +10,11 @@ from msgspec.structs import replace
 
 from cli.keys.access import RouterSettings, Verb, access_control, rights, ros
 from cli.keys.members import Member, Members, Role, read
-from common import keys
 from common.errors import ConfigError
 from services.ros2 import names
 from services.ros2.config import Ros2
 from services.ros2.definitions import HASHES
+from t2 import keys
 from tools.rights_table import MINE, OTHER, ROLES, may
 
 UNTIL = datetime(2030, 1, 1, tzinfo=UTC)

@@ -18,7 +18,7 @@ from cli.keys.ca import (
 )
 from cli.keys.member_list import DAY_S, profile
 from cli.keys.members import Profile
-from common.errors import RobotError
+from t2.errors import T2Error
 
 SERVER, CLIENT = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
 SPAN = 1.8e9, 1.8e9 + 10 * DAY_S
@@ -95,9 +95,9 @@ def test_every_certificate(
 def test_invalid_keys(authority: CertificateAuthority) -> None:
     certificate = certificate_pem(authority.certificate)
     stranger = CertificateAuthority.create("berlin", SPAN)
-    with pytest.raises(RobotError, match="does not match the certificate"):
+    with pytest.raises(T2Error, match="does not match the certificate"):
         CertificateAuthority.load(certificate, key_pem(stranger.key), no_passphrase)
-    with pytest.raises(RobotError, match="cannot read"):
+    with pytest.raises(T2Error, match="cannot read"):
         CertificateAuthority.load(certificate, b"no key", no_passphrase)
-    with pytest.raises(RobotError, match="invalid certificate"):
+    with pytest.raises(T2Error, match="invalid certificate"):
         CertificateAuthority.load(b"-----BEGIN", key_pem(stranger.key), no_passphrase)

@@ -16,7 +16,8 @@ from cli.keys.member_list import (
     span,
 )
 from cli.keys.members import ROLES, Member, Profile
-from common.errors import ConfigError, RobotError
+from common.errors import ConfigError
+from t2.errors import T2Error
 from tests.cli.keys.site_fixture import NOW_S, member, members
 
 # --- profiles -----------------------------------------------------------------------------------
@@ -84,7 +85,7 @@ def test_the_common_name_ends_with_the_start_of_the_serial() -> None:
     ],
 )
 def test_a_certificate_never_exceeds_the_authority(days: int, left_days: float, error: str) -> None:
-    with pytest.raises(RobotError, match=error) if error else nullcontext():
+    with pytest.raises(T2Error, match=error) if error else nullcontext():
         assert span(1e9, days, 1e9 + left_days * DAY_S) == (1e9 - EARLY_S, 1e9 + days * DAY_S)
 
 

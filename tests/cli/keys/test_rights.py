@@ -16,8 +16,8 @@ import zenoh.ext
 
 from cli.keys.access import Verb
 from cli.keys.machine_settings import ros_override
-from common import keys
 from common.bus.session import client_config
+from t2 import keys
 from tools.rights_table import CLASSES, MINE, ROLES, may
 from verification.harness.bus import at
 from verification.harness.certificates import Site, connecting

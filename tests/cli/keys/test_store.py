@@ -12,7 +12,7 @@ from cli.keys.ca import CertificateAuthority
 from cli.keys.member_list import DAY_S, profile
 from cli.keys.members import Members, Profile
 from cli.keys.store import Folder, locked
-from common.errors import RobotError
+from t2.errors import T2Error
 from tests.cli.keys.site_fixture import member, members
 
 SPAN = 1.8e9, 1.8e9 + 10 * DAY_S
@@ -81,7 +81,7 @@ def test_renewal_keeps_edited_settings(folder: Folder) -> None:
 def test_an_authority_is_never_overwritten(folder: Folder) -> None:
     kept = folder.ca_key.read_bytes()
     folder.ca.unlink()
-    with pytest.raises(RobotError, match="exists: another CA would invalidate"):
+    with pytest.raises(T2Error, match="exists: another CA would invalidate"):
         folder.create_authority(CertificateAuthority.create("x", SPAN), Members(site="x"), b"")
     assert folder.ca_key.read_bytes() == kept
 
@@ -93,7 +93,7 @@ def test_a_full_disk_or_ctrl_c_keeps_the_old_list(
     create_machine(folder, ROBOT)
     kept = folder.members.read_bytes()
     monkeypatch.setattr("cli.keys.store.os.fsync", Mock(side_effect=trouble))
-    with pytest.raises((RobotError, KeyboardInterrupt)):
+    with pytest.raises((T2Error, KeyboardInterrupt)):
         folder.write(Members(site="berlin"))
     assert folder.members.read_bytes() == kept
     assert not [file for file in folder.path.iterdir() if file.name.startswith(".")]

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from cli.recordings.timeline import Timeline
-from common import messages as m
 from common.freshness import NS_PER_S
-from common.motion import Command
+from t2 import messages as m
+from t2.messages import Command
 from tests import factories
 from tests.recorder.samples import BEGIN_NS, ROOT
 
@@ -30,7 +30,7 @@ def drive() -> Iterator[Arrival]:
         ):  # fmt: skip
             yield at(path, message, at_s)
         if at_s == HIT_S:
-            latched = m.Event(name="latched", level="error", text="The <b>bumper</b> was hit.")
+            latched = m.Event(name="contact", level="error", text="The <b>bumper</b> was hit.")
             yield at("evt/safety", latched, at_s)
         if seq % 20 == 0:
             health = m.Health(service="bridge", version="0.1.0", uptime=at_s, rates={}, counters={},

@@ -9,7 +9,7 @@ from typing import Any
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from common import keys
+from t2 import keys
 from tests.cli.inspect.conftest import buses
 from tests.cli.inspect.tool import pretend
 from tests.cli.processes import PATIENCE_S, running, sets, t2

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from cli.__main__ import main
-from common.messages import Event, Health
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
+from t2.messages import Event, Health
 from tests.cli.recordings.drive_fixture import state
 from tests.recorder import samples
 from tests.recorder.samples import bare, sample

@@ -9,12 +9,12 @@ import zenoh
 
 from cli.recordings import replay
 from cli.recordings.replay import is_played
-from common import keys
-from common import messages as m
-from common.motion import Command
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
+from t2 import keys
+from t2 import messages as m
+from t2.messages import Command
 from tests.cli.inspect.conftest import buses, tool
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from cli.recordings.timeline import Phase, Series, Stream, add_state, downsampled, stops
-from common.messages import Cause, Drive, SafetyState, Velocity, Verdict
+from t2.messages import Cause, Drive, SafetyState, Velocity, Verdict
 from tests import factories
 from tests.cli.recordings.drive_fixture import CONTACT, HIT_S, RESET_S, at, drive, timeline_of
 

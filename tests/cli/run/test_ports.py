@@ -13,8 +13,8 @@ from cli.run import ports
 from cli.run.ports import Port, claimed, wanted
 from cli.settings import Everything
 from common.bus.session import router
-from common.errors import LinkError
 from common.settings import BusSettings
+from t2.errors import LinkError
 from verification.harness.bus import listening
 
 TYPES = {"tcp": socket.SOCK_STREAM, "udp": socket.SOCK_DGRAM}

@@ -12,7 +12,8 @@ from cli.__main__ import main
 from cli.run import up
 from cli.run.up import everything, selected
 from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.errors import ConfigError, RobotError
+from common.errors import ConfigError
+from t2.errors import T2Error
 from tests.cli.processes import PATIENCE_S, children, ran, running, sets, t2, wait_gone
 from tests.cli.stack import STACK, ports, starts
 from verification.harness.waiting import wait_until
@@ -99,5 +100,5 @@ def test_a_process_that_does_not_exist(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ConfigError, match="--only brigde: no such process; available: router, sim"):
         selected(everything(options()), "brigde")
     monkeypatch.setitem(sys.modules, "xxhash", None)
-    with pytest.raises(RobotError, match="--ros2 needs xxhash: install the extra `ros2`"):
+    with pytest.raises(T2Error, match="--ros2 needs xxhash: install the extra `ros2`"):
         everything(options("--ros2"))

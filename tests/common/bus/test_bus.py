@@ -7,10 +7,11 @@ from collections.abc import Callable
 import msgpack
 import zenoh
 
-from common import clock, keys
+from common import clock
 from common.bus.bus import Arrival, Bus, OverwritingQueue
-from common.errors import MessageError
-from common.messages import Bumper, Drive, Event, ResetRequest
+from t2 import keys
+from t2.errors import MessageError
+from t2.messages import Bumper, Drive, Event, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
@@ -168,8 +169,8 @@ def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
     bus = Bus(at(buses.endpoint), buses.robot, buses.loop.post)
     publisher = bus.publisher(keys.EVENTS, service="bridge")
 
-    def emit(name: str) -> None:
-        publisher.put(Event(name=name, level="info", text=name))
+    def emit(text: str) -> None:
+        publisher.put(Event(name="stop", level="info", text=text))
 
     for name in names[:10]:
         emit(name)  # before there is a session
@@ -179,7 +180,7 @@ def test_late_joiners_get_the_events_that_were(buses: BusFixture) -> None:
     received: list[str] = []
 
     def hear(arrival: Arrival[Event]) -> None:
-        received.append(arrival.message.name)
+        received.append(arrival.message.text)
 
     buses.bus(lambda bus: bus.subscribe(keys.EVENTS, hear, depth=128, service="*"))
     wait_until(lambda: len(received) >= 20, "the events that were")

@@ -5,9 +5,9 @@ import time
 import msgpack
 import pytest
 
-from common import keys
 from common.bus.bus import Bus, Caller
-from common.messages import ResetDone, ResetRequest
+from t2 import keys
+from t2.messages import ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from common import keys
 from common.bus.bus import Arrival, Bus
 from common.bus.drive import DriveLink, LinkWatch
 from common.freshness import NS_PER_S
-from common.messages import Bumper, Motion
-from common.motion import Command
 from common.settings import BusSettings as Settings
+from t2 import keys
+from t2.messages import Bumper, Command, Motion
 from tests.common.bus_fixture import BusFixture, rising, until_received
 from verification.harness.bus import Lines, at
 from verification.harness.waiting import wait_until

@@ -8,10 +8,9 @@ import msgpack
 import pytest
 import zenoh
 
-from common import keys
 from common.bus.publisher import Publisher, host_id
-from common.messages import Bumper, Motion
-from common.motion import Command
+from t2 import keys
+from t2.messages import Bumper, Command, Motion
 
 
 def test_it_numbers_and_stamps_even_without_a_bus() -> None:

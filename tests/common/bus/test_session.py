@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from common import keys, settings
+from common import settings
 from common.bus.bus import Arrival, Bus
 from common.bus.probe import probe
 from common.bus.session import (
@@ -18,8 +18,9 @@ from common.bus.session import (
     router,
     router_config,
 )
-from common.errors import LinkError
-from common.messages import Bumper, Event, ResetDone, ResetRequest
+from t2 import keys
+from t2.errors import LinkError
+from t2.messages import Bumper, Event, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture, until_received
 from verification.harness.bus import at, listening, router_process
 from verification.harness.ports import free_port
@@ -68,7 +69,9 @@ def test_a_router_that_comes_later_or_again_finds_all_as_it_was(buses: BusFixtur
             until_received(lambda: bumper.put(Bumper(pressed=True)), lambda: received, "a bumper")
             wait_until(lambda: seen, "the token")
             until_received(
-                lambda: events.put(Event(name="x", level="info", text="")), lambda: late, "an event"
+                lambda: events.put(Event(name="stop", level="info", text="")),
+                lambda: late,
+                "an event",
             )
             until_received(
                 lambda: sender.call(keys.RESET, ResetRequest(), replies.append, print),

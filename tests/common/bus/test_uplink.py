@@ -4,8 +4,8 @@ from contextlib import ExitStack
 
 import zenoh
 
-from common import keys
 from common.bus.session import client_config, router
+from t2 import keys
 from tests.common.bus_fixture import until_received
 from verification.harness.bus import at, listening
 from verification.harness.ports import free_port

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
-from common.messages import Mileage, Odometry, Velocity
 from services.odom.config import Odom
 from services.odom.core.estimator import Estimator
 from services.odom.core.pose import Pose
+from t2.messages import Mileage, Odometry, Velocity
 
 TICK_NS = NS_PER_S // 50
 EXACT = pytest.approx((0.0, 0.0), abs=1e-6)

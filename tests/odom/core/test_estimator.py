@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
-from common.messages import Velocity
 from services.odom.config import Odom
 from services.odom.core.estimator import SEGMENTS_MAX, START, Estimator, SlipDetector
 from services.odom.core.pose import ArcSegment, Pose
+from t2.messages import Velocity
 from tests.odom.core.odom_fixture import (
     EXACT,
     TICK_NS,

@@ -6,10 +6,10 @@ import random
 import pytest
 
 from common.freshness import NS_PER_S
-from common.messages import Mileage
 from services.odom.config import Odom
 from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, NoiseModel
 from services.odom.core.pose import ArcSegment, ProcessNoise
+from t2.messages import Mileage
 from tests.odom.core.odom_fixture import OdomFixture, started
 
 ODOM = Odom(

@@ -6,9 +6,23 @@ import msgspec
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import (
+from common.settings import Vehicle
+from services.safety.config import Safety
+from services.safety.core.causes import latched
+from services.safety.core.inputs import (
+    DriveRequest,
+    Inputs,
+    KeepaliveRequest,
+    LimitRequest,
+    SourceRequest,
+)
+from services.safety.core.policy import Policy
+from services.safety.core.state import Reply, Verdict
+from services.safety.report import state_message, text
+from t2.messages import (
     SONAR_NAMES,
     Bumper,
+    CauseName,
     Direction,
     Drive,
     Driver,
@@ -26,19 +40,6 @@ from common.messages import (
     Ultrasonic,
     Velocity,
 )
-from common.settings import Vehicle
-from services.safety.config import Safety
-from services.safety.core.causes import latched
-from services.safety.core.inputs import (
-    DriveRequest,
-    Inputs,
-    KeepaliveRequest,
-    LimitRequest,
-    SourceRequest,
-)
-from services.safety.core.policy import Policy
-from services.safety.core.state import Reply, Verdict
-from services.safety.report import state_message, text
 from tests.factories import link, safety_state
 
 TICK_S = 0.02
@@ -261,7 +262,7 @@ class PolicyFixture:
         assert self.verdict.reply is not None
         return self.verdict.reply
 
-    def text(self, name: str) -> str:
+    def text(self, name: CauseName) -> str:
         """Return the published text of a held cause."""
         return text(self.state, name)
 

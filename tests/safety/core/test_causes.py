@@ -1,22 +1,23 @@
 """Causes: the table by hand, and each way to clear, at its boundary."""
 
+from typing import Any
+
 import pytest
 
 from common.freshness import NS_PER_S
-from common.messages import Action
 from services.safety.core.causes import (
     BARRING,
     FAILURES,
     RULES,
     Clears,
     FaultBudget,
-    Held,
     Latches,
     Observation,
     begun,
     observe,
     ordered,
 )
+from t2.messages import Action
 
 SETTLE_NS = 500
 RESET, SETTLED, NEUTRAL, AT_ONCE = Clears.RESET, Clears.SETTLED, Clears.NEUTRAL, Clears.AT_ONCE
@@ -58,7 +59,7 @@ def test_the_table() -> None:
 
 
 def test_order_and_groups_of_the_table() -> None:
-    names = [name for name, _, _ in TABLE]
+    names: Any = [name for name, _, _ in TABLE]
     assert ordered(reversed(names)) == tuple(names)
     actions = [action for _, action, _ in TABLE]
     assert actions == sorted(actions, key=["brake", "stop", "slow"].index)
@@ -69,7 +70,7 @@ def test_order_and_groups_of_the_table() -> None:
 # --- held causes ----------------------------------------------------------------------------
 
 
-def see(held: Latches, name: str, present: bool, now_ns: int, seq: int = 0) -> dict[str, Held]:
+def see(held: Latches, name: Any, present: bool, now_ns: int, seq: int = 0) -> Latches:
     return observe(held, [Observation(name, present, (1, seq))], now_ns, SETTLE_NS)
 
 
@@ -81,7 +82,7 @@ def see(held: Latches, name: str, present: bool, now_ns: int, seq: int = 0) -> d
         ("estop", 9999, True),  # by a reset
     ],
 )  # fmt: skip
-def test_each_way_to_clear(name: str, now_ns: int, stays: bool) -> None:
+def test_each_way_to_clear(name: Any, now_ns: int, stays: bool) -> None:
     held = see(see({}, name, True, 0), name, True, 101)
     assert held[name].since_ns == 0
     assert set(see(held, "bumper", True, now_ns)) == {name, "bumper"}  # it was not observed

@@ -6,7 +6,6 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Bumper, Driver, Switches, Ultrasonic, Velocity
 from common.motion import Twist
 from common.settings import Vehicle
 from common.standstill import Displacement
@@ -24,6 +23,7 @@ from services.safety.core.sources import (
     SpeedLimits,
 )
 from services.safety.core.state import State, Verdict
+from t2.messages import Bumper, Driver, Switches, Ultrasonic, Velocity
 from tests.factories import link, safety_state
 
 NOW_NS = 100 * NS_PER_S

@@ -5,10 +5,10 @@ import math
 import pytest
 
 from common.freshness import NS_PER_S
-from common.messages import Drive, Switches
 from common.motion import STILL
 from services.safety.config import Safety
 from services.safety.core.inputs import DriveRequest
+from t2.messages import Drive, Switches
 from tests.safety.core.policy_fixture import PolicyFixture
 
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from common.messages import SONAR_NAMES
 from common.motion import Twist
+from t2.messages import SONAR_NAMES
 from tests.safety.core.policy_fixture import TICK_S, PolicyFixture
 
 # --- zones ----------------------------------------------------------------------------------

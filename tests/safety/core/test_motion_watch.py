@@ -6,7 +6,6 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import Mileage
 from common.motion import STILL, Twist
 from common.standstill import GRACE_NS
 from services.safety.config import Safety
@@ -19,6 +18,7 @@ from services.safety.core.motion_watch import (
     Standstill,
     Supervisor,
 )
+from t2.messages import Mileage
 from tests.safety.core.policy_fixture import TICK_S
 
 TICK_NS = round(TICK_S * NS_PER_S)

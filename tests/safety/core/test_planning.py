@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from common.messages import SONAR_NAMES
 from common.motion import RUN, STILL, Twist
 from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety
@@ -24,6 +23,7 @@ from services.safety.core.planning import (
 from services.safety.core.policy import Policy
 from services.safety.core.sonars import Sonar, SonarArray
 from services.safety.core.state import State, Verdict
+from t2.messages import SONAR_NAMES
 
 ALLOWED_AT_1M = math.sqrt(0.15**2 + 2 * 0.6 * 0.8) - 0.15
 ALLOWED_AT_03 = math.sqrt(0.15**2 + 2 * 0.6 * 0.1) - 0.15

@@ -6,16 +6,16 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import (
+from common.motion import Twist
+from services.safety.config import Safety
+from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
+from services.safety.core.inputs import DriveRequest, Inputs
+from t2.messages import (
     Bumper,
     Drive,
     Switches,
     Velocity,
 )
-from common.motion import Twist
-from services.safety.config import Safety
-from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
-from services.safety.core.inputs import DriveRequest, Inputs
 from tests.factories import link
 from tests.safety.core.policy_fixture import DIRECTIONS, TICK_S, UNKNOWN_TEXT, PolicyFixture, hit
 

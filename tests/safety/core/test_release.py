@@ -6,9 +6,9 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from common.messages import Direction, ReleaseRequest
 from services.safety.core.causes import BY_NAME, latched
 from services.safety.core.operator_requests import BUMPER_FREE, LET_GO, room
+from t2.messages import Direction, ReleaseRequest
 from tests.factories import link
 from tests.safety.core.policy_fixture import (
     DIRECTIONS,

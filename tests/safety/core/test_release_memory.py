@@ -3,10 +3,10 @@
 import pytest
 
 from common.freshness import Latest
-from common.messages import Mileage
 from common.motion import STILL, Twist
 from services.safety.core.causes import Held
 from services.safety.core.release import COAST_NS, Leg, Release, sweep
+from t2.messages import Mileage
 
 REACH = 0.65
 BACK = Twist(-0.1)

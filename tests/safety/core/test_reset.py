@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from common.freshness import NS_PER_S
-from common.messages import ResetRequest
 from services.safety.core.causes import GOOD_SAMPLES, latched
 from services.safety.core.state import Reply
+from t2.messages import CauseName, ResetRequest
 from tests.factories import link
 from tests.safety.core.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit
 
@@ -165,7 +165,7 @@ class Latches(RuleBasedStateMachine):
         super().__init__()
         self.fixture = copy.copy(STOPPED)
         self.seen = self.fixture.latched()
-        self.held: set[str] = set()
+        self.held: set[CauseName] = set()
         self.zero_ns = 0  # of the newest request, if it is neutral
         self.was_neutral = False  # since the last latch
 

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S, Latest
-from common.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 from common.motion import Twist
 from common.settings import Place, Vehicle
 from services.safety.core.sonars import (
@@ -24,6 +23,7 @@ from services.safety.core.sonars import (
     updated,
 )
 from services.safety.report import _doubts
+from t2.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 from tests.safety.core.policy_fixture import FREE, NO_ECHO
 
 GOOD = Sonar(distance=1.0, fault="")

@@ -12,7 +12,6 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
-from common.messages import Drive, EstopKeepalive, KeepaliveState, Limit, LimitState
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
 from services.safety.config import LimitSource, Safety
 from services.safety.core.inputs import DriveRequest, KeepaliveRequest, LimitRequest
@@ -25,6 +24,7 @@ from services.safety.core.sources import (
     LimitChannel,
     SpeedLimits,
 )
+from t2.messages import Drive, EstopKeepalive, KeepaliveState, Limit, LimitState
 
 MS = NS_PER_S // 1000
 AGE_NS = 400 * MS

@@ -2,11 +2,11 @@
 
 import pytest
 
-from common.messages import Limit
 from common.motion import STILL
 from services.safety.config import LimitSource, Safety
 from services.safety.core.inputs import LimitRequest
 from services.safety.core.operator_requests import LET_GO
+from t2.messages import Limit
 from tests.safety.core.policy_fixture import PolicyFixture
 
 LEASE_S, LEASE_NS = 0.5, 500_000_000

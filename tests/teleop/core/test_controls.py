@@ -2,9 +2,7 @@
 
 import pytest
 
-from common.client import NEUTRAL, request
 from common.freshness import NS_PER_S
-from common.messages import Drive
 from common.motion import Twist
 from services.teleop.config import Teleop
 from services.teleop.core.controls import (
@@ -16,6 +14,8 @@ from services.teleop.core.controls import (
     shaped,
 )
 from services.teleop.core.hold import Press
+from t2.client import NEUTRAL, request
+from t2.messages import Drive
 from tests.teleop.inputs import PERIOD_NS, answer, stick
 
 SETTINGS = Teleop()

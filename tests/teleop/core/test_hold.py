@@ -5,11 +5,11 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
-from common.client import NEUTRAL, ZEROS
 from common.freshness import NS_PER_S
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
 from services.teleop.core.hold import RULES, Deadman, Keys, Press
+from t2.client import NEUTRAL, ZEROS
 
 
 def at(seconds: float) -> int:

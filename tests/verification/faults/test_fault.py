@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from common import motion
 from sim.trace import Command
+from t2 import messages
 from verification.faults.fault import STALL_S, Fault, Outcome, Row, Sample, unrequested
 
-RUN, STOP, BRAKE = motion.Command
+RUN, STOP, BRAKE = messages.Command
 FAULT = Fault("it", lambda _: 0, ("after a neutral",))
 
 
-def command(kind: motion.Command = RUN, linear: float = 0.8, angular: float = 0.0) -> Command:
+def command(kind: messages.Command = RUN, linear: float = 0.8, angular: float = 0.0) -> Command:
     return Command(mono_ns=0, kind=kind, linear=linear, angular=angular)
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import Struct, inspect
 
-from common import codec
+from t2 import codec
 from verification.fuzz.seeds import CORPUS, example, seeds
 from verification.fuzz.targets import KINDS, TARGETS
 

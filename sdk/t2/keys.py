@@ -11,7 +11,7 @@ from typing import Any, Generic, Literal, TypeVar
 import msgspec
 from msgspec import Struct
 
-from common import messages as m
+from t2 import messages as m
 
 ROOT = "t2/v1"
 

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import Struct
 
-from common.errors import MessageError
+from t2.errors import MessageError
 
 S = TypeVar("S", bound=Struct)
 
