@@ -9,7 +9,7 @@ that echoes of an earlier start are unknown.
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from t2.messages import SafetyState
+from t2.messages import Phrase, Phrases, SafetyState
 
 MAX_CALL_AGE_NS = NS_PER_S  # of an operator's call
 AHEAD = 20  # heartbeats (1 s) that a call may be ahead of the newest one received here
@@ -35,20 +35,17 @@ class Heartbeat(Struct, frozen=True):
         age_ns = self.age_ns(echo, now_ns)
         return age_ns is None or age_ns > max_age_ns
 
-    def refusal(self, echo: int | None, now_ns: int) -> str:
-        """Return why an operator's call with this echo is refused, as text; empty if accepted."""
+    def refusal(self, echo: int | None, now_ns: int) -> Phrases:
+        """Return why an operator's call with this echo is refused; empty if accepted."""
         if echo is None:
-            return (
-                "The call carries no echo of safety's heartbeat: send the newest "
-                "SafetyState.heartbeat as `echo`."
-            )
+            return (Phrase("call.no_echo"),)
         age_ns = self.age_ns(echo, now_ns)
         if age_ns is None:
-            return "The call echoes an unknown heartbeat of safety: look again, then repeat it."
+            return (Phrase("call.unknown_echo"),)
         if age_ns > MAX_CALL_AGE_NS:
             age_s, limit_s = age_ns / NS_PER_S, MAX_CALL_AGE_NS / NS_PER_S
-            return f"The call is {age_s:.1f} s old, allowed is {limit_s:g} s: repeat it."
-        return ""
+            return (Phrase("call.late", {"age": age_s, "limit": limit_s}),)
+        return ()
 
     def age_ns(self, echo: int, now_ns: int) -> int | None:
         """Return the time since a number was sent or received; None for an unknown one."""
@@ -69,8 +66,8 @@ class Echoes(Struct, frozen=True):
         heartbeat = self.heartbeat if state.boot == self.boot else Heartbeat()
         return Echoes(state.boot, heartbeat.noted(state.heartbeat, now_ns))
 
-    def refusal(self, echo: int | None, now_ns: int) -> str:
-        """Return why a call with this echo is refused, as text; empty if it is accepted.
+    def refusal(self, echo: int | None, now_ns: int) -> Phrases:
+        """Return why a call with this echo is refused; empty if it is accepted.
 
         A state may reach the operator's program before it comes here: an echo slightly ahead
         counts as the newest number, and has its age.

@@ -31,7 +31,8 @@ from common.settings import Shared
 from common.systemd import CHECK_PERIOD_S, Systemd
 from t2 import keys
 from t2.errors import LinkError, T2Error
-from t2.messages import MAX_TEXT, Durations, Event, EventName, Health, Level
+from t2.messages import MAX_TEXT, Durations, Event, EventName, Field, Health, Level, Phrase
+from t2.words import render
 
 STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
 QUERY_PERIOD_S = 0.02  # one query of each key
@@ -89,12 +90,15 @@ class Node(Generic[C]):
         self.loop.every(1.0, LinkWatch(self.drive, self.event).check)
         return self.drive
 
-    def event(
-        self, name: EventName, level: Level, text: str, **about: str | float | bool | None
-    ) -> None:
-        """Publish and log an event; texts are cut to the length that a message may have."""
+    def event(self, name: EventName, level: Level, *phrases: Phrase, **about: Field) -> None:
+        """Publish and log an event; without phrases it has the text of its name.
+
+        Texts are cut to the length that a message may have.
+        """
         cut = {key: v[:MAX_TEXT] if isinstance(v, str) else v for key, v in about.items()}
-        self._events.put(Event(name=name, level=level, text=text[:MAX_TEXT], about=cut))
+        phrases = phrases or (Phrase(f"event.{name}", cut),)
+        text = render(phrases)[:MAX_TEXT]
+        self._events.put(Event(name=name, level=level, text=text, phrases=phrases, about=cut))
         getattr(self.log, level)(text, event_name=name, **about)
 
     def announce(self) -> None:

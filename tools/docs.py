@@ -16,6 +16,7 @@ from services.metrics.samples import METRICS
 from services.safety.core.causes import RULES, Clears
 from t2 import keys
 from t2 import messages as m
+from t2.catalogue import CAUSES, EVENTS
 from tools import rights_table, settings_file
 from tools.fields import fields_of
 from verification.harness.results import filled, table
@@ -54,7 +55,7 @@ def generated() -> dict[Path, str]:
         "bus": bus,
         "safety": {"causes": causes()},
         "security": {"rights": rights_table.table()},
-        "operations": {"metrics": metrics()},
+        "operations": {"metrics": metrics(), "events": events()},
     }
     pages = {DOCS / f"{name}.md": tables for name, tables in blocks.items()}
     schemas = {DOCS / "schemas" / f"{kind.__name__}.json": schema(kind) for kind in kinds()}
@@ -125,10 +126,18 @@ def causes() -> str:
     """Return the table of safety's causes, most severe first."""
     rows = [
         (f"`{rule.name}`", rule.action.upper(), "yes" if rule.clears is Clears.RESET else "no",
-         CLEARED[rule.clears], rule.text)
+         CLEARED[rule.clears], CAUSES[rule.name].text[0])
         for rule in RULES
     ]  # fmt: skip
     return table(("cause", "action", "latched", "clears", "in words"), rows)
+
+
+def events() -> str:
+    """Return the table of events."""
+    rows = [
+        (row.services, f"`{row.name}`", row.levels, row.text[0], row.remedy[0]) for row in EVENTS
+    ]
+    return table(("service", "event", "level", "text", "what to do"), rows)
 
 
 def metrics() -> str:

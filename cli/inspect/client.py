@@ -26,7 +26,8 @@ from t2.client import DriveRequests, EstopRepetition, EstopStep, ResetCheck
 from t2.codec import Sample
 from t2.errors import T2Error
 from t2.keys import Call, Topic
-from t2.messages import Drive, Event, ResetDone, SafetyState, SourceMessage
+from t2.messages import Drive, Event, Phrase, ResetDone, SafetyState, SourceMessage
+from t2.words import render
 
 TICK_S = 0.05  # as ``t2.client`` expects
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
@@ -108,8 +109,12 @@ class SafetyClient:
 
     def report_stop(self, robot: str, user: str) -> None:
         """Publish the event of an emergency stop by this user."""
-        text = f"emergency stop requested by {user}"
-        event = Event(name="estop", level="warning", text=text, about={"by": user}, **self._stamp())
+        phrases, stamp = (Phrase("event.estop", {"by": user}),), self._stamp()
+        event = Event(
+            name="estop", level="warning", text=render(phrases), phrases=phrases,
+            about={"by": user},
+        )  # fmt: skip
+        event = replace(event, **stamp)
         key = keys.EVENTS.on(robot, service="estop")
         self.probe.put(key, codec.encode(event), codec.encoding(Event), keys.EVENTS.service)
 
@@ -154,7 +159,7 @@ class SafetyClient:
         if not answers:
             raise T2Error(f"{key}: {self._why_unanswered(call, key)}")
         if refusals := [answer.refusal for answer in answers if answer.refusal]:
-            raise T2Error(f"refused: {' '.join(refusals)}")
+            raise T2Error(f"refused: {' '.join(refusal.text for refusal in refusals)}")
         return answers
 
     def is_reset(self, seen: SafetyState, answers: Iterable[Answer]) -> bool:
@@ -177,4 +182,4 @@ class SafetyClient:
         """
         runs = services(self.probe, self.robot, call.server)
         barred = runs and not self.probe.has_server(key)
-        return not_allowed(call.server) if barred else no_answer(call.server)
+        return (not_allowed if barred else no_answer)(call.server).text

@@ -20,7 +20,8 @@ from t2 import codec
 from t2.codec import Sample
 from t2.errors import MessageError
 from t2.keys import ESTOP_CLASS, Call, Topic, estop_key
-from t2.messages import Message
+from t2.messages import Message, Phrase, Refusal
+from t2.words import render
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)
@@ -54,10 +55,11 @@ class Caller(Generic[R]):
             self._query.reply(self._key, codec.encode(message), encoding=encoding)
         self._query.drop()
 
-    def refuse(self, reason: str) -> None:
-        """Answer with the reason of the refusal."""
+    def refuse(self, *reasons: Phrase) -> None:
+        """Answer with the reasons of the refusal."""
         with contextlib.suppress(zenoh.ZError):
-            self._query.reply_err(reason.encode(), encoding="text/plain")
+            encoding = codec.encoding(Refusal)
+            self._query.reply_err(codec.encode(refusal(*reasons)), encoding=encoding)
         self._query.drop()
 
 
@@ -237,7 +239,7 @@ class Bus:
                 request = codec.decode(payload, call.request)
             except MessageError as error:
                 self.counters["undecodable"] += 1
-                caller.refuse(str(error))
+                caller.refuse(Phrase("call.invalid", {"reason": str(error)}))
                 return
             handler(request, caller)
 
@@ -269,12 +271,12 @@ class Bus:
         call: Call[Q, R],
         request: Q,
         on_reply: Callable[[R], None],
-        on_refusal: Callable[[str], None],
+        on_refusal: Callable[[Refusal], None],
         timeout_s: float = 2.0,
     ) -> None:
         """Make a call; exactly one of both handlers is called."""
         if self._session.zenoh is None:
-            self._hand_over(lambda: on_refusal("not connected to a router"))
+            self._hand_over(lambda: on_refusal(refusal(Phrase("call.not_connected"))))
             return
         ended = False
 
@@ -333,18 +335,18 @@ def _deliver(
     call: Call[Q, R],
     reply: zenoh.Reply | None,
     on_reply: Callable[[R], None],
-    on_refusal: Callable[[str], None],
+    on_refusal: Callable[[Refusal], None],
 ) -> None:
     """Call the handler that fits the reply to a call; None: there was none."""
     if reply is None:
         on_refusal(no_answer(call.server))
     elif reply.ok is None:
-        on_refusal(refusal_of(reply))
+        on_refusal(codec.refusal(reply.err.payload.to_bytes() if reply.err else b""))
     else:
         try:
             answer = codec.decode(reply.ok.payload.to_bytes(), call.reply)
         except MessageError as error:
-            on_refusal(str(error))
+            on_refusal(refusal(Phrase("call.invalid", {"reason": str(error)})))
         else:
             on_reply(answer)
 
@@ -379,25 +381,22 @@ def _subscriber(
 
 def is_timeout(reply: zenoh.Reply) -> bool:
     """Return whether a reply is Zenoh's own "Timeout", not a server's refusal."""
-    if reply.err is None or reply.err.encoding == zenoh.Encoding.TEXT_PLAIN:
-        return False
-    return reply.err.payload.to_bytes() == b"Timeout"
+    return reply.err is not None and reply.err.payload.to_bytes() == b"Timeout"
 
 
-def refusal_of(reply: zenoh.Reply) -> str:
-    """Return the reason of a refusal."""
-    reason = reply.err.payload.to_bytes() if reply.err else b""
-    return reason.decode(errors="replace") or "refused without a reason"
+def refusal(*reasons: Phrase) -> Refusal:
+    """Return the refusal of a call for these reasons."""
+    return Refusal(text=render(reasons), phrases=reasons)
 
 
-def no_answer(server: str) -> str:
-    """Return the text of a call without any answer."""
-    return f"{server} does not answer; run `t2 doctor`"
+def no_answer(server: str) -> Refusal:
+    """Return the refusal of a call without any answer."""
+    return refusal(Phrase("call.no_answer", {"service": server}))
 
 
-def not_allowed(server: str) -> str:
-    """Return the text of a call without any answer from a service whose messages arrive.
+def not_allowed(server: str) -> Refusal:
+    """Return the refusal of a call without any answer from a service whose messages arrive.
 
     A router whose access rules forbid a call drops it without an error.
     """
-    return f"no reply, though {server} runs: this certificate may not call it (see `t2 keys list`)"
+    return refusal(Phrase("call.not_allowed", {"service": server}))

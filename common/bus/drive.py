@@ -16,7 +16,7 @@ from common.drive_socket import check_router, prepare, socket_path
 from common.freshness import NS_PER_S
 from common.log import Logger
 from t2.keys import Topic
-from t2.messages import EventName, Level, Message
+from t2.messages import Message
 
 M = TypeVar("M", bound=Message)
 
@@ -68,9 +68,9 @@ class DriveLink:
 
 
 class LinkWatch:
-    """Reports that the other end of a drive link is missing, lost or back."""
+    """Reports that the other end of a drive link is missing, lost or back, by ``Node.event``."""
 
-    def __init__(self, link: DriveLink, event: Callable[[EventName, Level, str], None]) -> None:
+    def __init__(self, link: DriveLink, event: Callable[..., object]) -> None:
         self._link = link
         self._event = event
         self._was_up: bool | None = None  # None until the first connection
@@ -80,9 +80,9 @@ class LinkWatch:
         """Report what has changed since the last call."""
         up, other = self._link.connected, self._link.other
         if up and self._was_up is False:
-            self._event("drive_link_up", "info", f"the drive link to {other} is back")
+            self._event("drive_link_up", "info", other=other)
         if self._was_up and not up:
-            self._event("drive_link_lost", "error", f"the drive link to {other} is lost")
+            self._event("drive_link_lost", "error", other=other)
         self._was_up = up or (None if self._was_up is None else False)
         if up or self._since_ns is None:
             self._since_ns = now_ns

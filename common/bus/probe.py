@@ -15,13 +15,15 @@ import zenoh
 import zenoh.ext
 
 from common import clock
-from common.bus.bus import copied, is_timeout, refusal_of
+from common.bus.bus import copied, is_timeout
 from common.bus.publisher import QUERY_CONGESTION, qos
 from common.bus.session import check_files, client_config
 from common.settings import BusSettings
+from t2 import codec
 from t2.codec import Sample
 from t2.errors import LinkError
 from t2.keys import ClassOfService
+from t2.messages import Refusal
 
 MATCH_TIMEOUT_S = 1.0  # until the router has reported matching declarations
 QUEUE_MAX = 20_000  # samples queued for a slow reader; the oldest ones are dropped
@@ -30,12 +32,12 @@ POLL_PERIOD_S = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Answer to a query; ``refusal`` is the reason of a refusal."""
+    """Answer to a query, or its ``refusal``."""
 
     key: str
     payload: bytes
     encoding: str = ""
-    refusal: str = ""
+    refusal: Refusal | None = None
 
 
 class Probe:
@@ -199,4 +201,5 @@ def _answer(reply: zenoh.Reply) -> Answer:
     if reply.ok is not None:
         sample = reply.ok
         return Answer(str(sample.key_expr), sample.payload.to_bytes(), str(sample.encoding))
-    return Answer("", b"", refusal=refusal_of(reply))
+    payload = reply.err.payload.to_bytes() if reply.err else b""
+    return Answer("", b"", refusal=codec.refusal(payload))

@@ -7,6 +7,7 @@ import msgspec
 from msgspec import Struct
 
 from t2.errors import MessageError
+from t2.messages import Refusal
 
 S = TypeVar("S", bound=Struct)
 
@@ -29,6 +30,14 @@ def decode(payload: bytes, kind: type[S]) -> S:
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
         raise MessageError(f"not a {kind.__name__}: {error}") from None
     return message
+
+
+def refusal(payload: bytes) -> Refusal:
+    """Return the error reply to a call; another program's is taken as text."""
+    try:
+        return decode(payload, Refusal)
+    except MessageError:
+        return Refusal(text=payload.decode(errors="replace") or "refused without a reason")
 
 
 def encoding(kind: type[Struct]) -> str:

@@ -94,6 +94,20 @@ class Message(Struct, frozen=True, kw_only=True):
     host: int = 0  # identifies that clock: random per boot of the sender's host, 0 if unknown
 
 
+# A value of a phrase: a figure, a text, or a word of the catalogue; several words are a tuple.
+Field = Text | int | Number | bool | None | Annotated[tuple[Name, ...], Few]
+
+
+class Phrase(Struct, frozen=True, omit_defaults=True):
+    """A text by its name in the catalogue ``t2.catalogue``, and the fields of its template."""
+
+    name: Name
+    fields: Annotated[dict[Name, Field], Few] = {}
+
+
+Phrases = Annotated[tuple[Phrase, ...], Few]
+
+
 # --- tel/bridge -----------------------------------------------------------------------------
 
 
@@ -157,7 +171,8 @@ class Link(Message, frozen=True, kw_only=True):
     board: Name  # address:port
     epoch: int
     armed: bool  # whether the bridge would obey a RUN now
-    waiting: Text  # why it would not, as text; empty when armed
+    waiting: Text  # why it would not; empty when armed
+    waiting_phrases: Phrases = ()  # the same, for other languages
     rates: Annotated[dict[Name, Number], Few]  # frames by name, over the last second, Hz
     rejected: Counts  # frames and datagrams refused since start, by reason
     round_trip: Number | None  # s, the median of the last queries
@@ -194,7 +209,8 @@ class Cause(Struct, frozen=True, kw_only=True):
     name: CauseName
     action: Action
     age: Number  # s since it became active
-    text: Text  # text for the operator
+    text: Text  # for the operator
+    phrases: Phrases = ()  # the same, for other languages
     id: int = 0  # this occurrence, see ``ResetRequest.causes``; a new one for each occurrence
 
 
@@ -249,9 +265,11 @@ class SafetyState(Message, frozen=True, kw_only=True):
     source: Name | None  # the driving source
     limits: Limits
     heartbeat: int  # echoed by sources, see ``Drive.echo``
-    text: Text  # one sentence: why the vehicle may or may not move
+    text: Text  # why the vehicle may or may not move, and the next step
+    phrases: Phrases = ()  # the same, for other languages
     release: Release | None = None  # None while there is no contact
     release_refusal: Text = ""  # why the release that ``source`` requests does not move the vehicle
+    refusal_phrases: Phrases = ()  # the same, for other languages
     limit_sources: Annotated[tuple[LimitState, ...], Few] = ()  # those in the settings
     estop_keepalives: Annotated[tuple[KeepaliveState, ...], Few] = ()  # likewise
     doubted_sonars: Annotated[tuple[Name, ...], Few] = ()  # names of those that are not trusted
@@ -309,7 +327,8 @@ class Event(Message, frozen=True, kw_only=True):
     name: EventName
     level: Level
     text: Text
-    about: Annotated[dict[Name, Text | int | Number | bool | None], Few] = {}
+    phrases: Phrases = ()  # the same, for other languages
+    about: Annotated[dict[Name, Field], Few] = {}
 
 
 class Durations(Struct, frozen=True, kw_only=True):
@@ -375,10 +394,18 @@ class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 
+class Refusal(Struct, frozen=True, kw_only=True):
+    """The error reply to a call: why it was not carried out."""
+
+    text: Text
+    phrases: Phrases = ()  # the same, for other languages
+
+
 class Done(Struct, frozen=True, kw_only=True):
     """A call was carried out."""
 
     text: Text
+    phrases: Phrases = ()  # the same, for other languages
     boot: int = 0  # of the answering service; 0 if unknown
 
 

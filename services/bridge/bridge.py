@@ -192,12 +192,12 @@ class Bridge:
                     self._send(output)
                 case Publish(stream, message, raw):
                     self._publishers[stream].put(message, raw)
-                case Event(name, level, text, about):
-                    self._node.event(name, level, text, **about)
+                case Event(name, level, about, phrases):
+                    self._node.event(name, level, *phrases, **about)
                 case Reply(caller, reply):
                     caller.reply(reply)
-                case Refuse(caller, reason):
-                    caller.refuse(reason)
+                case Refuse(caller, reasons):
+                    caller.refuse(*reasons)
                 case Reacted(name, since_ns):
                     self._reactions[name].add(clock.now_ns() - since_ns)
 
@@ -218,9 +218,7 @@ class Bridge:
 
     def _on_no_guard(self) -> None:
         # Both are restarted together: a bridge without a guard must not drive.
-        self._node.event(
-            "guard_gone", "error", "the guard has died: the bridge stops the vehicle and exits"
-        )
+        self._node.event("guard_gone", "error")
         self._node.loop.stop()
 
     def _is_stopped(self) -> bool:

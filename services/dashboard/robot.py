@@ -172,7 +172,7 @@ class Robot:
             keys.RESET,
             reset_request(shown.value),
             answered,
-            lambda reason: notify("warning", reason, "reset_refused"),
+            lambda refusal: notify("warning", refusal.text, "reset_refused"),
         )
 
     # --- requests -----------------------------------------------------------------------------

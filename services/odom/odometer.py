@@ -14,6 +14,7 @@ from services.odom.core.estimator import Estimator
 from services.odom.core.pose import Pose
 from t2 import keys
 from t2 import messages as m
+from t2.words import done
 
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
 CHECK_S = 0.25  # between two checks for that
@@ -48,8 +49,7 @@ class Odometer:
     def _on_mileage(self, arrival: Arrival[m.Mileage]) -> None:
         self._counted_ns = arrival.received_ns
         if self._estimator.on_mileage(arrival.message, arrival.received_ns):
-            text = "the counters restarted: the pose is kept"
-            self._node.event("reanchored", "warning", text)
+            self._node.event("reanchored", "warning")
         self._estimate()
 
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
@@ -58,13 +58,14 @@ class Odometer:
     def _on_set_pose(self, request: m.PoseRequest, caller: Caller[m.Done]) -> None:
         late = self._echoes.refusal(request.echo, clock.now_ns())
         if late:
-            caller.refuse(late)
+            caller.refuse(*late)
             return
         pose = Pose(request.x, request.y, request.heading)
         self._estimator.place(pose, clock.now_ns())
-        text = f"pose set to x {request.x:.3f} m, y {request.y:.3f} m, {request.heading:.3f} rad"
-        self._node.event("pose_set", "info", text, epoch=self._estimator.epoch)
-        caller.reply(m.Done(text=text, boot=self._node.bus.boot))
+        fields: dict[str, m.Field] = {"x": request.x, "y": request.y, "heading": request.heading}
+        phrase = m.Phrase("pose.set", fields)
+        self._node.event("pose_set", "info", phrase, epoch=self._estimator.epoch)
+        caller.reply(done(phrase, boot=self._node.bus.boot))
 
     def _estimate(self) -> None:
         now_ns = clock.now_ns()
@@ -75,19 +76,18 @@ class Odometer:
         self._to_odometry.put(odometry)
         if self._silent:
             self._silent = False
-            self._node.event("velocity_back", "info", "velocities are received")
+            self._node.event("velocity_back", "info")
         self._report_slip(odometry)
 
     def _check_silence(self, now_ns: int) -> None:
         if self._silent or now_ns - self._estimated_ns < SILENT_NS:
             return
         self._silent = True
-        self._node.event("silent", "warning", "no velocities: no odometry is published")
+        self._node.event("silent", "warning")
 
     def _report_slip(self, odometry: m.Odometry) -> None:
         if odometry.slip and not self._slip:
-            text = "counters and velocities disagree: wheels slip, or a unit is wrong"
-            self._node.event("slip", "warning", text, residual=odometry.residual)
+            self._node.event("slip", "warning", residual=odometry.residual)
         elif self._slip and not odometry.slip:
-            self._node.event("slip_over", "info", "counters and velocities agree again")
+            self._node.event("slip_over", "info")
         self._slip = odometry.slip

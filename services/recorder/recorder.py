@@ -14,7 +14,7 @@ from services.recorder.writer import RecordingWriter, RollingWriter
 from t2 import codec, keys
 from t2.codec import Sample
 from t2.errors import MessageError
-from t2.messages import SafetyState
+from t2.messages import Phrase, SafetyState
 
 # `**` does not match chunks that begin with "@": two expressions cover all keys.
 EVERYTHING = ("**", "@cmd/**")
@@ -72,8 +72,8 @@ class Recorder:
         if causes and self._storage.has_room:
             self._black_box.trigger(causes, sample.received_ns)
         elif causes:
-            text = f"{', '.join(causes)} latched, and the black box is not written"
-            self._node.event("black_box_lost", "error", f"{text}: {self._storage.problem}")
+            problem = self._storage.problem
+            self._node.event("black_box_lost", "error", causes=tuple(causes), problem=problem)
 
     def _flush(self, now_ns: int) -> None:
         self._on_disk(self._black_box.flush)
@@ -88,17 +88,19 @@ class Recorder:
         if had_room and not self._storage.has_room:
             self._stop()
         elif not had_room and self._storage.has_room:
-            self._node.event("disk_room", "info", "the disk has room again: recording continues")
+            self._node.event("disk_room", "info")
 
     def _report_removed(self, removed: list[StoredFile]) -> None:
         self._node.counters["removed"] += len(removed)
-        freed = sum(each.size for each in removed) / MB
-        text = f"{len(removed)} of the oldest recordings removed to free {freed:.0f} MB"
-        self._node.event("recordings_removed", "warning", text, first=removed[0].name)
+        megabytes = sum(each.size for each in removed) / MB
+        count, first = len(removed), removed[0].name
+        self._node.event(
+            "recordings_removed", "warning", count=count, megabytes=megabytes, first=first
+        )
 
     def _stop(self) -> None:
-        text = f"no room for recordings: {self._storage.problem}"
-        self._node.event("disk_full", "error", text, folder=str(self._storage.folder))
+        folder, problem = str(self._storage.folder), self._storage.problem
+        self._node.event("disk_full", "error", folder=folder, problem=problem)
         for close in (self._black_box.finish, self._rolling.close):
             try:
                 close()
@@ -124,8 +126,9 @@ class Recorder:
         path, messages = str(recording.path), recording.messages
         if "-latch-" in recording.path.name:
             # From any folder it can be pasted after `t2 report`.
-            text = f"black box written to {shlex.quote(str(recording.path.absolute()))}"
-            self._node.event("black_box", "info", text, file=path, messages=messages)
+            quoted = shlex.quote(str(recording.path.absolute()))
+            phrase = Phrase("event.black_box", {"file": quoted})
+            self._node.event("black_box", "info", phrase, file=path, messages=messages)
         else:
             self._node.log.info("recorded", file=path, messages=messages)
 

@@ -96,7 +96,10 @@ class Calls:
             self._resets.append((answer, check, done.text))
 
         self._node.bus.call(
-            keys.RESET, reset_request(state), answered, lambda reason: answer((False, reason))
+            keys.RESET,
+            reset_request(state),
+            answered,
+            lambda refused: answer((False, refused.text)),
         )
 
     def _parameters(

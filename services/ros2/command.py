@@ -78,35 +78,20 @@ class Twist(NamedTuple):
 class Refusal(NamedTuple):
     """Why a command is not passed on."""
 
-    name: str  # for counters and events
-    text: str
+    name: str  # for counters; its text in the catalogue is ``cmd_vel.NAME``
     is_neutral: bool = False  # whether safety gets a neutral request instead
 
 
-OUT_OF_ORDER = Refusal("out_of_order", "A command arrived again, or after a later one.")
-HELD_BACK = Refusal(
-    "held_back",
-    "A command took over 0.2 s longer than the fastest of its publisher. The network held it back, "
-    "or the publisher's clock was set: restart that node.",
-)
-SETTLING = Refusal(
-    "settling", "A publisher begins, or its delay changes. Its commands are taken after 0.5 s."
-)
+OUT_OF_ORDER = Refusal("out_of_order")
+HELD_BACK = Refusal("held_back")
+SETTLING = Refusal("settling")
 BEGINS = SETTLING._replace(is_neutral=True)
 SETTLES = SETTLING._replace(is_neutral=True)
-SECOND_PUBLISHER = Refusal("second_publisher", "Another publisher drives. One at a time may.")
-NOT_PAUSED = Refusal(
-    "not_paused",
-    "A publisher commanded motion while the robot was not allowed to move or another one drove, or "
-    "the network interrupted it. Stop publishing for 0.5 s, then publish again.",
-)
-NOT_ZERO = Refusal("not_zero", 'ros2.neutral is "zero": publish zero before motion.')
-NOT_FINITE = Refusal("not_finite", "A command has a number that is not finite, or over 1e9.")
-OTHER_AXES = Refusal(
-    "other_axes",
-    "A command asks for motion other than linear.x and angular.z. The vehicle cannot drive "
-    "sideways through this interface.",
-)
+SECOND_PUBLISHER = Refusal("second_publisher")
+NOT_PAUSED = Refusal("not_paused")
+NOT_ZERO = Refusal("not_zero")
+NOT_FINITE = Refusal("not_finite")
+OTHER_AXES = Refusal("other_axes")
 
 
 # Causes that stop, and after which safety wants no neutral request.

@@ -14,12 +14,12 @@ from services.ros2.command import MAX_PUBLISHERS, SOURCE, Commands, Refusal, Twi
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
+from t2.messages import Field, Phrase
+from t2.words import render
 
 REPORT_NS = NS_PER_S
 TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "twist": "geometry_msgs/msg/Twist"}
-OTHER_TYPE = Refusal(
-    "other_type", "A node publishes cmd_vel with another type than that of ros2.cmd_vel."
-)
+OTHER_TYPE = Refusal("other_type")
 
 
 class Gateway:
@@ -61,14 +61,14 @@ class Gateway:
         if decided.neutral_first:
             self._drive.request(0.0, 0.0)
         self._drive.request(decided.linear, decided.angular)
-        self._note(translate.OK, "taken", "Taken.", about.gid)
+        self._note(translate.OK, Phrase("cmd_vel.taken"), about.gid)
 
     def _unreadable(self, reason: str) -> None:
-        self._refuse(Refusal("unreadable", f"A command cannot be read: {reason}."), b"")
+        self._refuse(Refusal("unreadable"), b"", reason=reason)
 
-    def _refuse(self, refusal: Refusal, publisher: bytes) -> None:
+    def _refuse(self, refusal: Refusal, publisher: bytes, **fields: Field) -> None:
         self._node.counters[f"cmd_vel_{refusal.name}"] += 1
-        self._note(translate.WARN, refusal.name, refusal.text, publisher)
+        self._note(translate.WARN, Phrase(f"cmd_vel.{refusal.name}", fields), publisher)
 
     def _is_new(self, publisher: bytes, decision: str) -> bool:
         """Return whether it is not the last one; each of a publisher counts once a second."""
@@ -81,9 +81,10 @@ class Gateway:
         reported[decision] = now_ns
         return True
 
-    def _note(self, level: int, decision: str, text: str, publisher: bytes) -> None:
+    def _note(self, level: int, phrase: Phrase, publisher: bytes) -> None:
         """Show a decision in the diagnostics; log a new one, and report a new refusal."""
         sender = self._publishers.get(publisher, "unknown")
+        decision, text = phrase.name.partition(".")[2], render((phrase,))
         values = {"reason": decision, "publisher": sender}
         self._diagnostics.note(translate.status(level, "cmd_vel", text, values), clock.now_ns())
         if not self._is_new(publisher, decision):
@@ -91,7 +92,7 @@ class Gateway:
         logged = f"cmd_vel of {sender} ({decision}): {text}"
         self._log.put(translate.log(time.time_ns(), level, logged))
         if level == translate.WARN:
-            self._node.event("cmd_vel_refused", "warning", text, **values)
+            self._node.event("cmd_vel_refused", "warning", phrase, **values)
 
     def _on_token(self, token: str, appeared: bool) -> None:
         """Keep the nodes that publish commands."""

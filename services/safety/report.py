@@ -1,4 +1,4 @@
-"""Reports: the published state with its texts, and transitions as events."""
+"""Reports: the published state, and transitions as events."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -20,9 +20,12 @@ from t2.messages import (
     EventName,
     Level,
     Limits,
+    Phrase,
+    Phrases,
     Release,
     SafetyState,
 )
+from t2.words import render
 
 MOVING = ("run", "slow")
 OPPOSITE: dict[Direction | None, Direction] = {"forward": "backward", "backward": "forward"}
@@ -31,13 +34,13 @@ EVENT_NAMES: dict[CauseName, EventName] = {
     "driver_left": "driver_fault",
     "driver_right": "driver_fault",
 }
-# What the operator does about a latched cause that is still present, before a reset.
-STILL_PRESENT = {
-    "estop": "It is still pressed or requested: release it, then reset.",
-    "estop_keepalive": "Start its program again, then reset.",
+# The next step at a latched cause that is still present, before a reset.
+STILL_PRESENT: dict[CauseName, Phrase] = {
+    "estop": Phrase("next.estop"),
+    "estop_keepalive": Phrase("next.estop_keepalive"),
 }
-MOVE_OFF = "It is still pressed: move off first, then reset."
-RESET_OTHERS = "It is still pressed: reset first, then move off."
+MOVE_OFF = Phrase("next.move_off")
+RESET_OTHERS = Phrase("next.reset_others")
 
 
 class Transition(Struct, frozen=True):
@@ -45,22 +48,14 @@ class Transition(Struct, frozen=True):
 
     name: EventName
     level: Level
-    text: str
+    phrases: Phrases
     about: dict[str, str | None]
 
 
 def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
     """Return the published state, with the heartbeat of ``state``."""
-    causes = tuple(
-        Cause(
-            name=name,
-            action=BY_NAME[name].action,
-            age=(now_ns - state.latches[name].since_ns) / NS_PER_S,
-            text=text(state, name),
-            id=state.latches[name].id,
-        )
-        for name in ordered(state.latches)
-    )
+    causes = tuple(_cause(state, name, now_ns) for name in ordered(state.latches))
+    phrases = summary(state, by_hand=bool(spent(state, policy.settings)))
     return SafetyState(
         verdict=state.verdict.name,
         latched=latched(state.latches),
@@ -68,9 +63,11 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         source=state.verdict.source,
         limits=_limits(policy, state, now_ns),
         heartbeat=state.heartbeat.number,
-        text=sentence(state, by_hand=bool(spent(state, policy.settings))),
+        text=render(phrases),
+        phrases=phrases,
         release=_release(policy, state, now_ns) if "contact" in state.latches else None,
-        release_refusal=state.release.refusal,
+        release_refusal=render(state.release.refusal),
+        refusal_phrases=state.release.refusal,
         estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
         doubted_sonars=tuple(
@@ -81,28 +78,39 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
     )
 
 
-def sentence(state: State, *, by_hand: bool = False) -> str:
-    """Return one sentence: why the vehicle does or does not move.
+def _cause(state: State, name: CauseName, now_ns: int) -> Cause:
+    held, phrases = state.latches[name], described(state, name)
+    return Cause(
+        name=name,
+        action=BY_NAME[name].action,
+        age=(now_ns - held.since_ns) / NS_PER_S,
+        text=render(phrases),
+        phrases=phrases,
+        id=held.id,
+    )
+
+
+def summary(state: State, *, by_hand: bool = False) -> Phrases:
+    """Return why the vehicle does or does not move, and the next step.
 
     ``by_hand`` means that no release may move the vehicle off a pressed bumper any more.
     """
     names = ordered(state.latches)
     if state.verdict.command is RUN:
-        control = _source_text(state.verdict.source)
-        slowing = [text(state, n) for n in names if BY_NAME[n].action == "slow"]
-        return " ".join([*slowing[:1], control])
+        slowing = [described(state, name) for name in names if BY_NAME[name].action == "slow"]
+        return *(slowing[0] if slowing else ()), _control(state.verdict.source)
     worst = names[0]
-    why = text(state, worst)
+    why = described(state, worst)
     if worst not in latched(state.latches):
         return why
     if state.latches[worst].good >= GOOD_SAMPLES:
-        return f"{why} Reset to go on."
+        return *why, Phrase("next.reset")
     if worst == "contact":
-        return f"{why} {_way_off(state, by_hand=by_hand)}"
-    return f"{why} {STILL_PRESENT.get(worst, 'The cause is still present: fix it, then reset.')}"
+        return *why, _way_off(state, by_hand=by_hand)
+    return *why, STILL_PRESENT.get(worst, Phrase("next.fix"))
 
 
-def _way_off(state: State, *, by_hand: bool) -> str:
+def _way_off(state: State, *, by_hand: bool) -> Phrase:
     """Return the next step at a pressed bumper, as safety accepts it."""
     if by_hand:
         return BY_HAND
@@ -110,53 +118,49 @@ def _way_off(state: State, *, by_hand: bool) -> str:
     return RESET_OTHERS if len(latched(state.latches)) > 1 else MOVE_OFF
 
 
-def text(state: State, name: CauseName) -> str:
-    """Return the text of a held cause; that of the newest decision for a cause of planning."""
-    verdict, default = state.verdict, state.latches[name].text
+def described(state: State, name: CauseName) -> Phrases:
+    """Return the phrases of a held cause; of the newest decision for a cause of planning."""
+    verdict, default = state.verdict, state.latches[name].phrases
     match name:
         case "neutral":
-            return _overruled_text(state, verdict.source) or default
+            return _overruled(state, verdict.source) or default
         case "blocked" if verdict.blocked_by is not None:
-            return _blocked_text(state, verdict.blocked_by)
+            return _blocked(state, verdict.blocked_by)
         case "obstacle" if verdict.slowed_by is not None:
-            return _slowed_text(state, verdict.slowed_by)
+            return _slowed(state, verdict.slowed_by)
         case "limit" if verdict.limited_by:
             because = state.speed_limits.channels[verdict.limited_by].because
-            return f"Slowed by {verdict.limited_by}{because}."
+            return (Phrase("limit.by", {"source": f"{verdict.limited_by}{because}"}),)
         case "sonar":
-            return f"Sonar not trusted: {_doubts(state.sonar_array.sonars)}."
+            return _doubts(state.sonar_array.sonars)
         case _:
             return default
 
 
-def _overruled_text(state: State, source: str | None) -> str:
-    """Return a text when another source overruled the requesting one; otherwise empty."""
+def _overruled(state: State, source: str | None) -> Phrases:
+    """Return that another source overruled the requesting one; otherwise empty."""
     channel = state.arbiter.channels.get(source or "")
     if channel is None or not channel.overruled_by:
-        return ""
-    return f"{channel.overruled_by} was in control: {source} needs a neutral request first."
+        return ()
+    return (Phrase("neutral.overruled", {"other": channel.overruled_by, "source": source}),)
 
 
-def _blocked_text(state: State, sonar: int) -> str:
-    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
+def _blocked(state: State, sonar: int) -> Phrases:
+    name, one = SONAR_NAMES[sonar], state.sonar_array.sonars[sonar]
     if not one.fault:
-        return f"No room toward the {name}: {one.distance:.2f} m."
-    past = ""
-    if sonar in state.sonar_array.unseen and "release" not in state.latches:
-        past = " An operator can creep past: release the controls, then drive."
-    return f"No motion toward the {name}: that sonar is {one.fault}.{past}"
+        return (Phrase("blocked.near", {"sonar": name, "distance": one.distance}),)
+    why = Phrase("blocked.untrusted", {"sonar": name, "fault": one.fault})
+    passable = sonar in state.sonar_array.unseen and "release" not in state.latches
+    return (why, Phrase("blocked.creep_past")) if passable else (why,)
 
 
-def _slowed_text(state: State, sonar: int) -> str:
-    name, one = SONAR_NAMES[sonar].replace("_", " "), state.sonar_array.sonars[sonar]
+def _slowed(state: State, sonar: int) -> Phrases:
+    name, one = SONAR_NAMES[sonar], state.sonar_array.sonars[sonar]
     if one.fault:
-        return f"Creeping toward the {name}: that sonar is {one.fault} and sees nothing there."
+        return (Phrase("obstacle.untrusted", {"sonar": name, "fault": one.fault}),)
     if one.suspect:
-        return (
-            f"Creeping toward the {name}: that sonar still shows {one.same:.2f} m although the "
-            "vehicle moved."
-        )
-    return f"Slowed by an obstacle at {one.distance:.2f} m ({name})."
+        return (Phrase("obstacle.suspect", {"sonar": name, "distance": one.same}),)
+    return (Phrase("obstacle.near", {"sonar": name, "distance": one.distance}),)
 
 
 def _doubted(sonars: tuple[Sonar, ...]) -> dict[str, str]:
@@ -165,12 +169,14 @@ def _doubted(sonars: tuple[Sonar, ...]) -> dict[str, str]:
     return {name: doubt for name, doubt in zip(SONAR_NAMES, doubts, strict=True) if doubt}
 
 
-def _doubts(sonars: tuple[Sonar, ...]) -> str:
-    """Return the untrusted sonars as text."""
+def _doubts(sonars: tuple[Sonar, ...]) -> Phrases:
+    """Return which sonars are not trusted, and why."""
     found = _doubted(sonars)
     if len(found) == len(sonars) and len(reasons := set(found.values())) == 1:
-        return f"all {reasons.pop()}"
-    return ", ".join(f"{name.replace('_', ' ')} {doubt}" for name, doubt in found.items())
+        return (Phrase("sonar.all", {"fault": reasons.pop()}),)
+    return tuple(
+        Phrase("sonar.one", {"sonar": name, "fault": doubt}) for name, doubt in found.items()
+    )
 
 
 def signature(state: State) -> tuple[object, ...]:
@@ -186,28 +192,27 @@ def transitions(before: State, after: State) -> Iterator[Transition]:
     tripped = [name for name in latched(after.latches) if _is_new(before, after, name)]
     for name in tripped:
         event: Any = EVENT_NAMES.get(name, name)  # a latched cause has an event of its name
-        yield Transition(event, "error", after.latches[name].text, {"cause": name})
+        yield Transition(event, "error", after.latches[name].phrases, {"cause": name})
     worst = next(iter(ordered(after.latches)), None)
     # A cause that latches, and a release, have events of their own.
     is_stop = old.name in MOVING and new.name not in MOVING and "release" not in before.latches
     if is_stop and worst and worst not in tripped:
         level: Level = "info" if worst in ("no_request", "neutral") else "warning"
-        yield Transition("stop", level, sentence(after), {"cause": worst, "verdict": new.name})
+        yield Transition("stop", level, summary(after), {"cause": worst, "verdict": new.name})
     # The end of control is worth an event of its own only while no latch is the reason.
     if old.control != new.control and (new.control or not latched(after.latches)):
         yield Transition(
-            "source", "info", _source_text(new.control), {"from": old.control, "to": new.control}
+            "source", "info", (_control(new.control),), {"from": old.control, "to": new.control}
         )
     if ("release" in before.latches) != ("release" in after.latches):
-        began = "release" in after.latches
-        what = "Creeping off the bumper." if began else "No longer creeping off the bumper."
-        yield Transition("release" if began else "release_end", "warning", what, {})
+        edge: EventName = "release" if "release" in after.latches else "release_end"
+        yield Transition(edge, "warning", (Phrase(f"event.{edge}"),), {})
     yield from _release_events(before.release.refusal, after.release.refusal)
     if (reply := new.reply) is not None:
         if reply.done:
-            yield Transition("reset", "info", reply.text, {})
+            yield Transition("reset", "info", reply.phrases, {})
         else:
-            yield Transition("reset_refused", "warning", reply.text, {})
+            yield Transition("reset_refused", "warning", reply.phrases, {})
 
 
 def _is_new(before: State, after: State, name: CauseName) -> bool:
@@ -219,7 +224,7 @@ def _is_new(before: State, after: State, name: CauseName) -> bool:
     return known is None or (known.id != after.latches[name].id and name != "estop")
 
 
-def _release_events(before: str, after: str) -> Iterator[Transition]:
+def _release_events(before: Phrases, after: Phrases) -> Iterator[Transition]:
     """Yield the first refusal of a request; its text may change while the key is held."""
     if after == BUMPER_FREE != before:
         yield Transition("release_free", "info", after, {})
@@ -227,8 +232,8 @@ def _release_events(before: str, after: str) -> Iterator[Transition]:
         yield Transition("release_refused", "warning", after, {})
 
 
-def _source_text(source: str | None) -> str:
-    return f"{source} is in control." if source else "No source is in control."
+def _control(source: str | None) -> Phrase:
+    return Phrase("control.of", {"source": source}) if source else Phrase("control.none")
 
 
 def _release(policy: Policy, state: State, now_ns: int) -> Release:

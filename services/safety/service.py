@@ -36,10 +36,12 @@ from t2.messages import (
     Bumper,
     Message,
     Motion,
+    Phrase,
     ResetDone,
     ResetRequest,
     SafetyState,
 )
+from t2.words import render
 
 M = TypeVar("M", bound=Message)
 
@@ -169,19 +171,25 @@ class SafetyService:
 
     def _on_reset(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         if not self._may_reset:
-            caller.refuse("Another reset is being decided: try again.")
+            caller.refuse(Phrase("reset.pending"))
             return
         self._may_reset = False
 
         def answer(reply: Reply) -> None:
             if not reply.done:
-                caller.refuse(reply.text)
+                caller.refuse(*reply.phrases)
                 return
             # The state published right after this is the first one that shows the effect.
             heartbeat = self._state.heartbeat.number + 1
             boot = self._node.bus.boot
             caller.reply(
-                ResetDone(text=reply.text, boot=boot, heartbeat=heartbeat, cleared=reply.cleared)
+                ResetDone(
+                    text=render(reply.phrases),
+                    phrases=reply.phrases,
+                    boot=boot,
+                    heartbeat=heartbeat,
+                    cleared=reply.cleared,
+                )
             )
 
         self._decide(request, answer)
@@ -230,7 +238,9 @@ class SafetyService:
                 if now_ns - self._refused_ns < NS_PER_S:
                     continue
                 self._refused_ns = now_ns
-            self._node.event(transition.name, transition.level, transition.text, **transition.about)
+            self._node.event(
+                transition.name, transition.level, *transition.phrases, **transition.about
+            )
 
     def _publish_state(self, now_ns: int) -> None:
         self._state = replace(self._state, heartbeat=self._state.heartbeat.beat(now_ns))

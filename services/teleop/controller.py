@@ -29,7 +29,6 @@ from services.teleop.core.controls import (
 )
 from services.teleop.core.hold import Press
 from services.teleop.core.keystroke import no_function
-from services.teleop.core.round_trip import ADVICE
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import LINES, EventLog, View
 from t2 import keys
@@ -42,7 +41,7 @@ from t2.client import (
     ResetCheck,
     reset_request,
 )
-from t2.messages import Drive, Event, EventName, ResetDone, SafetyState
+from t2.messages import Drive, Event, EventName, Field, Phrase, Refusal, ResetDone, SafetyState
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 WAIT_TICKS = round(ESTOP_WAIT_S / PERIOD_S) + 1  # its age ends it first
@@ -127,7 +126,7 @@ class Controller:
         elif action is Action.RESET:
             self._start_reset(press.shown, self._state(now_ns))
         elif action is Action.SLOW:
-            self._report_slow(self.terminal.refusal(press.at_ns))
+            self._report("terminal_slow", *self.terminal.refusal(press.at_ns))
         self._report_key(press.key, action)
 
     def _report_key(self, key: str, action: Action) -> None:
@@ -161,8 +160,7 @@ class Controller:
         was_silent = self._controls.is_silent
         self._requested = self._controls.tick(self._read_stick(now_ns), now_ns)
         if was_silent and not self._controls.is_silent and (other := self._contest.other):
-            text = f"{self._operator} requests motion while {other} is in control"
-            self._node.event("take_over", "info", text)
+            self._node.event("take_over", "info", by=self._operator, other=other)
         if self._requested is not None:
             self._source.put(self._requested)
         self._repeat_estop(state, now_ns)
@@ -173,7 +171,7 @@ class Controller:
         """Release the controls by the rules of ``hold``, so that nothing old moves the vehicle."""
         # A program that was suspended has a fresh state at once, and controls from before.
         unheard_s = (now_ns - (self._heard_ns or now_ns)) / NS_PER_S
-        self._enforce("unheard", unheard_s > UNHEARD_S, UNHEARD, now_ns)
+        self._enforce("unheard", unheard_s > UNHEARD_S, now_ns, seconds=1.0)
         if state is not None:
             self._heard_ns = now_ns
         contest = self._contest
@@ -182,40 +180,33 @@ class Controller:
             self._overruled_by = contest.other
         elif contest.other is None and not self._controls.is_muted(now_ns):
             self._overruled_by = None
-        text = f"overruled by {contest.other}: controls released"
-        self._enforce("overruled", contest.is_lost, text, now_ns)
+        self._enforce("overruled", contest.is_lost, now_ns, other=contest.other)
         if not (reason := self.terminal.refusal(now_ns)):
             self._reported.discard("terminal_slow")
         elif self._controls.holds_keys(now_ns):
             self._controls.enforce("terminal_slow", now_ns)
-            self._report_slow(reason)
+            self._report("terminal_slow", *reason)
 
-    def _enforce(self, rule: EventName, is_broken: bool, text: str, now_ns: int) -> None:
+    def _enforce(self, rule: EventName, is_broken: bool, now_ns: int, **about: Field) -> None:
         if is_broken:
             self._controls.enforce(rule, now_ns)
-            self._report(rule, text)
+            self._report(rule, **about)
         else:
             self._reported.discard(rule)
 
-    def _report(self, rule: EventName, text: str) -> None:
+    def _report(self, rule: EventName, *phrases: Phrase, **about: Field) -> None:
         """Report a rule once, until it holds again."""
         if rule not in self._reported:
             self._reported.add(rule)
-            self._node.event(rule, "warning", text)
-
-    def _report_slow(self, reason: str) -> None:
-        self._report("terminal_slow", f"keys ignored: {reason}; {ADVICE}")
+            self._node.event(rule, "warning", *phrases, **about)
 
     def _read_stick(self, now_ns: int) -> Stick | None:
         before = self._gamepad.status
         stick = self._gamepad.read()
         if self._gamepad.status != before:
-            self._node.event("gamepad", "info", f"gamepad: {self._gamepad.status}")
+            self._node.event("gamepad", "info", device=self._gamepad.status)
         if self._controls.is_gamepad_silent:
-            self._report("gamepad_silent", (
-                "gamepad released: deflected, and its reading is unchanged for "
-                f"{self._settings.gamepad_silence:g} s; "
-                "release the deadman, then press it again"))  # fmt: skip
+            self._report("gamepad_silent", seconds=self._settings.gamepad_silence)
         else:
             self._reported.discard("gamepad_silent")
         self._report_ignored(self._gamepad.ignored)
@@ -243,7 +234,7 @@ class Controller:
         self._estop.start(state, ESTOP_TICKS if self._leaving else WAIT_TICKS)
         self._estop_ns, self._estop_sent, self._lapsed = now_ns, self._bus.connected, ""
         if not is_known:
-            self._node.event("estop", "warning", f"emergency stop requested by {self._operator}")
+            self._node.event("estop", "warning", by=self._operator)
 
     def _repeat_estop(self, state: SafetyState | None, now_ns: int) -> None:
         """Repeat a stop until it is confirmed or too old; a suspended program sends no old one."""
@@ -268,7 +259,7 @@ class Controller:
         if not self._unconfirmed:
             self._unconfirmed = True
             name: EventName = "estop_denied" if self._source.denied else "estop_unconfirmed"
-            self._node.event(name, "error", self.unconfirmed)
+            self._node.event(name, "error")
 
     @property
     def unconfirmed(self) -> str:
@@ -290,12 +281,12 @@ class Controller:
         if self._reset is not None and not self._reset.is_answered:
             return  # a held key repeats
         self._reset = check = ResetCheck(shown)
-        self._node.event("reset_request", "info", f"reset requested by {self._operator}")
+        self._node.event("reset_request", "info", by=self._operator)
         self._bus.call(
             keys.RESET,
             replace(reset_request(shown), echo=newest.heartbeat),
             lambda done: self._reset_answered(check, done),
-            lambda reason: self._reset_refused(check, reason),
+            lambda refusal: self._reset_refused(check, refusal),
             timeout_s=RESET_TIMEOUT_S,
         )
 
@@ -303,12 +294,12 @@ class Controller:
         check.answer(done)
         self._event_log.add("safety", "info", done.text)
 
-    def _reset_refused(self, check: ResetCheck, reason: str) -> None:
+    def _reset_refused(self, check: ResetCheck, refusal: Refusal) -> None:
         if self._reset is check:
             self._reset = None
-        if reason == no_answer("safety") and self._source.denied:
-            reason = not_allowed("safety")
-        self._event_log.add("safety", "warning", reason)
+        if refusal == no_answer("safety") and self._source.denied:
+            refusal = not_allowed("safety")
+        self._event_log.add("safety", "warning", refusal.text)
 
     def _check_reset(self, state: SafetyState | None, now_ns: int) -> None:
         """Report an unconfirmed reset."""
@@ -316,7 +307,7 @@ class Controller:
         if outcome is not None:
             self._reset = None
         if outcome is False:
-            self._node.event("reset_unconfirmed", "error", NOT_CONFIRMED)
+            self._node.event("reset_unconfirmed", "error")
 
     # --- the view -----------------------------------------------------------------------------
 
@@ -327,8 +318,7 @@ class Controller:
             self._event_log.add(service, event.level, event.text, event)
 
     def _report_denied(self) -> None:
-        text = "NOT ALLOWED: the router drops our requests; this certificate may only watch"
-        self._node.event("barred", "error", text)
+        self._node.event("barred", "error")
 
     def _on_message(self, name: str, arrival: Arrival[Any]) -> None:
         self._latest[name] = Latest(arrival.message, arrival.received_ns)

@@ -27,7 +27,7 @@ def build(node: Node[Shared]) -> None:
     node.loop.every(0.05, tick)
     node.is_stopped = lambda: kind != "restless"
     node.counters["resets"] += 1
-    node.event("gamepad", "info", "all is built", count=3)
+    node.event("gamepad", "info", device="pad")
 
 
 if __name__ == "__main__":

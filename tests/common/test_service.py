@@ -131,10 +131,10 @@ def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
     buses.bus(witness.declare)
     wait_until(lambda: witness.events, "the event")
     assert witness.events[0].name == "gamepad"
-    assert witness.events[0].about == {"count": 3}
+    assert witness.events[0].about == {"device": "pad"}
     logged = [json.loads(line) for line in log.read_text().splitlines() if "event_name" in line]
     assert [(e["event"], e["event_name"], e["level"]) for e in logged] == [
-        ("all is built", "built", "info")
+        ("Gamepad: pad.", "gamepad", "info")
     ]
 
 
@@ -231,10 +231,13 @@ def test_systemd_learns_that_it_is_ready_and_lives_from_its_loop_and_that_it_sto
 
 
 def test_a_long_text_of_an_event_is_cut(node: Node[Shared]) -> None:
-    node.event("disk_full", "error", "x" * 5000, folder="y" * 5000)
+    node.event("disk_full", "error", problem="x" * 5000, folder="y" * 5000)
     (sent,) = (each.last for each in node.bus.publishers if isinstance(each.last, Event))
     assert codec.decode(codec.encode(sent), Event) == sent
-    assert (len(sent.text), sent.about) == (MAX_TEXT, {"folder": "y" * MAX_TEXT})
+    assert (len(sent.text), sent.about) == (
+        MAX_TEXT,
+        {"problem": "x" * MAX_TEXT, "folder": "y" * MAX_TEXT},
+    )
     node.loop.close()
 
 

@@ -10,6 +10,7 @@ from common import clock
 from common.freshness import NS_PER_S
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
+from t2.words import render
 from t2 import keys
 from t2 import messages as m
 from tests.factories import safety_state
@@ -41,7 +42,7 @@ class Odometry:
         """Set the pose; return what was replied, or the refusal."""
         answers: list[str] = []
         caller: Any = SimpleNamespace(
-            refuse=answers.append, reply=lambda done: answers.append(done.text)
+            refuse=lambda *reasons: answers.append(render(reasons)), reply=lambda done: answers.append(done.text)
         )
         self.node.fake.served[keys.SET_POSE.path](m.PoseRequest(**request), caller)
         return answers[0]

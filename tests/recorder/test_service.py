@@ -154,7 +154,7 @@ def test_a_latch_writes_the_black_box_and_old_recordings_make_room(
         wait_until(lambda: "black_box" in [each.name for each in events], "the black box")
     (path,) = tmp_path.glob("*-latch-contact.mcap")
     (event,) = (each for each in events if each.name == "black_box")
-    assert event.text == f"black box written to '{path}'"
+    assert event.text == f"The black box is written to '{path}'"
     with Reader(path) as reader:
         found = list(reader)
     states = [each.message.latched for each in found if isinstance(each.message, m.SafetyState)]
@@ -164,7 +164,11 @@ def test_a_latch_writes_the_black_box_and_old_recordings_make_room(
     assert len(velocities) > 50
     assert velocities == sorted(velocities)
     (removed,) = (each for each in events if each.name == "recordings_removed")
-    assert removed.about == {"first": old[0]}
+    assert removed.about | {"count": 1, "megabytes": 1.0} == {
+        "count": 1,
+        "megabytes": 1.0,
+        "first": old[0],
+    }
 
 
 def test_without_room_nothing_is_written(buses: BusFixture, tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from services.ros2.command import (
     bars_motion,
 )
 from services.safety.core.causes import BY_NAME, RULES, Clears
+from t2.catalogue import CAUSES
 from t2.client import OVERRULED_TICKS
 from t2.messages import MAX_NUMBER, Cause, CauseName, SafetyState
 from tests import factories
@@ -173,7 +174,10 @@ def test_what_a_network_holds_back_across_a_reset_is_motion() -> None:
 def state(*causes: CauseName, source: str | None = "ros2") -> SafetyState:
     """Return a state with these causes, in which this source is in control."""
     rows = [BY_NAME[name] for name in causes]
-    held = tuple(Cause(name=row.name, action=row.action, age=1.0, text=row.text) for row in rows)
+    held = tuple(
+        Cause(name=row.name, action=row.action, age=1.0, text=CAUSES[row.name].text[0])
+        for row in rows
+    )
     return factories.safety_state(source=source, causes=held)
 
 

@@ -7,15 +7,20 @@ from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
 from services.safety.config import LimitSource, Safety, Source
-from services.safety.core.operator_requests import BUMPER_FREE
+from services.safety.core.state import State
 from services.safety.report import (
-    sentence,
     signature,
+    summary,
     transitions,
 )
 from t2.codec import decode, encode
 from t2.messages import MAX_REASON, MAX_TEXT, SONAR_NAMES, Limits, ResetRequest, SafetyState
-from tests.safety.core.policy_fixture import PolicyFixture
+from t2.words import render
+from tests.safety.core.policy_fixture import BUMPER_FREE, PolicyFixture
+
+
+def sentence_of(state: State) -> str:
+    return render(summary(state))
 
 
 def noted(fixture: PolicyFixture, step: Callable[[], object]) -> list[str]:
@@ -37,26 +42,27 @@ def test_nothing_is_allowed_while_a_cause_is_latched() -> None:
 
 def test_one_sentence_says_why() -> None:
     fixture = PolicyFixture()
-    assert sentence(fixture.state).startswith("Waiting for the first sample of: velocity,")
+    assert sentence_of(fixture.state).startswith("Waiting for the first sample of: velocity,")
     fixture.tick(40)
-    assert sentence(fixture.state) == "No source requests motion."
+    assert sentence_of(fixture.state) == "No source requests motion."
     fixture.drive(0.5)
-    assert sentence(fixture.state).startswith("Waiting for a neutral request")
+    assert sentence_of(fixture.state).startswith("Waiting for a neutral request")
     fixture.drive()
-    assert sentence(fixture.state) == "teleop is in control."
+    assert sentence_of(fixture.state) == "teleop is in control."
     fixture.sonar(front=0.5)
     fixture.drive(0.5)
     assert (
-        sentence(fixture.state) == "Slowed by an obstacle at 0.50 m (front). teleop is in control."
+        sentence_of(fixture.state)
+        == "Slowed by an obstacle at 0.50 m (front). teleop is in control."
     )
     fixture.pressed = True
     fixture.tick()
-    assert sentence(fixture.state) == (
+    assert sentence_of(fixture.state) == (
         "The bumper was hit. It is still pressed: move off first, then reset."
     )
     fixture.pressed = False
     fixture.tick(5)
-    assert sentence(fixture.state) == "The bumper was hit. Reset to go on."
+    assert sentence_of(fixture.state) == "The bumper was hit. Reset to go on."
 
 
 def test_a_release_reports_its_beginning_its_first_refusal_and_its_success() -> None:
@@ -120,13 +126,15 @@ def test_untrusted_sonars_are_listed() -> None:
     fixture.sonar(front=None, rear=None)
     fixture.tick(5)
     assert fixture.published().doubted_sonars == ("front", "rear")
-    assert "Sonar not trusted: front faulty, rear faulty. " in sentence(fixture.state)
+    assert "Sonar not trusted: front (faulty). Sonar not trusted: rear (faulty). " in sentence_of(
+        fixture.state
+    )
     fixture.status = ("too_near", *fixture.status[1:])
     fixture.tick(5)
     assert fixture.published().doubted_sonars == ("front", "rear")
     fixture.sonar(**dict.fromkeys(SONAR_NAMES))
     fixture.tick(5)
-    assert "Sonar not trusted: all faulty. " in sentence(fixture.state)
+    assert "All sonars are faulty. " in sentence_of(fixture.state)
 
 
 def test_a_change_of_source_is_reported() -> None:

@@ -25,7 +25,7 @@ from services.safety.core.inputs import DriveRequest
 from services.safety.service import SafetyService
 from t2 import keys
 from t2.client import reset_request
-from t2.messages import Bumper, Drive, Motion, ResetRequest, SafetyState, Velocity
+from t2.messages import Bumper, Drive, Motion, Phrase, Refusal, ResetRequest, SafetyState, Velocity
 from tests.common.bus_fixture import until_received
 from tests.factories import safety_state
 from verification.harness.bus import at, joined, router_process, running
@@ -139,8 +139,12 @@ def test_it_stops_from_the_beginning_judges_a_hit_and_answers_calls(safety: Safe
     assert safety.motions[-1].judged_boot == safety.bus.boot
     wait_until(lambda: safety.states[-1].release, "a latched contact")
     answers: list[str] = []
+
+    def refused(refusal: Refusal) -> None:
+        answers.append(refusal.text)
+
     request = reset_request(safety.states[-1])
-    safety.bus.call(keys.RESET, request, lambda done: answers.append(done.text), answers.append)
+    safety.bus.call(keys.RESET, request, lambda done: answers.append(done.text), refused)
     wait_until(lambda: answers, "an answer")
     assert "Still present" in answers[0]
     wait_until(safety.node.is_stopped, "rest")
@@ -236,10 +240,10 @@ class Refusing:
     """A caller of a reset."""
 
     def __init__(self) -> None:
-        self.answers: list[str] = []
+        self.answers: list[Phrase] = []
 
-    def refuse(self, text: str) -> None:
-        self.answers.append(text)
+    def refuse(self, *reasons: Phrase) -> None:
+        self.answers += reasons
 
 
 @pytest.fixture
@@ -270,7 +274,7 @@ def test_a_flood_raises_neither_decisions_nor_motions(
     assert service._state.decision - before == 50 + 1 + 50  # ticks, the first stop, resets
     assert 50 <= len(sent) <= 51
     assert service._node.counters["refused_unknown_source"] == 1000
-    assert caller.answers.count("Another reset is being decided: try again.") == 50 * 19
+    assert caller.answers.count(Phrase("reset.pending")) == 50 * 19
     assert events.count("reset_refused") == 1
     assert "estop" in service._state.latches
 

@@ -13,7 +13,7 @@ from verification.harness.stack import RunningStack
 
 pytestmark = pytest.mark.timed
 
-MODULES = "aio", "connection", "drive", "recording", "robot", "sim", "stream", "third_party"
+MODULES = "aio", "connection", "drive", "recording", "robot", "simulator", "stream", "third_party"
 FOUND = [doctest.DocTestFinder().find(importlib.import_module(f"t2.{name}")) for name in MODULES]
 EXAMPLES = {
     test.name.rpartition(".")[2]: test for tests in FOUND for test in tests if test.examples

@@ -17,6 +17,8 @@ from common.wire.frame import Frame
 from services.bridge.core.output import Outputs, Refuse, Reply, Send
 from services.bridge.core.readiness import Readiness
 from t2 import messages as m
+from t2 import words
+from t2.messages import Phrase
 
 
 class Pending(Struct, frozen=True):
@@ -69,9 +71,9 @@ class Calls:
         """Process the board's answer to a lamp command."""
         if call := self._pending.pop("lamps", None):
             if done:
-                yield Reply(call.caller, m.Done(text="the lamp is set"))
+                yield Reply(call.caller, words.done(Phrase("board.lamp_set")))
             else:
-                yield Refuse(call.caller, "the board reports a failure (0xAA)")
+                yield Refuse(call.caller, (Phrase("board.failure"),))
 
     def on_tick(self, now_ns: int) -> Outputs:
         """Answer the calls whose echo was received or is overdue."""
@@ -80,12 +82,13 @@ class Calls:
         for what, call in list(self._pending.items()):
             if now_ns > call.until_ns:
                 del self._pending[what]
-                yield Refuse(call.caller, f"the board did not echo within {self._timeout_s:g} s")
+                late = Phrase("board.unconfirmed", {"timeout": self._timeout_s})
+                yield Refuse(call.caller, (late,))
 
     def _begin(self, what: str, caller: Any, now_ns: int) -> None:
         self._pending[what] = Pending(caller, now_ns + round(self._timeout_s * NS_PER_S))
 
-    def _refusal(self, what: str) -> str:
+    def _refusal(self, what: str) -> m.Phrases:
         if self._readiness.link != "up":
-            return f"the board is absent (link {self._readiness.link})"
-        return f"another call for the {what} is pending" if what in self._pending else ""
+            return (Phrase("board.absent", {"link": self._readiness.link}),)
+        return (Phrase("board.pending", {"what": what}),) if what in self._pending else ()

@@ -41,6 +41,8 @@ from services.bridge.core.readiness import Readiness
 from services.bridge.core.translate import BumperFilter, Translator, driver, restarted
 from t2 import keys
 from t2 import messages as m
+from t2.messages import Field, Phrase
+from t2.words import render
 
 Handler = Callable[[Any, bytes, int], Outputs]  # frame, raw bytes, receive time
 
@@ -142,8 +144,7 @@ class Core:
         if self.motions.port != self._ports.main:
             self.motions.port = self._ports.main
             number = self._config.board.listen_ports[port]
-            text = f"commands leave from UDP port {number} now: the velocity comes to it"
-            yield Event("port_changed", "warning", text, {"port": number})
+            yield Event("port_changed", "warning", {"port": number})
 
     def _is_urgent(self, frame: Frame) -> bool:
         """Return whether a frame counts from either port: a new hit or fault, or a brake as off."""
@@ -177,7 +178,7 @@ class Core:
             lost = self._polling.lost("bumper", now_ns)
             yield Publish("bumper", m.Bumper(pressed=pressed, lost=lost), raw)
         if hit:
-            yield Event("contact", "error", "the bumper is hit: BRAKE")
+            yield Event("contact", "error")
 
     def _on_distance(self, frame: reports.DistanceReport, raw: bytes, now_ns: int) -> Outputs:
         asked_ns = self._polling.answered("mileage", now_ns)  # the answer may be read late
@@ -204,9 +205,11 @@ class Core:
         self._polling.answered(f"driver_{side}", now_ns)
         message = driver(frame)
         if frame.fault_bits != self._faults.get(frame.side, 0):
-            text = f"{side} motor driver: {', '.join(message.faults) or 'no fault'}"
             level: m.Level = "error" if message.faults else "info"
-            yield Event("driver_fault", level, text, {"side": side, "bits": frame.fault_bits})
+            name = "driver.faults" if message.faults else "driver.no_fault"
+            phrase = Phrase(name, {"side": side, "faults": message.faults})
+            about: dict[str, Field] = {"side": side, "bits": frame.fault_bits}
+            yield Event("driver_fault", level, about, (phrase,))
         self._faults[frame.side] = frame.fault_bits
         yield Publish(f"driver_{side}", message, raw)
 
@@ -256,7 +259,8 @@ class Core:
             board=f"{board.address}:{board.port}",
             epoch=self.readiness.epoch,
             armed=not waiting,
-            waiting=waiting,
+            waiting=render(waiting),
+            waiting_phrases=waiting,
             rates=self._rates,
             rejected={reason: count for reason, count in self.rejected.items() if count},
             round_trip=self._polling.round_trip_s(),
@@ -270,6 +274,6 @@ class Core:
     def _link_state(self) -> tuple[object, ...]:
         return self.readiness.link, self.readiness.epoch, self._waiting()
 
-    def _waiting(self) -> str:
+    def _waiting(self) -> m.Phrases:
         """Describe why a RUN would be refused; empty when it would be obeyed."""
         return self.readiness.waiting() or self.motions.lease.waiting

@@ -46,7 +46,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.motion import BRAKE, RUN, STOP
-from t2.messages import Command, Motion
+from t2.messages import Command, Motion, Phrase, Phrases
 
 STOP_PERIOD_NS = NS_PER_S * 3 // 100  # at the second tick of 20 ms: about 25 Hz
 BEGIN_NS = 3 * NS_PER_S  # longer than a restart of safety
@@ -69,12 +69,12 @@ class Refusal(StrEnum):
 
 BRAKING = (Refusal.ESTOP, Refusal.HIT, Refusal.UNCOMMANDED)  # BRAKE, whatever is commanded
 WAITING = {
-    Refusal.ESTOP: "safety has not acknowledged the emergency stop",
-    Refusal.HIT: "safety has not acknowledged the bumper hit",
-    Refusal.UNCOMMANDED: "the vehicle moved without a command: safety has not latched that yet",
-    Refusal.NOT_LATCH_OWNER: "safety has not taken over the latch of its predecessor",
-    Refusal.NOT_READY: "the board is not ready",
-    Refusal.NOT_NEUTRAL: "waiting for a neutral motion from safety",
+    Refusal.ESTOP: Phrase("waiting.estop"),
+    Refusal.HIT: Phrase("waiting.hit"),
+    Refusal.UNCOMMANDED: Phrase("waiting.uncommanded"),
+    Refusal.NOT_LATCH_OWNER: Phrase("waiting.latch_owner"),
+    Refusal.NOT_READY: Phrase("waiting.ready"),
+    Refusal.NOT_NEUTRAL: Phrase("waiting.neutral"),
 }
 
 
@@ -114,9 +114,9 @@ class Lease(Struct, frozen=True):
         return self.braked or self.missing in BRAKING
 
     @property
-    def waiting(self) -> str:
-        """Why a RUN would be refused, as text; empty if it would be obeyed."""
-        return WAITING[self.missing] if self.missing else ""
+    def waiting(self) -> Phrases:
+        """Why a RUN would be refused; empty if it would be obeyed."""
+        return (WAITING[self.missing],) if self.missing else ()
 
 
 def on_motion(

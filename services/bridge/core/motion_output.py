@@ -83,8 +83,7 @@ class MotionOutput:
             self._counters[f"motion_{refusal}"] += 1
         if refusal is Refusal.SECOND_AUTHORITY and motion.boot != self._refused:
             self._refused = motion.boot
-            text = "a second sender on @cmd/motion is refused"
-            yield Event("second_authority", "error", text, {"boot": motion.boot})
+            yield Event("second_authority", "error", {"boot": motion.boot})
 
     def reflex(self, now_ns: int) -> tuple[Send, Reacted]:
         """Brake for a hit before its datagram is processed; then ``on_hit``."""
@@ -131,8 +130,7 @@ class MotionOutput:
             self.lease, order = leases.on_uncommanded(self.lease, now_ns, self._boot)
             if order is not None:
                 yield self.order(order)
-                text = "moved from standstill without a command: BRAKE"
-                yield Event("uncommanded_motion", "error", text)
+                yield Event("uncommanded_motion", "error")
         self.lease, order = leases.on_tick(
             self.lease, now_ns, self._valid_ns, self._limit_ns, self._standing(now_ns)
         )

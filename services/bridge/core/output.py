@@ -5,7 +5,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from t2.messages import Command, EventName, Level, Message
+from t2.messages import Command, EventName, Field, Level, Message, Phrases
 
 
 class Send(Struct, frozen=True):
@@ -29,8 +29,8 @@ class Event(Struct, frozen=True):
 
     name: EventName
     level: Level
-    text: str
-    about: dict[str, str | float | bool | None] = {}
+    about: dict[str, Field] = {}
+    phrases: Phrases = ()  # without any it has the text of its name
 
 
 class Reply(Struct, frozen=True):
@@ -41,10 +41,10 @@ class Reply(Struct, frozen=True):
 
 
 class Refuse(Struct, frozen=True):
-    """The refusal of a call, with its reason."""
+    """The refusal of a call, with its reasons."""
 
     caller: Any
-    reason: str
+    reasons: Phrases
 
 
 class Reacted(Struct, frozen=True):

@@ -38,7 +38,7 @@ from common.wire.frame import Frame
 from services.bridge.config import Bridge as Settings
 from services.bridge.core.output import Event, Outputs, Publish
 from t2 import messages as m
-from t2.messages import Few, Name
+from t2.messages import Few, Field, Name, Phrase, Phrases
 
 # Half a tick less than 0.1 and 0.2 s: the tick that is due may come early.
 ASK_NS = NS_PER_S * 9 // 100
@@ -146,18 +146,19 @@ class Readiness:
     def _assumed_on(self) -> bool:
         return all(brake.assumed_on for brake in self._brakes)
 
-    def waiting(self) -> str:
+    def waiting(self) -> Phrases:
         """Describe the missing condition; empty when ready."""
         if self.link == "never":
-            return f"nothing received from the board yet on UDP port {self._ports}"
+            return (Phrase("waiting.board", {"ports": self._ports}),)
         if self.link != "up":
-            return "link lost"
+            return (Phrase("waiting.link"),)
         if self.relay.waiting or self._brakes_on:
             return self.relay.waiting
-        text = "the board's emergency brakes are not both on and echoed"
+        brakes = Phrase("waiting.brakes")
         if self._required and self._inhibited and self._assumed_on:
-            text += "; a firmware without echoes needs bridge.require_switches = false"
-        return text
+            setting = "bridge.require_switches"
+            return brakes, Phrase("waiting.no_confirmation", {"setting": setting})
+        return (brakes,)
 
     def on_frame(self, now_ns: int) -> Outputs:
         """Process a valid frame from the board."""
@@ -166,7 +167,7 @@ class Readiness:
         if before != "up":
             self.up_ns = now_ns
             self._on_return(now_ns)
-            yield Event("link_up", "info", "the board is connected", {"before": before})
+            yield Event("link_up", "info", {"before": before})
         elif silent_ns > GAP_NS:
             self.gap_ns = now_ns
             for brake in self._brakes:
@@ -188,8 +189,7 @@ class Readiness:
         """Process a restart of the board."""
         self.epoch += 1
         self._on_return(now_ns)
-        text = "the board has restarted"
-        yield Event("board_restarted", "warning", text, {"epoch": self.epoch})
+        yield Event("board_restarted", "warning", {"epoch": self.epoch})
 
     def _on_return(self, now_ns: int) -> None:
         for brake in self._brakes:
@@ -205,7 +205,7 @@ class Readiness:
         yield from self.relay.on_tick(now_ns)
         if self._is_silent(now_ns):
             self.link = "lost"
-            yield Event("link_lost", "error", "the board is silent")
+            yield Event("link_lost", "error")
         if self.link == "up":
             yield from self._report_inhibited(now_ns)
 
@@ -234,8 +234,7 @@ class Readiness:
         since_ns = max(brake.since_ns for brake in self._brakes)
         inhibited = now_ns - since_ns > self._echo_ns and not self._brakes_on
         if inhibited and not self._inhibited:
-            text = "no motion: the board's emergency brakes are not both on and echoed"
-            yield Event("switches_unverified", "error", text)
+            yield Event("switches_unverified", "error")
         self._inhibited = inhibited
 
 
@@ -253,7 +252,7 @@ class RelayStatus:
 
     def __init__(self, required: bool) -> None:
         """Set up; without a configured relay all reports are ignored."""
-        self.waiting = "nothing received from the relay yet" if required else ""
+        self.waiting: Phrases = (Phrase("relay.never"),) if required else ()
         self._required = required
         self._state: m.LinkState = "never"
         self._report = RelayReport("", "", 0.0, {})
@@ -276,14 +275,15 @@ class RelayStatus:
         if not self._required or self._state == "never":
             return
         if now_ns - self._received_ns > RELAY_SILENCE_NS:
-            self._state, self.waiting = "lost", "the relay is silent"
-            event = Event("relay_lost", "error", self.waiting)
+            self._state, self.waiting = "lost", (Phrase("relay.lost"),)
+            event = Event("relay_lost", "error")
         elif self._report.braking:
-            self.waiting = f"the relay brakes: {self._report.braking}"
-            event = Event("relay_braking", "warning", self.waiting)
+            reason: dict[str, Field] = {"reason": self._report.braking}
+            self.waiting = (Phrase("relay.brakes", reason),)
+            event = Event("relay_braking", "warning", reason)
         else:
-            self.waiting = ""
-            event = Event("relay_up", "info", "the relay passes commands")
+            self.waiting = ()
+            event = Event("relay_up", "info")
         if event.name != self._event:
             self._event = event.name
             yield event

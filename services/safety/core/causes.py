@@ -34,7 +34,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from t2.messages import Action, CauseName
+from t2.messages import Action, CauseName, Phrase, Phrases
 
 
 class Clears(Enum):
@@ -47,62 +47,50 @@ class Clears(Enum):
 
 
 class Rule(Struct, frozen=True):
-    """One row: the action of a cause, how it clears, and its text for the operator."""
+    """One row: the action of a cause, and how it clears. Its texts are in ``t2.catalogue``."""
 
     name: CauseName
     action: Action
     clears: Clears
-    text: str
 
 
 RULES = (
     # latched
-    Rule("contact", "brake", Clears.RESET, "The bumper was hit."),
-    Rule("estop", "brake", Clears.RESET, "Emergency stop."),
-    Rule(
-        "estop_reader", "brake", Clears.RESET,
-        "The emergency stop could not be received for a while.",
-    ),
-    Rule(
-        "estop_keepalive", "brake", Clears.RESET, "The emergency stop is no longer kept alive.",
-    ),
-    Rule("predecessor", "brake", Clears.RESET, "Safety restarted while a reset was due."),
-    Rule("runaway", "brake", Clears.RESET, "The vehicle did not move as commanded."),
-    Rule(
-        "uncommanded_motion", "brake", Clears.RESET,
-        "The vehicle moved while standstill was commanded.",
-    ),
+    Rule("contact", "brake", Clears.RESET),
+    Rule("estop", "brake", Clears.RESET),
+    Rule("estop_reader", "brake", Clears.RESET),
+    Rule("estop_keepalive", "brake", Clears.RESET),
+    Rule("predecessor", "brake", Clears.RESET),
+    Rule("runaway", "brake", Clears.RESET),
+    Rule("uncommanded_motion", "brake", Clears.RESET),
     # the only BRAKE that clears by itself
-    Rule("not_stopping", "brake", Clears.SETTLED, "The vehicle does not stop."),
+    Rule("not_stopping", "brake", Clears.SETTLED),
     # latched
-    Rule("driver_left", "stop", Clears.RESET, "The left motor driver reported a fault."),
-    Rule("driver_right", "stop", Clears.RESET, "The right motor driver reported a fault."),
-    Rule("flapping", "stop", Clears.RESET, "Inputs failed repeatedly."),
+    Rule("driver_left", "stop", Clears.RESET),
+    Rule("driver_right", "stop", Clears.RESET),
+    Rule("flapping", "stop", Clears.RESET),
     # inhibiting
-    Rule("leaving", "stop", Clears.SETTLED, "The safety service is shutting down."),
-    Rule("starting", "stop", Clears.SETTLED, "Waiting for the first samples."),
-    Rule("link", "stop", Clears.SETTLED, "The link to the board is down."),
-    Rule("switches", "stop", Clears.SETTLED, "The board's emergency brakes are not verified."),
-    Rule("bumper", "stop", Clears.SETTLED, "The bumper is not being read."),
-    Rule("silent", "stop", Clears.SETTLED, "An input is too old."),
-    Rule("unarmed", "stop", Clears.SETTLED, "The bridge is not armed yet."),
+    Rule("leaving", "stop", Clears.SETTLED),
+    Rule("starting", "stop", Clears.SETTLED),
+    Rule("link", "stop", Clears.SETTLED),
+    Rule("switches", "stop", Clears.SETTLED),
+    Rule("bumper", "stop", Clears.SETTLED),
+    Rule("silent", "stop", Clears.SETTLED),
+    Rule("unarmed", "stop", Clears.SETTLED),
     # by third parties
-    Rule("limit_stop", "stop", Clears.NEUTRAL, "A limit source stops the vehicle."),
-    Rule("limit_silent", "stop", Clears.NEUTRAL, "A limit source is silent."),
-    Rule("two_publishers", "stop", Clears.NEUTRAL, "Two publishers use one source."),
+    Rule("limit_stop", "stop", Clears.NEUTRAL),
+    Rule("limit_silent", "stop", Clears.NEUTRAL),
+    Rule("two_publishers", "stop", Clears.NEUTRAL),
     # transient
-    Rule(
-        "neutral", "stop", Clears.AT_ONCE,
-        "Waiting for a neutral request: release the controls, then drive.",
-    ),
-    Rule("blocked", "stop", Clears.AT_ONCE, "No room in that direction."),
-    Rule("no_request", "stop", Clears.AT_ONCE, "No source requests motion."),
-    Rule("release", "slow", Clears.AT_ONCE, "Creeping off the bumper."),
-    Rule("bumper_lossy", "slow", Clears.AT_ONCE, "Creeping: bumper polls were lost."),
-    Rule("limit", "slow", Clears.AT_ONCE, "Slowed by a limit source."),
-    Rule("obstacle", "slow", Clears.AT_ONCE, "Slowed by an obstacle."),
-    Rule("sonar", "slow", Clears.AT_ONCE, "A sonar cannot be trusted."),
-)  # fmt: skip
+    Rule("neutral", "stop", Clears.AT_ONCE),
+    Rule("blocked", "stop", Clears.AT_ONCE),
+    Rule("no_request", "stop", Clears.AT_ONCE),
+    Rule("release", "slow", Clears.AT_ONCE),
+    Rule("bumper_lossy", "slow", Clears.AT_ONCE),
+    Rule("limit", "slow", Clears.AT_ONCE),
+    Rule("obstacle", "slow", Clears.AT_ONCE),
+    Rule("sonar", "slow", Clears.AT_ONCE),
+)
 
 BY_NAME = {rule.name: rule for rule in RULES}
 _ROW = {rule.name: row for row, rule in enumerate(RULES)}  # the worst first
@@ -125,12 +113,12 @@ REFILL_PER_S = 0.1  # ten good seconds refill one failure
 
 
 class Observation(Struct, frozen=True):
-    """Whether a sample shows a cause, with a text for the operator."""
+    """Whether a sample shows a cause; ``phrases`` describe it, without any its name does."""
 
     name: CauseName
     present: bool
     token: Token | None = None  # None: this decision, without a sample
-    text: str = ""
+    phrases: Phrases = ()
 
 
 class Held(Struct, frozen=True):
@@ -140,7 +128,7 @@ class Held(Struct, frozen=True):
     bad_ns: int  # last observation of the cause
     good: int  # samples without it since then
     token: Token
-    text: str
+    phrases: Phrases
     id: int = 0  # of this occurrence
 
 
@@ -159,11 +147,11 @@ def observe(
     for one in seen:
         old, token = held.get(one.name), one.token or (0, now_ns)
         if one.present:
-            text = one.text or BY_NAME[one.name].text
+            phrases = one.phrases or (Phrase(one.name),)
             since_ns, id_ = now_ns, decision * len(RULES) + _ROW[one.name]
             if old and old.good < GOOD_SAMPLES:
                 since_ns, id_ = old.since_ns, old.id
-            result[one.name] = Held(since_ns, now_ns, 0, token, text, id_)
+            result[one.name] = Held(since_ns, now_ns, 0, token, phrases, id_)
         elif old and _is_over(one.name, old, now_ns, settle_ns):
             del result[one.name]
         elif old:

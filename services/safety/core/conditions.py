@@ -9,15 +9,13 @@ from services.safety.core.causes import Observation, Token
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.state import State
-from t2.messages import CauseName, Driver
+from t2.messages import CauseName, Driver, Field, Phrase
 
 T = TypeVar("T")
 
 # The bridge ends a hit after three clear samples, so a hit is at least three samples long. Fewer
 # lost samples cannot hide it.
 LOST_SAMPLES = 3  # between two decisions, at most
-ESTOP_PATH = "the emergency stop's path through the router"
-MOVED_ALONE = "The vehicle moved without a command while safety was absent."
 # Of the polls of the last 0.2 s, ten at the full rate: this many lost ones can hide a hit of 60 ms.
 LOST_POLLS = 3
 FEW_POLLS = 1  # hysteresis: the cause clears at this number
@@ -46,9 +44,9 @@ def observe_inputs(
     yield _silent(inputs, settings, state, now_ns)
     yield from _motion(state.motion, now_ns)
     yield from state.speed_limits.observations(now_ns)
-    conflicts = ", ".join(state.arbiter.conflict(now_ns) + state.speed_limits.conflicts(now_ns))
-    text = f"Two publishers use {conflicts}."
-    yield Observation("two_publishers", bool(conflicts), text=text)
+    conflicts = (*state.arbiter.conflict(now_ns), *state.speed_limits.conflicts(now_ns))
+    phrases = (Phrase("two_publishers.of", {"sources": conflicts}),)
+    yield Observation("two_publishers", bool(conflicts), phrases=phrases)
 
 
 def _contact(inputs: Inputs) -> Observation:
@@ -68,8 +66,7 @@ def _estop_received(inputs: Inputs, state: State) -> bool:
 def _estop_reader(inputs: Inputs, state: State, now_ns: int) -> Observation:
     """Observe whether an emergency stop may have been missed."""
     if _stalled(state, STALL_S, now_ns):
-        text = "Safety was stalled: an emergency stop may have been missed."
-        return Observation("estop_reader", True, text=text)
+        return Observation("estop_reader", True, phrases=(Phrase("estop_reader.stalled"),))
     lost = state.estop_connection not in (0, inputs.estop_connection)
     return Observation("estop_reader", lost)
 
@@ -83,9 +80,9 @@ def _driver(name: CauseName, side: str, latest: Latest[Driver] | None) -> Observ
         return Observation(name, False)
     sample = latest.value
     faulty = bool(sample.bits or sample.faults)
-    names = ", ".join(sample.faults) or f"bits {sample.bits:#x}"
-    text = f"The {side} motor driver reports: {names.replace('_', ' ')}."
-    return Observation(name, faulty, (sample.boot, sample.seq), text)
+    faults = sample.faults or (f"bits {sample.bits:#x}",)
+    phrases = (Phrase("driver.faults", {"side": side, "faults": faults}),)
+    return Observation(name, faulty, (sample.boot, sample.seq), phrases)
 
 
 def _starting(inputs: Inputs, settings: Safety, keepalives: list[str]) -> Observation:
@@ -93,36 +90,37 @@ def _starting(inputs: Inputs, settings: Safety, keepalives: list[str]) -> Observ
         "velocity": inputs.velocity,
         "ultrasonic": inputs.ultrasonic,
         "bumper": inputs.bumper,
-        "left driver": inputs.left,
-        "right driver": inputs.right,
+        "driver_left": inputs.left,
+        "driver_right": inputs.right,
         "link": inputs.link,
     }
     if settings.require_switches:
         needed["switches"] = inputs.switches
     missing = [name for name, latest in needed.items() if latest is None]
     if not inputs.estop_connection:
-        missing.append("emergency stop")
+        missing.append("estop")
     elif inputs.estop_path is None:
-        missing.append(ESTOP_PATH)
-    missing += [f"emergency stop keepalive of {name}" for name in keepalives]
-    text = f"Waiting for the first sample of: {', '.join(missing)}."
-    return Observation("starting", bool(missing), text=text)
+        missing.append("estop_path")
+    phrases = []
+    if missing:
+        phrases.append(Phrase("starting.missing", {"inputs": tuple(missing)}))
+    if keepalives:
+        phrases.append(Phrase("starting.keepalives", {"names": tuple(keepalives)}))
+    return Observation("starting", bool(phrases), phrases=tuple(phrases))
 
 
 def _link(inputs: Inputs) -> Iterator[Observation]:
     if inputs.link is None:
         return
     link = inputs.link.value
-    texts = {"lost": "The link to the board is lost.", "never": "No frame came from the board yet."}
-    # 3 equivalent mutants: nobody reads the text of an absent cause.
-    yield Observation("link", link.state != "up", text=texts.get(link.state, ""))
-    text = f"The bridge is not armed yet: {link.waiting}." if link.waiting else ""
-    yield Observation("unarmed", link.state == "up" and not link.armed, text=text)
+    yield Observation("link", link.state != "up", phrases=(Phrase(f"link.{link.state}"),))
+    phrases = (Phrase("unarmed"), *link.waiting_phrases)
+    yield Observation("unarmed", link.state == "up" and not link.armed, phrases=phrases)
     # The bridge stores a latch until safety confirms it, so that a latch survives a restart of
     # safety. The bridge's own boot means a motion that it braked without a safety service.
     due = link.latched_by not in (None, inputs.boot)
-    text = MOVED_ALONE if due and link.latched_by == link.boot else ""
-    yield Observation("predecessor", due, text=text)
+    moved = due and link.latched_by == link.boot
+    yield Observation("predecessor", due, phrases=(Phrase("predecessor.moved"),) * moved)
 
 
 def _switches(inputs: Inputs, settings: Safety) -> Observation:
@@ -137,52 +135,52 @@ def _bumper(inputs: Inputs, settings: Safety, judged: Token | None, now_ns: int)
     if inputs.bumper is None:
         return Observation("bumper", False)
     if not fresh(inputs.bumper, now_ns, settings.times.bumper_age):
-        return Observation("bumper", True, text="The bumper is not being read.")
+        return Observation("bumper", True)
     boot, seq = inputs.bumper.value.boot, inputs.bumper.value.seq
     polls = inputs.bumper.value.lost
     if polls > LOST_POLLS:
-        return Observation("bumper", True, text=f"{polls} bumper polls of 0.2 s were lost.")
+        return Observation("bumper", True, phrases=(Phrase("bumper.polls", {"polls": polls}),))
     if judged is not None and boot != judged[0]:
-        return Observation("bumper", True, text="The bridge has restarted.")
+        return Observation("bumper", True, phrases=(Phrase("bumper.restarted"),))
     lost = judged is not None and seq - judged[1] > LOST_SAMPLES
-    return Observation("bumper", lost, text="Samples of the bumper were lost.")
+    return Observation("bumper", lost, phrases=(Phrase("bumper.samples"),))
 
 
 def _bumper_lossy(inputs: Inputs, held: bool) -> Observation:
     # 1 equivalent mutant: a single lost poll is not lossy either.
     polls = inputs.bumper.value.lost if inputs.bumper else 0
     lossy = polls >= LOST_POLLS or (held and polls > FEW_POLLS)
-    text = f"Creeping: {polls} bumper polls of 0.2 s were lost."
-    return Observation("bumper_lossy", lossy, text=text)
+    phrases = (Phrase("bumper_lossy.polls", {"polls": polls}),)
+    return Observation("bumper_lossy", lossy, phrases=phrases)
 
 
 def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Observation:
     # A sample counts from its reception; samples queued during a stall seem new afterwards.
     if _stalled(state, settings.times.bumper_age, now_ns):
-        text = "Safety was stalled: samples received meanwhile may be old."
-        return Observation("silent", True, text=text)
+        return Observation("silent", True, phrases=(Phrase("silent.stalled"),))
     too_old = {
         "velocity": _is_old(inputs.velocity, settings.times.velocity_age, now_ns),
         "link": _is_old(inputs.link, settings.times.link_age, now_ns),
         "switches": settings.require_switches
         and _is_old(inputs.switches, settings.times.switches_age, now_ns),
-        "left driver": _is_old(inputs.left, settings.times.driver_age, now_ns),
-        "right driver": _is_old(inputs.right, settings.times.driver_age, now_ns),
-        ESTOP_PATH: _is_old(inputs.estop_path, settings.times.estop_path_age, now_ns),
+        "driver_left": _is_old(inputs.left, settings.times.driver_age, now_ns),
+        "driver_right": _is_old(inputs.right, settings.times.driver_age, now_ns),
+        "estop_path": _is_old(inputs.estop_path, settings.times.estop_path_age, now_ns),
     }
-    old = [name for name, is_old in too_old.items() if is_old]
-    return Observation("silent", bool(old), text=f"No recent data: {', '.join(old)}.")
+    old = tuple(name for name, is_old in too_old.items() if is_old)
+    return Observation("silent", bool(old), phrases=(Phrase("silent.old", {"inputs": old}),))
 
 
 def _motion(motion: MotionWatch, now_ns: int) -> Iterator[Observation]:
     standstill = motion.standstill
     twist = standstill.displacement.steady
-    text = "Standstill is not confirmed: no velocity is received."
+    phrase = Phrase("standstill.unknown")
     if twist is not None:
-        text = f"The vehicle does not stop: {twist.linear:.2f} m/s, {twist.angular:.2f} rad/s."
+        fields: dict[str, Field] = {"linear": twist.linear, "angular": twist.angular}
+        phrase = Phrase("not_stopping.speed", fields)
     yield Observation("runaway", motion.runs_away)
     yield Observation("uncommanded_motion", standstill.has_left)
-    yield Observation("not_stopping", standstill.is_late(now_ns), text=text)
+    yield Observation("not_stopping", standstill.is_late(now_ns), phrases=(phrase,))
 
 
 def _is_old(latest: Latest[T] | None, age_s: float, now_ns: int) -> bool:

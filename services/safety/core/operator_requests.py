@@ -23,11 +23,12 @@ from services.safety.core.inputs import Inputs
 from services.safety.core.release import SIGN, Release, stopping_distance
 from services.safety.core.sources import DriveChannel
 from services.safety.core.state import Reply, State
-from t2.messages import ResetRequest
+from t2.messages import Direction, Phrase, Phrases, ResetRequest
 
-BY_HAND = "Push the vehicle off by hand, then reset."
-BUMPER_FREE = "The bumper is free. Next: reset."
-LET_GO = "A release begins with a new hold: let go first."
+BY_HAND = Phrase("next.by_hand")
+BUMPER_FREE = (Phrase("release.bumper_free"),)
+LET_GO = (Phrase("release.let_go"),)
+KEYSTROKES: dict[Direction, str] = {"forward": "F", "backward": "B"}
 
 
 def room(state: State, settings: Safety) -> float:
@@ -47,74 +48,76 @@ def carry_out(
         or _not_standing(inputs, settings, now_ns)
     )
     if not reason and state.arbiter.requests_motion(now_ns):
-        reason = "Motion is requested: release the controls first."
+        reason = (Phrase("reset.motion"),)
     if reason:
         return state, Reply(False, reason)
     held = reset(state.latches, call.causes)
     cleared = tuple(one.id for name, one in state.latches.items() if name not in held)
     budget = state.fault_budget if "flapping" in held else FaultBudget()
     after = replace(state, latches=held, fault_budget=budget)
-    text = _remaining(after, inputs, settings)
-    # ``disarmed`` has already disarmed every source while the cause was held.
-    text = text or "Reset. Release the controls, then drive."
-    return after, Reply(True, text, cleared)
+    return after, Reply(True, _outcome(after, inputs, settings), cleared)
 
 
-def _not_named(state: State, call: ResetRequest) -> str:
+def _not_named(state: State, call: ResetRequest) -> Phrases:
     """Return why these identities are refused; empty when each names a latched cause."""
     held = latched(state.latches)
     if not held:
-        return "Nothing is latched."
-    texts = " ".join(state.latches[name].text for name in held)
+        return (Phrase("reset.nothing"),)
     if not call.causes:
-        return f"The reset names no cause. Latched: {texts} Send the `id` of each as `causes`."
+        return Phrase("reset.no_cause"), *_described(state)
     if set(call.causes) - {state.latches[name].id for name in held}:
-        return f"A cause that the reset names is no longer latched. Now latched: {texts}"
-    return ""
+        return Phrase("reset.other_cause"), *_described(state)
+    return ()
 
 
-def _no_reset(state: State, inputs: Inputs, call: ResetRequest, settings: Safety) -> str:
+def _no_reset(state: State, inputs: Inputs, call: ResetRequest, settings: Safety) -> Phrases:
     """Return which cause forbids this reset; empty when it may clear something."""
+    present = Phrase("reset.still_present")
     new = begun(state.latches, state.decision)
     if new:  # a trip in the same decision wins: the operator has not seen it
-        return f"Still present: {state.latches[new[0]].text}"
+        return present, *state.latches[new[0]].phrases
     targets = named(state.latches, call.causes)
     stays = [name for name in still_present(state.latches) if name in targets]
     if not stays:
-        return ""
+        return ()
     if "contact" not in stays or not _is_pressed(inputs):
-        return f"Still present: {state.latches[stays[0]].text}"
+        return present, *state.latches[stays[0]].phrases
     if len(stays) == len(targets):
-        return f"Still present: {_pressed(state, inputs, settings)}"
-    return ""
+        return present, *_pressed(state, inputs, settings)
+    return ()
 
 
-def _remaining(state: State, inputs: Inputs, settings: Safety) -> str:
-    """Return the causes still latched after a reset, for the operator; empty without any."""
+def _outcome(state: State, inputs: Inputs, settings: Safety) -> Phrases:
+    """Return the answer to a reset that was carried out, with the causes that stay latched."""
     held = latched(state.latches)
     if not held:
-        return ""
+        return (Phrase("reset.done"),)
     if "contact" in held and _is_pressed(inputs):
-        return f"Reset, but still latched: {_pressed(state, inputs, settings)}"
-    return f"Reset, but still latched: {' '.join(state.latches[name].text for name in held)}"
+        return Phrase("reset.partial"), *_pressed(state, inputs, settings)
+    return Phrase("reset.partial"), *_described(state)
 
 
-def _pressed(state: State, inputs: Inputs, settings: Safety) -> str:
-    """Return the text of a pressed bumper with the remedy."""
-    what = _no_release(state, inputs, settings) or _way_off(state.release)
-    return f"{state.latches['contact'].text} {what}"
+def _described(state: State) -> Phrases:
+    """Return the phrases of all latched causes."""
+    return tuple(each for name in latched(state.latches) for each in state.latches[name].phrases)
 
 
-def _way_off(release: Release) -> str:
-    """Return the remedy, by the directions that are not forbidden."""
+def _pressed(state: State, inputs: Inputs, settings: Safety) -> Phrases:
+    """Return the phrases of a pressed bumper with the next step."""
+    step = _no_release(state, inputs, settings) or _way_off(state.release)
+    return *state.latches["contact"].phrases, *step
+
+
+def _way_off(release: Release) -> Phrases:
+    """Return the next step, by the directions that are not forbidden."""
     free = SIGN.keys() - release.forbidden
     if len(free) == len(SIGN):
-        return "Hold release to move off, forward or backward."
+        return (Phrase("release.any_way"),)
     (only,) = free
-    advice = f"Hold release {only} to move off."
+    step = Phrase("release.one_way", {"key": KEYSTROKES[only], "direction": only})
     if only != release.came.direction:
-        return advice
-    return f"{advice} The vehicle drove {only} into the contact: check that direction first."
+        return (step,)
+    return step, Phrase("release.into_contact", {"direction": only})
 
 
 def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Release:
@@ -127,59 +130,60 @@ def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Rel
     # 2 equivalent mutants: without a source its request does not matter.
     asked = state.arbiter.channels[source].release if source else "none"
     if source is None or asked == "none":
-        return replace(release, direction=None, refusal="")
+        return replace(release, direction=None, refusal=())
     if source not in settings.operators:
-        reason = f"{source} may not release: only a source that an operator holds may."
+        reason: Phrases = (Phrase("release.no_operator", {"source": source}),)
     elif reason := _no_release(state, inputs, settings):
         pass
     elif asked in release.forbidden:
-        reason = f"Release {asked} is forbidden until a reset: the bumper was pressed that way."
+        reason = (Phrase("release.forbidden", {"direction": asked}),)
     else:
         reason = _not_let_go(release, source, state.arbiter.channels[source])
     if reason:
         return replace(release, direction=None, refusal=reason, barred_ns=now_ns)
-    moves = "" if release.direction else _not_standing(inputs, settings, now_ns)
+    moves = () if release.direction else _not_standing(inputs, settings, now_ns)
     return replace(release, source=source, direction=None if moves else asked, refusal=moves)
 
 
-def _not_let_go(release: Release, source: str, channel: DriveChannel) -> str:
+def _not_let_go(release: Release, source: str, channel: DriveChannel) -> Phrases:
     """Return that a neutral request is due: before each release of a source in a direction."""
     if release.direction is not None:
         continues = (release.source, release.direction) == (source, channel.release)
-        return "" if continues else LET_GO
+        return () if continues else LET_GO
     neutral_ns = channel.neutral_ns
-    return "" if neutral_ns is not None and neutral_ns > release.barred_ns else LET_GO
+    return () if neutral_ns is not None and neutral_ns > release.barred_ns else LET_GO
 
 
-def _no_release(state: State, inputs: Inputs, settings: Safety) -> str:
+def _no_release(state: State, inputs: Inputs, settings: Safety) -> Phrases:
     """Return why no release is possible in either direction; empty when one is."""
     if "contact" not in state.latches:
-        return "There is no contact to release."
+        return (Phrase("release.no_contact"),)
     if not _is_pressed(inputs):
         return BUMPER_FREE
     others = ordered((BARRING & state.latches.keys()) - {"contact"})
     if others:
         due = others[0] in latched(state.latches) and others[0] not in still_present(state.latches)
-        return state.latches[others[0]].text + (" Reset first." if due else "")
+        phrases = state.latches[others[0]].phrases
+        return (*phrases, Phrase("next.reset_first")) if due else phrases
     why = spent(state, settings)
-    return f"{why} {BY_HAND}" if why else ""
+    return (*why, BY_HAND) if why else ()
 
 
-def spent(state: State, settings: Safety) -> str:
+def spent(state: State, settings: Safety) -> Phrases:
     """Return why the releases of this contact are used up; empty when they are not."""
     if state.release.unknown:
-        return "Safety has restarted: the travel of an earlier release is unknown."
+        return (Phrase("release.unknown"),)
     if len(state.release.forbidden) == 2:
-        return "The bumper was pressed in both directions."
-    return "The distance for moving off is used up." if room(state, settings) <= 0 else ""
+        return (Phrase("release.both_ways"),)
+    return (Phrase("release.used_up"),) if room(state, settings) <= 0 else ()
 
 
 def _is_pressed(inputs: Inputs) -> bool:
     return inputs.bumper is not None and inputs.bumper.value.pressed
 
 
-def _not_standing(inputs: Inputs, settings: Safety, now_ns: int) -> str:
+def _not_standing(inputs: Inputs, settings: Safety, now_ns: int) -> Phrases:
     velocity = inputs.known_velocity(now_ns, settings.times.velocity_age)
     if velocity is None:
-        return "Standstill is not confirmed: no velocity is received."
-    return "" if velocity.value.is_standing else "The vehicle still moves."
+        return (Phrase("standstill.unknown"),)
+    return () if velocity.value.is_standing else (Phrase("standstill.moving"),)

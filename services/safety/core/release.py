@@ -26,7 +26,7 @@ from common.freshness import NS_PER_S, Latest
 from common.motion import STILL, Twist
 from common.standstill import comparable
 from services.safety.core.causes import Held
-from t2.messages import Direction, Mileage
+from t2.messages import Direction, Mileage, Phrases
 
 COAST_NS = (
     NS_PER_S // 2
@@ -82,7 +82,7 @@ class Release(Struct, frozen=True):
     forbidden: frozenset[Direction] = frozenset()
     unknown: bool = False  # whether releases before a restart of safety may have moved the vehicle
     barred_ns: int = 0  # a release begins only with a newer neutral request
-    refusal: str = ""  # why a requested release does not move the vehicle
+    refusal: Phrases = ()  # why a requested release does not move the vehicle
     came: Leg = Leg()  # the leg that led to the newest press outside a release
 
     @property

@@ -138,7 +138,7 @@ def trusted(reading: float | None, status: RangeStatus) -> tuple[float, str]:
     if status == "no_echo":
         return math.inf, ""
     if status != "ok":
-        return 0.0, {"fault": "faulty", "too_near": "too near to measure"}[status]
+        return 0.0, {"fault": "faulty", "too_near": "too_near"}[status]
     if reading is None or reading < 0:
         return 0.0, "faulty"
     return reading, ""

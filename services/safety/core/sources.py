@@ -58,6 +58,7 @@ from t2.messages import (
     Drive,
     KeepaliveState,
     LimitState,
+    Phrase,
     ReleaseRequest,
     SourceMessage,
 )
@@ -295,11 +296,12 @@ class SpeedLimits(Struct, frozen=True):
         """Yield the causes that forbid motion, present or not; none without sources."""
         if not self.sources:
             return
-        stopping = [f"{name}{one.because}" for name, one in self._valid(now_ns) if one.stops]
-        silent = ", ".join(self._silent(now_ns))
-        silent_text = f"No speed limit arrives of {silent}."
-        yield Observation("limit_stop", bool(stopping), text=f"Stopped by {', '.join(stopping)}.")
-        yield Observation("limit_silent", bool(silent), text=silent_text)
+        stopping = tuple(f"{name}{one.because}" for name, one in self._valid(now_ns) if one.stops)
+        by = (Phrase("limit_stop.by", {"sources": stopping}),)
+        yield Observation("limit_stop", bool(stopping), phrases=by)
+        silent = tuple(self._silent(now_ns))
+        of = (Phrase("limit_silent.of", {"sources": silent}),)
+        yield Observation("limit_silent", bool(silent), phrases=of)
 
     def conflicts(self, now_ns: int) -> list[str]:
         """Return the names of sources with two publishers."""
@@ -384,9 +386,9 @@ class Keepalives(Struct, frozen=True):
 
     def observation(self, now_ns: int) -> Observation:
         """Return the cause of the names that were received and are lost, present or not."""
-        lost = [name for name in self.channels if not self._is_alive(name, now_ns)]
-        text = f"The emergency stop is no longer kept alive by {', '.join(lost)}."
-        return Observation("estop_keepalive", bool(lost), text=text)
+        lost = tuple(name for name in self.channels if not self._is_alive(name, now_ns))
+        by = (Phrase("estop_keepalive.lost", {"names": lost}),)
+        return Observation("estop_keepalive", bool(lost), phrases=by)
 
     def states(self, now_ns: int) -> tuple[KeepaliveState, ...]:
         """Return the published states."""

@@ -9,7 +9,7 @@ from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.release import Leg, Release
 from services.safety.core.sonars import SonarArray, SonarOverrides
 from services.safety.core.sources import Arbiter, Keepalives, SpeedLimits
-from t2.messages import Command
+from t2.messages import Command, Phrases
 from t2.messages import Verdict as VerdictName
 
 
@@ -17,7 +17,7 @@ class Reply(Struct, frozen=True):
     """Answer to a reset."""
 
     done: bool
-    text: str
+    phrases: Phrases
     cleared: tuple[int, ...] = ()  # identities of the causes that a reset cleared
 
 

@@ -20,6 +20,7 @@ from services.bridge.core.core import Core
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
 from t2 import messages as m
 from t2.messages import Command
+from t2.words import render
 
 MS = NS_PER_S // 1000
 NOW = 1_000 * NS_PER_S
@@ -49,7 +50,7 @@ class Bench:
             if isinstance(output, Reply):
                 output.caller.replies.append(output.reply)
             elif isinstance(output, Refuse):
-                output.caller.refusals.append(output.reason)
+                output.caller.refusals.append(render(output.reasons))
         self.outputs += made
         return made
 

@@ -15,7 +15,9 @@ from common.wire.framing import checksum
 from common.wire.reports import BumperReport, DistanceReport, DriverReport, VelocityReport
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Send
 from t2 import messages as m
+from t2 import words
 from t2.messages import Command
+from t2.words import render
 from tests.bridge.core.core_fixture import (
     BOOT,
     CLEAR,
@@ -55,7 +57,7 @@ def test_brake_comes_first_then_the_report_of_the_hit_then_the_rest(
     assert isinstance(out[2], Publish)
     assert isinstance(out[2].message, m.Bumper)
     assert out[2].message.pressed
-    assert out[3] == Event("contact", "error", "the bumper is hit: BRAKE")
+    assert out[3] == Event("contact", "error")
     assert (motions(out), events(out), reactions(out)) == (
         [MotionKind.BREAK], ["contact"], ["reflex"],
     )  # fmt: skip
@@ -171,13 +173,11 @@ def test_a_driver_fault_counts_from_either_port(bench: Bench) -> None:
     assert reported == [0, 1, 0, 3]
     (right,) = published(bench.answer(DriverReport(Side.RIGHT, 1), port=1), "driver_right")
     assert right.bits == 1
-    text = "left motor driver: "
-    assert seen == [
-        Event("driver_fault", "error", f"{text}over_current", {"side": "left", "bits": 1}),
-        Event("driver_fault", "info", f"{text}no fault", {"side": "left", "bits": 0}),
-        Event("driver_fault", "error", f"{text}over_current, over_voltage",
-              {"side": "left", "bits": 3}),
-    ]  # fmt: skip
+    assert [(it.level, it.about["bits"], render(it.phrases)) for it in seen] == [
+        ("error", 1, "The left motor driver reports: over current."),
+        ("info", 0, "The left motor driver reports no fault."),
+        ("error", 3, "The left motor driver reports: over current, over voltage."),
+    ]
 
 
 def test_copies_are_dropped_and_counted(bench: Bench) -> None:
@@ -196,9 +196,8 @@ def test_a_dead_port_is_left_and_reported(bench: Bench) -> None:
     bench.now_ns += MS
     out = bench.receive(STANDS, STANDS, port=1)
     assert len(published(out, "velocity")) == 2
-    text = "commands leave from UDP port 4001 now: the velocity comes to it"
     assert [one for one in out if isinstance(one, Event)] == [
-        Event("port_changed", "warning", text, {"port": 4001})
+        Event("port_changed", "warning", {"port": 4001})
     ]
     assert bench.core.motions.port == 1
     assert bench.link().ports == {"VelocityReport": 4001}
@@ -311,7 +310,8 @@ def test_the_link_message_comes_at_5_hz_and_on_a_change(bench: Bench) -> None:
 def test_the_link_message(bench: Bench) -> None:
     link = m.Link(
         state="never", board="127.0.0.1:4003", epoch=0, armed=False, rates={}, rejected={},
-        waiting="nothing received from the board yet on UDP port 4002, 4001", round_trip=None,
+        waiting="Nothing received from the board yet on UDP port 4002, 4001.",
+        waiting_phrases=(m.Phrase("waiting.board", {"ports": "4002, 4001"}),), round_trip=None,
     )  # fmt: skip
     assert bench.link() == link
     bench.tick()
@@ -322,12 +322,12 @@ def test_the_link_message(bench: Bench) -> None:
     bench.answer(DistanceReport(1000, 0))
     kinds = ("VelocityReport", "DistanceReport", "UltrasonicBrakeReport", "BumperBrakeReport")
     assert bench.link() == msgspec.structs.replace(
-        link, state="up", armed=True, waiting="", send_errors=3, round_trip=0.0,
+        link, state="up", armed=True, waiting="", waiting_phrases=(), send_errors=3, round_trip=0.0,
         rates={"BumperReport": 4.0} | dict.fromkeys(kinds, 1.0),
         ports=dict.fromkeys(("BumperReport", *kinds), 4002),
     )  # fmt: skip
     bench.estop()
-    waiting = "safety has not acknowledged the emergency stop"
+    waiting = "Safety has not acknowledged the emergency stop."
     assert (bench.link().waiting, bench.link().estop) == (waiting, bench.now_ns)
 
 
@@ -386,9 +386,8 @@ def test_a_second_authority_is_an_event_once(bench: Bench) -> None:
     bench.arm()
     for boot in (SAFETY, 2, 2, SAFETY, 2, 3):
         bench.move(STOP, boot=boot)
-    text = "a second sender on @cmd/motion is refused"
     assert [one for one in bench.outputs if isinstance(one, Event) and one.name != "link_up"] == [
-        Event("second_authority", "error", text, {"boot": boot}) for boot in (2, 3)
+        Event("second_authority", "error", {"boot": boot}) for boot in (2, 3)
     ]
     assert bench.counters["motion_second_authority"] == 4
 
@@ -516,12 +515,12 @@ ONE_OFF = m.Switches(ultrasonic_brake=True, bumper_brake=False)
 @pytest.mark.parametrize(
     ("call", "then", "reply", "refusal"),
     [
-        (lamp, echo(reports.LedReport(True)), m.Done(text="the lamp is set"), None),
-        (lamp, echo(reports.LedReport(False)), None, "the board reports a failure (0xAA)"),
-        (lamp, late, None, "the board did not echo within 0.5 s"),
+        (lamp, echo(reports.LedReport(True)), words.done(m.Phrase("board.lamp_set")), None),
+        (lamp, echo(reports.LedReport(False)), None, "The board reports a failure (0xAA)."),
+        (lamp, late, None, "The board did not confirm it within 0.5 s."),
         (lamp, lambda bench: lamp(bench, Caller()), None, None),
         (brakes, echo(reports.BumperBrakeReport(False)), ONE_OFF, None),
-        (brakes, late, None, "the board did not echo within 0.5 s"),
+        (brakes, late, None, "The board did not confirm it within 0.5 s."),
     ],
 )
 def test_a_call_is_answered_by_the_boards_echo(
@@ -542,8 +541,8 @@ def test_a_call_is_answered_by_the_boards_echo(
 @pytest.mark.parametrize(
     ("before", "call", "refusal"),
     [
-        (nothing, lamp, "the board is absent (link never)"),
-        (nothing, brakes, "the board is absent (link never)"),
+        (nothing, lamp, "The board is absent (link never up)."),
+        (nothing, brakes, "The board is absent (link never up)."),
         (Bench.arm, lambda bench, to: bench.switch(to, bumper_brake=False), "no echo"),
         (Bench.arm, lambda bench, to: bench.switch(to, echo=1), "unknown heartbeat"),
         (Bench.arm, called_late, "The call is 1.0 s old, allowed is 1 s"),
@@ -566,7 +565,7 @@ def test_one_call_of_each_is_pending(bench: Bench, call: Call, what: str) -> Non
     first, second = Caller(), Caller()
     call(bench, first)
     call(bench, second)
-    assert (first.refusals, second.refusals) == ([], [f"another call for the {what} is pending"])
+    assert (first.refusals, second.refusals) == ([], [f"Another call for the {what} is pending."])
 
 
 def test_lost_polls_are_counted_each_second(bench: Bench) -> None:

@@ -22,6 +22,7 @@ from services.bridge.core.lease import (
     on_uncommanded,
 )
 from t2.messages import Command, Motion
+from t2.words import render
 
 MS = NS_PER_S // 1000
 LEASE, COAST, BEGIN = 200 * MS, 1000 * MS, 3000 * MS
@@ -225,8 +226,8 @@ def test_each_reason_to_wait_has_its_text() -> None:
     waiting = (NOT_READY, HIT, STOPPED, NOT_NEUTRAL, OWED, replace(MOVED, neutral=False))
     texts = [lease.waiting for lease in waiting]
     assert all(texts)
-    assert len(set(texts)) == 6
-    assert ARMED.waiting == replace(ARMED, latched_by=1).waiting == ""
+    assert len(set(map(render, texts))) == 6
+    assert ARMED.waiting == replace(ARMED, latched_by=1).waiting == ()
 
 
 # --- the end of the lease -------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from services.bridge.core.readiness import (
 )
 from services.relay.core import REPORT, Relay
 from t2 import messages as m
+from t2.messages import Phrase
 from tests.bridge.core.core_fixture import MS, STANDS, Bench, events, frames, motions, published
 
 SILENCE = 200 * MS
@@ -36,7 +37,7 @@ def bench() -> Bench:
 
 
 def link_up(before: str) -> Event:
-    return Event("link_up", "info", "the board is connected", {"before": before})
+    return Event("link_up", "info", {"before": before})
 
 
 def of_type(kind: type[Event], outputs: list[Output]) -> list[Output]:
@@ -46,8 +47,7 @@ def of_type(kind: type[Event], outputs: list[Output]) -> list[Output]:
 def test_a_restart_of_the_board_is_an_event(bench: Bench) -> None:
     bench.arm()
     out = bench.answer(reports.DistanceReport(0, 0))
-    text = "the board has restarted"
-    assert of_type(Event, out) == [Event("board_restarted", "warning", text, {"epoch": 1})]
+    assert of_type(Event, out) == [Event("board_restarted", "warning", {"epoch": 1})]
     assert settings_sent(bench.tick(0)) == 2
     bench.answer(reports.DistanceReport(1000, 0), reports.DistanceReport(0, 0))
     assert bench.core.readiness.epoch == 2
@@ -58,18 +58,21 @@ def test_silence_loses_the_link(bench: Bench, age: int, state: str) -> None:
     readiness = bench.core.readiness
     bench.tick(9 * NS_PER_S)
     assert bench.link().state == "never"
-    assert bench.link().waiting == "nothing received from the board yet on UDP port 4002, 4001"
+    assert bench.link().waiting == "Nothing received from the board yet on UDP port 4002, 4001."
     assert bench.receive(STANDS)[-1] == link_up("never")
     up_ns = bench.now_ns
     bench.now_ns += 60 * MS
     assert events(bench.receive(STANDS)) == []
     assert (readiness.up_ns, readiness.gap_ns) == (up_ns, 0)
-    lost = [Event("link_lost", "error", "the board is silent")]
+    lost = [Event("link_lost", "error")]
     assert of_type(Event, bench.tick(age)) == ([] if state == "up" else lost)
     assert bench.link().state == state
     if state == "lost":
         assert events(bench.tick(age)) == []
-        assert (bench.link().waiting, bench.link().state) == ("link lost", "lost")
+        assert (bench.link().waiting, bench.link().state) == (
+            "The link to the board is lost.",
+            "lost",
+        )
         assert bench.receive(STANDS)[-1] == link_up("lost")
         assert (readiness.up_ns, readiness.gap_ns) == (bench.now_ns, 0)
 
@@ -173,7 +176,7 @@ def test_both_must_be_on_and_echoed_unless_the_settings_accept_a_firmware_withou
             if on is not None:
                 bench.answer(kind(on))
         assert readiness.ready is expected
-        assert (readiness.waiting() == "") is expected
+        assert (readiness.waiting() == ()) is expected
         assert settings_sent(bench.tick()), "they are sent in any case"
         readiness.bumper.want(False, bench.now_ns)
         assert not readiness.ready
@@ -181,14 +184,14 @@ def test_both_must_be_on_and_echoed_unless_the_settings_accept_a_firmware_withou
 
 def test_a_board_without_echoes_is_reported_once_with_the_setting_that_helps(bench: Bench) -> None:
     bench.receive(STANDS)
-    hint = "; a firmware without echoes needs bridge.require_switches = false"
+    hint = " A firmware that confirms nothing needs bridge.require_switches = false."
     for _ in range(25):
         bench.receive(STANDS)
         assert events(bench.tick(20 * MS)) == []
         assert hint not in bench.link().waiting
     bench.receive(STANDS)
-    text = "the board's emergency brakes are not both on and echoed"
-    unverified = Event("switches_unverified", "error", f"no motion: {text}")
+    text = "The board's emergency brakes are not both on and confirmed."
+    unverified = Event("switches_unverified", "error")
     assert of_type(Event, bench.tick(1)) == [unverified]
     assert bench.link().waiting.startswith(f"{text}{hint}")
     assert events(bench.tick(20 * MS)) == []
@@ -214,12 +217,12 @@ def report(braking: str = "", **fields: Any) -> bytes:
     return json.dumps(usual | fields).encode()
 
 
-UP = Event("relay_up", "info", "the relay passes commands")
-LOST = Event("relay_lost", "error", "the relay is silent")
+UP = Event("relay_up", "info")
+LOST = Event("relay_lost", "error")
 
 
 def braking(why: str) -> Event:
-    return Event("relay_braking", "warning", f"the relay brakes: {why}")
+    return Event("relay_braking", "warning", {"reason": why})
 
 
 def take(bench: Bench, datagram: bytes) -> list[Output]:
@@ -233,12 +236,12 @@ def armed() -> Bench:
     """Return a bridge that drives through a relay."""
     bench = Bench(CONFIGURED)
     assert of_type(Event, bench.tick()) == []
-    assert bench.link().waiting.startswith("nothing received from the board")
+    assert bench.link().waiting.startswith("Nothing received from the board")
     bench.receive(STANDS)
-    assert bench.link().waiting.startswith("nothing received from the relay yet")
+    assert bench.link().waiting.startswith("Nothing received from the relay yet.")
     assert take(bench, report()) == [UP]
     bench.arm()
-    assert bench.core.readiness.waiting() == ""
+    assert bench.core.readiness.waiting() == ()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
     return bench
 
@@ -254,7 +257,7 @@ def test_without_the_setting_reports_change_nothing(bench: Bench) -> None:
 def test_while_the_relay_brakes_stop_is_sent_and_a_neutral_motion_re_arms(why: str) -> None:
     bench = armed()
     assert take(bench, report(why)) == [braking(why)]
-    assert bench.link().waiting.startswith(f"the relay brakes: {why}")
+    assert bench.link().waiting.startswith("The relay brakes: ")
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]  # neutral to the relay
     assert take(bench, report(why)) == []
     assert take(bench, report()) == [UP]
@@ -270,10 +273,10 @@ def test_a_silent_relay_is_lost_after_five_reports_and_comes_back() -> None:
     while bench.now_ns < received_ns + RELAY_SILENCE_NS:
         bench.receive(STANDS)
         bench.tick(10 * MS)
-    assert not bench.link().waiting.startswith("the relay is silent")
+    assert not bench.link().waiting.startswith("The relay is silent.")
     bench.receive(STANDS)
     assert LOST in bench.tick(10 * MS)
-    assert bench.link().waiting.startswith("the relay is silent")
+    assert bench.link().waiting.startswith("The relay is silent.")
     assert bench.link().relay.state == "lost"  # type: ignore[union-attr]
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]
     assert take(bench, report()) == [UP]
@@ -308,7 +311,7 @@ def test_the_link_message_has_the_newest_report() -> None:
 def test_an_invalid_report_is_refused(datagram: bytes) -> None:
     status = RelayStatus(required=True)
     assert not status.take(datagram, 0)
-    assert status.waiting == "nothing received from the relay yet"
+    assert status.waiting == (Phrase("relay.never"),)
 
 
 def test_the_relays_own_report_is_valid() -> None:

@@ -6,15 +6,15 @@ import msgpack
 import pytest
 
 from common.bus.bus import Bus, Caller
-from t2 import keys
-from t2.messages import ResetDone, ResetRequest
+from t2 import codec, keys
+from t2.messages import Phrase, Refusal, ResetDone, ResetRequest
 from tests.common.bus_fixture import BusFixture
 from verification.harness.bus import at
 from verification.harness.waiting import wait_until
 
 FLOOD = 50  # queries
 ARRIVES_S = 0.5
-NO_ANSWER = "safety does not answer; run `t2 doctor`"
+NO_ANSWER = "safety does not answer; run `t2 doctor`."
 LATER = 9  # a cause whose reset is answered later
 DONE = ResetDone(text="done")
 
@@ -33,7 +33,7 @@ class Server:
     def take(self, request: ResetRequest, caller: Caller[ResetDone]) -> None:
         self.requests.append(request)
         if self.refuses:
-            caller.refuse(self.refuses)
+            caller.refuse(Phrase("call.invalid", {"reason": self.refuses}))
         elif LATER in request.causes:
             self.waiting.append(caller)
         else:
@@ -54,7 +54,11 @@ class Client:
 
     def send(self, *causes: int, timeout_s: float = 20.0) -> None:
         request = ResetRequest(causes=causes)
-        self.bus.call(keys.RESET, request, self.replies.append, self.refusals.append, timeout_s)
+
+        def refused(refusal: Refusal) -> None:
+            self.refusals.append(refusal.text)
+
+        self.bus.call(keys.RESET, request, self.replies.append, refused, timeout_s)
 
     def asked(self, *causes: int, timeout_s: float = 20.0) -> "Client":
         """Send a request and wait for its answer."""
@@ -85,7 +89,7 @@ def test_a_call_is_replied_to_or_refused_with_a_reason(
 ) -> None:
     server.refuses = refusal
     client.asked()
-    assert (client.replies, client.refusals) == (([], [refusal]) if refusal else ([DONE], []))
+    assert (client.replies, client.refusals) == (([], [f"The message is invalid: {refusal}."]) if refusal else ([DONE], []))
 
 
 def test_a_flood_of_queries_is_answered_one_at_a_time(
@@ -119,13 +123,13 @@ def test_the_routers_own_timeout_is_no_refusal(client: Client) -> None:
 def test_without_a_server_or_router_the_refusal_comes_at_once(buses: BusFixture) -> None:
     assert Client(buses.bus()).asked(timeout_s=600.0).refusals == [NO_ANSWER]
     never_opened = Client(Bus(at(buses.endpoint), buses.robot, buses.loop.post))
-    assert never_opened.asked().refusals == ["not connected to a router"]
+    assert never_opened.asked().refusals == ["Not connected to a router."]
 
 
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
-        (lambda query, key: query.reply(key, msgpack.packb({"text": 5})), "not a ResetDone: "),
+        (lambda query, key: query.reply(key, msgpack.packb({"text": 5})), "The message is invalid: not a ResetDone: "),
         (lambda query, _: query.reply_err("not with us"), "not with us"),  # without an encoding
     ],
 )
@@ -148,7 +152,7 @@ def test_an_undecodable_request_is_refused_with_its_fault(
     count = len(server.requests)
     (reply,) = buses.session().get(keys.RESET.on(buses.robot), payload=b"\xc1")
     assert reply.err is not None
-    assert "not a ResetRequest: " in reply.err.payload.to_bytes().decode()
+    assert "not a ResetRequest: " in codec.refusal(reply.err.payload.to_bytes()).text
     assert len(server.requests) == count
 
 

@@ -8,6 +8,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S, Latest
 from common.settings import Vehicle
 from services.safety.config import Safety
+from services.safety.core import operator_requests
 from services.safety.core.causes import latched
 from services.safety.core.inputs import (
     DriveRequest,
@@ -18,7 +19,7 @@ from services.safety.core.inputs import (
 )
 from services.safety.core.policy import Policy
 from services.safety.core.state import Reply, Verdict
-from services.safety.report import state_message, text
+from services.safety.report import described, state_message
 from t2.messages import (
     SONAR_NAMES,
     Bumper,
@@ -40,6 +41,7 @@ from t2.messages import (
     Ultrasonic,
     Velocity,
 )
+from t2.words import render
 from tests.factories import link, safety_state
 
 TICK_S = 0.02
@@ -48,7 +50,7 @@ NO_ECHO_TEXT = (
     "The call carries no echo of safety's heartbeat: send the newest SafetyState.heartbeat as "
     "`echo`."
 )
-HOLD_TEXT = "The bumper was hit. Hold release to move off, forward or backward."
+HOLD_TEXT = "The bumper was hit. Hold F to move off forward, or B to move off backward."
 UNKNOWN_TEXT = (
     "Safety has restarted: the travel of an earlier release is unknown. Push the vehicle off by "
     "hand, then reset."
@@ -56,6 +58,9 @@ UNKNOWN_TEXT = (
 USED_UP_TEXT = "The distance for moving off is used up. Push the vehicle off by hand, then reset."
 DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
 NO_ECHO: tuple[RangeStatus, ...] = ("no_echo",) * 8
+
+LET_GO = render(operator_requests.LET_GO)
+BUMPER_FREE = render(operator_requests.BUMPER_FREE)
 
 
 class PolicyFixture:
@@ -227,7 +232,7 @@ class PolicyFixture:
         """Reset these causes, all by default; return the reason of a refusal."""
         call = ResetRequest(echo=echo or self.echo, causes=causes or self.latched())
         self.decide(reset=call)
-        return "" if self.reply().done else self.reply().text
+        return "" if self.reply().done else self.answer()
 
     def hold(
         self, direction: Direction = "backward", ticks: int = 0, source: str = "teleop"
@@ -237,7 +242,7 @@ class PolicyFixture:
         for _ in range(ticks):
             self.tick()
             self.request(release=direction, source=source)
-        return self.state.release.refusal
+        return render(self.state.release.refusal)
 
     def let_go(self, ticks: int = 1) -> Verdict:
         """Request zero for some ticks."""
@@ -262,9 +267,13 @@ class PolicyFixture:
         assert self.verdict.reply is not None
         return self.verdict.reply
 
+    def answer(self) -> str:
+        """Return the text of that reply."""
+        return render(self.reply().phrases)
+
     def text(self, name: CauseName) -> str:
         """Return the published text of a held cause."""
-        return text(self.state, name)
+        return render(described(self.state, name))
 
     def estop(self) -> Verdict:
         return self.decide(estop=True)

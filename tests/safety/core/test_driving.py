@@ -9,6 +9,7 @@ from common.motion import STILL
 from services.safety.config import Safety
 from services.safety.core.inputs import DriveRequest
 from t2.messages import Drive, Switches
+from t2.words import render
 from tests.safety.core.policy_fixture import PolicyFixture
 
 
@@ -53,7 +54,7 @@ def test_two_publishers_stop_the_vehicle_until_one_is_left_and_neutral() -> None
     fixture.request(0.5)
     assert fixture.refused == "second_publisher"
     assert fixture.verdict.command == "stop"
-    assert fixture.state.latches["two_publishers"].text == "Two publishers use teleop."
+    assert render(fixture.state.latches["two_publishers"].phrases) == "Two publishers use teleop."
     fixture.driver_boot, fixture.driver_seq = 99, 10_000
     assert fixture.drive(0.5, seconds=0.4).command == "stop"
     assert fixture.drive(0.5, seconds=0.2).name == "inhibited"  # the stick is still pushed
@@ -146,7 +147,7 @@ def test_more_lost_bumper_polls_stop_until_half_a_second_and_a_neutral_request()
     fixture = PolicyFixture().running()
     fixture.lost = 4
     assert fixture.tick().command == "stop"
-    assert fixture.state.latches["bumper"].text == "4 bumper polls of 0.2 s were lost."
+    assert render(fixture.state.latches["bumper"].phrases) == "4 bumper polls of 0.2 s were lost."
     fixture.lost = 0
     assert fixture.drive(0.5, seconds=1.0).command == "stop"
     fixture.drive()

@@ -104,7 +104,7 @@ def test_a_frozen_front_sonar_creeps_before_the_wall(frozen_m: float) -> None:
         assert speed <= 0.151 or speed * 0.25 + speed**2 / (2 * 0.6) < room_m
     assert fixture.verdict.twist.linear == pytest.approx(0.15)
     assert "sonar" in fixture.state.latches
-    assert "front suspect" in fixture.text("sonar")
+    assert "front (suspect)" in fixture.text("sonar")
     assert "Creeping toward the front" in fixture.text("obstacle")
     assert fixture.drive(-0.5, seconds=2.0).twist.linear == pytest.approx(-0.5)
     fixture.ranges = tuple(1.0 if one else None for one in fixture.ranges)
@@ -130,7 +130,7 @@ def test_an_operator_creeps_past_a_faulty_sonar_after_a_neutral_request() -> Non
     fixture = PolicyFixture().running()
     fixture.sonar(front=None)
     assert fixture.drive(0.5, seconds=3.0).command == "stop"  # held on: nothing moves
-    assert "release the controls" in fixture.text("blocked")
+    assert "let go of the controls" in fixture.text("blocked")
     fixture.drive()
     assert fixture.drive(0.5, seconds=1.0).name == "slow"
     assert fixture.verdict.twist.linear == pytest.approx(0.15)

@@ -283,6 +283,6 @@ def test_a_turn_slows_down_at_its_own_deceleration() -> None:
     ("asked", "given"), [(0.5, 0.15), (0.15, 0.15), (0.05, 0.05), (0.0, 0.0), (-0.5, -0.15)]
 )
 def test_lost_bumper_polls_limit_a_twist_to_the_creep_speed(asked: float, given: float) -> None:
-    limited = planner().limited(Twist(asked), {"bumper_lossy": Held(0, 0, 0, (0, 0), "")})
+    limited = planner().limited(Twist(asked), {"bumper_lossy": Held(0, 0, 0, (0, 0), ())})
     assert (limited.linear, limited.angular) == pytest.approx((given, 0.0))
     assert planner().limited(Twist(asked), {}) == Twist(asked)

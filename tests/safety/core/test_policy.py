@@ -13,9 +13,11 @@ from services.safety.core.inputs import DriveRequest, Inputs
 from t2.messages import (
     Bumper,
     Drive,
+    Phrase,
     Switches,
     Velocity,
 )
+from t2.words import render
 from tests.factories import link
 from tests.safety.core.policy_fixture import DIRECTIONS, TICK_S, UNKNOWN_TEXT, PolicyFixture, hit
 
@@ -70,7 +72,7 @@ def test_a_latched_trip_holds_until_a_reset_and_a_neutral_request(
     fixture.linear = 0.0
     fixture.drive(0.5, seconds=2.0)
     assert fixture.verdict.command == command
-    assert fixture.reset() == "Motion is requested: release the controls first."
+    assert fixture.reset() == "Motion is requested: let go of the controls first."
     fixture.tick(40)
     assert fixture.reset() == ""
     assert not latched(fixture.state.latches)
@@ -107,7 +109,7 @@ def test_inputs_that_fail_again_and_again_latch() -> None:
             fixture.tick()
         fixture.muted = set()
     held, now_ns = fixture.state.latches["flapping"], fixture.now_ns
-    assert held == Held(now_ns, now_ns, 0, (0, now_ns), "Inputs failed repeatedly.", held.id)
+    assert held == Held(now_ns, now_ns, 0, (0, now_ns), (Phrase("flapping"),), held.id)
     assert held.id // len(RULES) == fixture.state.decision
     fixture.tick(40)
     assert latched(fixture.state.latches) == ("flapping",)
@@ -206,7 +208,7 @@ def test_lost_bumper_samples_could_hide_a_hit() -> None:
     assert "bumper" not in fixture.state.latches
     fixture.seq += 3
     fixture.tick()
-    assert fixture.state.latches["bumper"].text == "Samples of the bumper were lost."
+    assert render(fixture.state.latches["bumper"].phrases) == "Samples of the bumper were lost."
 
 
 def test_a_bridge_that_started_anew_wants_a_neutral_request() -> None:
@@ -260,7 +262,9 @@ def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_reque
     fixture.muted = {"estop_path"}
     assert fixture.drive(0.3, seconds=0.18).command == "run"
     assert fixture.drive(0.3, seconds=0.08).command == "stop"
-    assert "the emergency stop's path through the router" in fixture.state.latches["silent"].text
+    assert "the emergency stop's path through the router" in render(
+        fixture.state.latches["silent"].phrases
+    )
     fixture.muted = set()
     assert fixture.drive(0.3, seconds=1.0).command == "stop"
     fixture.drive()
@@ -332,7 +336,7 @@ def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str)
     fixture.state = replace(fixture.state, heartbeat=fixture.state.heartbeat.beat(fixture.now_ns))
     assert fixture.request(0.5).command == command
     if late_ns:
-        assert "stalled" in fixture.state.latches["silent"].text
+        assert "stalled" in render(fixture.state.latches["silent"].phrases)
         assert fixture.drive(0.5, seconds=2.0).command == "stop"
         fixture.drive()
     assert fixture.drive(0.5).command == "run"
@@ -471,7 +475,7 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
     fixture.link = replace(fixture.link, latched_by=OWN)
     fixture.tick(10)
     assert fixture.reset() == ""
-    assert fixture.reply().text == f"Reset, but still latched: The bumper was hit. {UNKNOWN_TEXT}"
+    assert fixture.answer() == f"Reset, but still latched: The bumper was hit. {UNKNOWN_TEXT}"
     for direction in DIRECTIONS:
         fixture.let_go()
         assert fixture.hold(direction) == UNKNOWN_TEXT

@@ -6,12 +6,16 @@ import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
-from services.safety.core.causes import BY_NAME, latched
-from services.safety.core.operator_requests import BUMPER_FREE, LET_GO, room
+from services.safety.core.causes import latched
+from services.safety.core.operator_requests import room
+from t2.catalogue import CAUSES
 from t2.messages import Direction, ReleaseRequest
+from t2.words import render
 from tests.factories import link
 from tests.safety.core.policy_fixture import (
+    BUMPER_FREE,
     DIRECTIONS,
+    LET_GO,
     UNKNOWN_TEXT,
     USED_UP_TEXT,
     PolicyFixture,
@@ -130,7 +134,7 @@ def test_without_a_contact_there_is_no_release() -> None:
     assert fixture.hold() == "There is no contact to release."
     assert fixture.verdict.twist.is_zero
     assert fixture.let_go().command == "run"
-    assert fixture.state.release.refusal == ""
+    assert fixture.state.release.refusal == ()
 
 
 def test_only_an_operator_releases() -> None:
@@ -158,7 +162,7 @@ def test_a_key_that_was_held_into_the_contact_moves_nothing(held: Direction) -> 
         fixture.tick()
         fixture.hold(held)
         assert fixture.verdict.command == "brake"
-    assert fixture.state.release.refusal == LET_GO
+    assert render(fixture.state.release.refusal) == LET_GO
     fixture.let_go()
     assert fixture.hold(held, 5) == ""
     assert fixture.verdict.command == "run"
@@ -262,7 +266,7 @@ def test_a_higher_source_ends_a_release_and_continues_none(asked: ReleaseRequest
     fixture.driver_boot = 99
     assert fixture.request(release=asked).command == "brake"
     assert fixture.verdict.source == "teleop"
-    assert fixture.state.release.refusal == ("" if asked == "none" else LET_GO)
+    assert render(fixture.state.release.refusal) == ("" if asked == "none" else LET_GO)
 
 
 @pytest.mark.parametrize("rear", [0.1, None])
@@ -324,14 +328,14 @@ def test_pressed_again_while_it_moves_off_it_goes_no_farther_that_way() -> None:
         fixture.let_go()
         assert fixture.hold(either) == BOTH
     fixture.let_go()
-    assert fixture.reset() == f"Still present: {BY_NAME['contact'].text} {BOTH}"
+    assert fixture.reset() == f"Still present: {CAUSES['contact'].text[0]} {BOTH}"
 
 
 def test_the_advice_names_only_the_direction_that_is_left() -> None:
     check = "The vehicle drove forward into the contact: check that direction first."
     for pressed_again, advice in (
-        ("backward", f"Hold release forward to move off. {check}"),
-        ("forward", "Hold release backward to move off."),
+        ("backward", f"Hold F to move off forward. {check}"),
+        ("forward", "Hold B to move off backward."),
     ):
         fixture = hit()
         fixture.hold(pressed_again, 10)  # type: ignore[arg-type]
@@ -422,4 +426,4 @@ def test_a_neutral_request_at_the_time_of_the_press_is_not_newer() -> None:
     fixture.request(0.0)
     fixture.tick()
     fixture.request(release="forward")
-    assert fixture.state.release.refusal == LET_GO
+    assert render(fixture.state.release.refusal) == LET_GO

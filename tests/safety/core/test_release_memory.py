@@ -11,7 +11,7 @@ from t2.messages import Mileage
 REACH = 0.65
 BACK = Twist(-0.1)
 BACKWARD = Release(direction="backward")
-CLEARED, TOUCHED = (Held(1, 1, good, (1, 1), "hit", 40) for good in (1, 0))
+CLEARED, TOUCHED = (Held(1, 1, good, (1, 1), (), 40) for good in (1, 0))
 
 
 def at(distance: float, epoch: int = 0, heading: float = 0.0, boot: int = 7) -> Mileage:

@@ -9,8 +9,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from common.freshness import NS_PER_S
 from services.safety.core.causes import GOOD_SAMPLES, latched
-from services.safety.core.state import Reply
 from t2.messages import CauseName, ResetRequest
+from t2.words import render
 from tests.factories import link
 from tests.safety.core.policy_fixture import HOLD_TEXT, NO_ECHO_TEXT, PolicyFixture, hit
 
@@ -88,17 +88,14 @@ def test_a_reset_of_nothing_is_refused() -> None:
 
 def test_a_reset_that_names_nothing_is_refused() -> None:
     fixture = stopped()
-    refused = fixture.decide(reset=ResetRequest(echo=fixture.echo)).reply
-    assert refused == Reply(
-        False,
-        "The reset names no cause. Latched: Emergency stop. Send the `id` of each as `causes`.",
-    )
+    fixture.decide(reset=ResetRequest(echo=fixture.echo))
+    asked = "The reset names no cause. Send the `id` of each as `causes`. Latched:"
+    assert (fixture.reply().done, fixture.answer()) == (False, f"{asked} Emergency stop.")
     assert latched(fixture.state.latches) == ("estop",)
     blink(fixture)
-    refused = fixture.decide(reset=ResetRequest(echo=fixture.echo)).reply
-    fault = fixture.state.latches["driver_left"].text
-    assert refused is not None
-    assert f"Latched: Emergency stop. {fault} Send" in refused.text
+    fixture.decide(reset=ResetRequest(echo=fixture.echo))
+    fault = render(fixture.state.latches["driver_left"].phrases)
+    assert fixture.answer() == f"{asked} Emergency stop. {fault}"
 
 
 def test_a_contact_that_is_free_and_others_stay_latched_by_their_texts() -> None:
@@ -107,9 +104,9 @@ def test_a_contact_that_is_free_and_others_stay_latched_by_their_texts() -> None
     fixture.tick(4)
     fixture.estop()
     driver = blink(fixture)
-    texts = f"The bumper was hit. {fixture.state.latches['estop'].text}"
+    texts = f"The bumper was hit. {render(fixture.state.latches['estop'].phrases)}"
     assert fixture.reset(driver) == ""
-    assert fixture.reply().text == f"Reset, but still latched: {texts}"
+    assert fixture.answer() == f"Reset, but still latched: {texts}"
 
 
 @pytest.mark.parametrize(("ticks", "age"), [(50, ""), (51, "1.0"), (150, "3.0")])
@@ -123,9 +120,8 @@ def test_a_late_reset_is_refused(ticks: int, age: str) -> None:
 
 def test_a_reset_without_a_known_echo_is_refused() -> None:
     fixture = stopped()
-    assert fixture.decide(reset=ResetRequest(echo=None, causes=fixture.latched())).reply == Reply(
-        False, NO_ECHO_TEXT
-    )
+    fixture.decide(reset=ResetRequest(echo=None, causes=fixture.latched()))
+    assert (fixture.reply().done, fixture.answer()) == (False, NO_ECHO_TEXT)
     assert "unknown heartbeat" in fixture.reset(echo=2**62)
     assert latched(fixture.state.latches) == ("estop",)
 
@@ -134,13 +130,15 @@ def test_a_reset_clears_what_it_names_and_says_what_stays() -> None:
     fixture = stopped()
     (estop,) = fixture.latched()
     driver = blink(fixture)
-    fault = fixture.state.latches["driver_left"].text
+    fault = render(fixture.state.latches["driver_left"].phrases)
     assert fixture.reset(estop) == ""
-    assert fixture.reply() == Reply(True, f"Reset, but still latched: {fault}", (estop,))
+    assert fixture.reply().cleared == (estop,)
+    assert fixture.answer() == f"Reset, but still latched: {fault}"
     assert latched(fixture.state.latches) == ("driver_left",)
     assert fixture.reset(estop, driver).startswith("A cause that the reset names")  # half of it
     assert fixture.reset(driver) == ""
-    assert fixture.reply() == Reply(True, "Reset. Release the controls, then drive.", (driver,))
+    assert fixture.reply().cleared == (driver,)
+    assert fixture.answer() == "Reset. Let go of the controls, then drive."
     assert fixture.drive().command == "run"
 
 
@@ -230,11 +228,11 @@ def test_at_a_pressed_bumper_a_reset_clears_the_others_and_a_release_comes_next(
     blink(fixture)
     fixture.tick(40)
     assert latched(fixture.state.latches) == ("contact", "driver_left")
-    assert fixture.hold() == f"{fixture.state.latches['driver_left'].text} Reset first."
-    assert fixture.reset() == "Motion is requested: release the controls first."
+    assert fixture.hold() == f"{render(fixture.state.latches['driver_left'].phrases)} Reset first."
+    assert fixture.reset() == "Motion is requested: let go of the controls first."
     fixture.let_go()
     assert fixture.reset() == ""
-    assert fixture.reply().text == f"Reset, but still latched: {HOLD_TEXT}"
+    assert fixture.answer() == f"Reset, but still latched: {HOLD_TEXT}"
     assert latched(fixture.state.latches) == ("contact",)
     assert fixture.drive(0.5).command == "brake"
     assert fixture.drive(0.0).command == "brake"
@@ -258,7 +256,7 @@ def test_a_reset_on_a_pressed_bumper_wants_all_that_a_reset_wants() -> None:
     fixture.linear = None
     fixture.tick()
     fixture.request(0.5)
-    assert fixture.reset() == "Motion is requested: release the controls first."
+    assert fixture.reset() == "Motion is requested: let go of the controls first."
     fixture.tick(40)
     fixture.pressed = False
     fixture.tick()
@@ -271,9 +269,9 @@ def test_a_reset_on_a_pressed_bumper_leaves_what_is_not_gone() -> None:
     fixture.estop()
     fixture.left_bits = 1
     fixture.tick(3)
-    fault = fixture.state.latches["driver_left"].text
+    fault = render(fixture.state.latches["driver_left"].phrases)
     assert fixture.reset() == ""
-    assert fixture.reply().text == f"Reset, but still latched: The bumper was hit. {fault}"
+    assert fixture.answer() == f"Reset, but still latched: The bumper was hit. {fault}"
     assert latched(fixture.state.latches) == ("contact", "driver_left")
     fixture.tick()
     assert fixture.hold() == fault

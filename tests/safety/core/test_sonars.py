@@ -24,6 +24,7 @@ from services.safety.core.sonars import (
 )
 from services.safety.report import _doubts
 from t2.messages import SONAR_NAMES, RangeStatus, Ultrasonic
+from t2.words import render
 from tests.safety.core.policy_fixture import FREE, NO_ECHO
 
 GOOD = Sonar(distance=1.0, fault="")
@@ -67,7 +68,7 @@ def test_farther_counts_after_three_by_5_cm(readings: tuple[float, ...], distanc
     ("reading", "status", "fault"),
     [
         (None, "fault", "faulty"),
-        (None, "too_near", "too near to measure"),
+        (None, "too_near", "too_near"),
         (None, "ok", "faulty"),
         (-0.1, "ok", "faulty"),
     ],
@@ -210,7 +211,7 @@ def drive(count: int, twist: Twist, **readings: float) -> SonarArray:
 
 def doubts(array: SonarArray) -> str:
     """Return the doubts as an operator reads them; empty without any."""
-    text = _doubts(array.sonars)
+    text = render(_doubts(array.sonars)).removeprefix("Sonar not trusted: ").rstrip(".")
     assert bool(text) == array.is_doubted
     return text
 
@@ -241,7 +242,7 @@ def test_an_old_sample_closes_all_sectors_and_its_repetition_opens_none() -> Non
 def test_without_fresh_samples_no_sonar_can_be_crept_past() -> None:
     assert SonarArray().unseen == frozenset()
     array = FILTER.update(drive(2, Twist()), sample(2), Twist(), NS_PER_S)
-    assert doubts(array) == "all silent"
+    assert doubts(array) == "All sonars are silent"
     assert array.unseen == frozenset()
 
 
@@ -251,22 +252,22 @@ AHEAD, BACK = Twist(0.5), Twist(-0.5)
 @pytest.mark.parametrize(
     ("twist", "readings", "faults"),
     [
-        (AHEAD, {"front": 2.0}, "front suspect"),
-        (AHEAD, {"rear": 2.0}, "rear suspect"),
-        (BACK, {"rear": 2.0}, "rear suspect"),
+        (AHEAD, {"front": 2.0}, "front (suspect)"),
+        (AHEAD, {"rear": 2.0}, "rear (suspect)"),
+        (BACK, {"rear": 2.0}, "rear (suspect)"),
         (AHEAD, {"left": 0.57, "right": 0.8}, ""),
-        (AHEAD, {"front_left": 0.8}, "front left suspect"),
+        (AHEAD, {"front_left": 0.8}, "front left (suspect)"),
         (AHEAD, {"front_left": 0.8, "left": 0.57}, ""),
         (AHEAD, {"rear_left": 0.8, "left": 0.57}, ""),
         (BACK, {"rear_right": 0.8, "right": 0.57}, ""),
         (AHEAD, {"front_right": 0.8, "right": 0.57}, ""),
-        (AHEAD, {"front_right": 0.8, "left": 0.57}, "front right suspect"),
-        (AHEAD, {"front_left": 0.8, "left": 0.39}, "front left suspect"),
-        (AHEAD, {"front_left": 0.8, "left": 0.89}, "front left suspect"),
+        (AHEAD, {"front_right": 0.8, "left": 0.57}, "front right (suspect)"),
+        (AHEAD, {"front_left": 0.8, "left": 0.39}, "front left (suspect)"),
+        (AHEAD, {"front_left": 0.8, "left": 0.89}, "front left (suspect)"),
         (AHEAD, {"front_left": 0.8, "left": 0.41}, ""),
         (AHEAD, {"front_left": 0.8, "left": 0.87}, ""),
-        (Twist(0.0, 0.5), {"left": 0.8}, "left suspect"),
-        (Twist(0.0, -0.5), {"front": 0.8}, "front suspect"),
+        (Twist(0.0, 0.5), {"left": 0.8}, "left (suspect)"),
+        (Twist(0.0, -0.5), {"front": 0.8}, "front (suspect)"),
         (Twist(0.0, 0.2), {"left": 0.8}, ""),
     ],
 )

@@ -25,6 +25,7 @@ from services.safety.core.sources import (
     SpeedLimits,
 )
 from t2.messages import Drive, EstopKeepalive, KeepaliveState, Limit, LimitState
+from t2.words import render
 
 MS = NS_PER_S // 1000
 AGE_NS = 400 * MS
@@ -302,17 +303,17 @@ def test_zero_is_a_protective_stop(
     assert (stop.name, stop.present) == ("limit_stop", stops)
     assert not silent.present
     if stops:
-        assert stop.text == "Stopped by lidar: PERSON."
+        assert render(stop.phrases) == "Stopped by lidar: PERSON."
         assert limits.limited(Twist(1.0, 1.0), 0) == (STILL, "lidar")
     assert not next(limits.observations(LEASE_NS + 1)).present
     both, _ = limit(limit(LIMITS, 0.0, reason="dog")[0], 0.0, source="fleet")
-    assert next(both.observations(0)).text == "Stopped by lidar: dog, fleet."
+    assert render(next(both.observations(0)).phrases) == "Stopped by lidar: dog, fleet."
 
 
 def test_all_silent_sources_are_named() -> None:
     needed = LimitSource(lease=LEASE_S, silence="stop")
     _, silent = SpeedLimits({"lidar": needed, "person": needed}).observations(0)
-    assert (silent.name, silent.text) == (
+    assert (silent.name, render(silent.phrases)) == (
         "limit_silent", "No speed limit arrives of lidar, person.",
     )  # fmt: skip
 
@@ -389,7 +390,7 @@ def test_another_program_under_the_name_is_a_loss_at_any_time(now_ns: int) -> No
     assert refused == ("second_publisher" if now_ns <= TIMEOUT_NS else "")
     seen = other.observation(now_ns)
     assert (seen.name, seen.present) == ("estop_keepalive", True)
-    assert seen.text == "The emergency stop is no longer kept alive by pendant."
+    assert render(seen.phrases) == "The emergency stop is no longer kept alive by pendant."
     assert other.channels["pendant"].in_conflict(now_ns + CONFLICT_NS - 1)
 
 
@@ -411,5 +412,5 @@ def test_a_name_that_was_never_received_is_missing_and_not_lost() -> None:
         KeepaliveState(source="pendant", age=0.5, alive=True, timeout=TIMEOUT_S),
         KeepaliveState(source="web", age=None, alive=False, timeout=TIMEOUT_S),
     )
-    text = keep(keepalives, source="web")[0].observation(2 * TIMEOUT_NS).text
-    assert text == "The emergency stop is no longer kept alive by pendant, web."
+    lost = keep(keepalives, source="web")[0].observation(2 * TIMEOUT_NS)
+    assert render(lost.phrases) == "The emergency stop is no longer kept alive by pendant, web."

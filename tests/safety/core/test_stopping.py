@@ -3,6 +3,7 @@
 import pytest
 
 from common.freshness import NS_PER_S
+from t2.words import render
 from tests.safety.core.policy_fixture import TICK_S, PolicyFixture
 
 
@@ -23,7 +24,7 @@ def test_a_stop_that_does_not_stop_becomes_a_brake(linear: float, angular: float
     began_ns = fixture.now_ns
     until(fixture, "brake")
     assert fixture.now_ns - began_ns <= (bound_s + 3 * TICK_S) * NS_PER_S
-    assert f"{linear:.2f} m/s" in fixture.state.latches["not_stopping"].text
+    assert f"{linear:.2f} m/s" in render(fixture.state.latches["not_stopping"].phrases)
     assert fixture.tick(500).name == "brake"
     fixture.linear, fixture.angular = 0.0, 0.0
     assert fixture.drive(0.3, seconds=1.0).name == "inhibited"  # a neutral request first

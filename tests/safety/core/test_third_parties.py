@@ -5,9 +5,9 @@ import pytest
 from common.motion import STILL
 from services.safety.config import LimitSource, Safety
 from services.safety.core.inputs import LimitRequest
-from services.safety.core.operator_requests import LET_GO
 from t2.messages import Limit
-from tests.safety.core.policy_fixture import PolicyFixture
+from t2.words import render
+from tests.safety.core.policy_fixture import LET_GO, PolicyFixture
 
 LEASE_S, LEASE_NS = 0.5, 500_000_000
 SOURCES = {
@@ -74,7 +74,9 @@ def test_a_needed_source_stops_from_the_start_until_its_first_limit() -> None:
     fixture.drive(0.0, seconds=1.0)
     fixture.drive(0.5, seconds=1.0)
     assert fixture.verdict.command == "stop"
-    assert fixture.state.latches["limit_silent"].text == "No speed limit arrives of lidar."
+    assert (
+        render(fixture.state.latches["limit_silent"].phrases) == "No speed limit arrives of lidar."
+    )
     for _ in range(10):
         fixture.limit()
         fixture.drive(seconds=0.1)
@@ -90,7 +92,7 @@ def test_two_limiting_publishers_stop_the_vehicle_until_one_is_left() -> None:
     assert fixture.refused == "limit_second_publisher"
     assert fixture.verdict.command == "stop"
     text = "Two publishers use limit lidar."
-    assert fixture.state.latches["two_publishers"].text == text
+    assert render(fixture.state.latches["two_publishers"].phrases) == text
     fixture.drive(0.5, seconds=0.6)
     assert fixture.verdict.name == "inhibited"  # the stick is still pushed
     fixture.drive()

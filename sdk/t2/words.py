@@ -1,0 +1,61 @@
+"""Texts for people: phrases of the catalogue, in English or Chinese. Pure.
+
+A cause, an event or a refusal is a name with fields, so that each screen shows it in the language
+of its reader. A template has a placeholder for each field: ``{name}``, with an optional format of
+Python's, as in ``{age:.1f}``. ``{name:word}`` is a word of the catalogue, or several.
+"""
+
+import re
+from collections.abc import Iterable
+from typing import Literal, get_args
+
+from t2.catalogue import TEXTS, WORDS, Words
+from t2.messages import Done, Field, Phrase
+
+Language = Literal["en", "zh"]
+LANGUAGES: tuple[Language, ...] = get_args(Language)
+PLACEHOLDER = re.compile(r"\{(\w+)(?::([^}]*))?\}")
+GAP = {"en": " ", "zh": ""}  # between two sentences
+COMMA = {"en": ", ", "zh": "、"}  # between two words of a list
+
+
+def render(phrases: Iterable[Phrase], language: Language = "en", otherwise: str = "") -> str:
+    """Return the phrases as one text.
+
+    ``otherwise`` is the text of the message that has them: it is returned without any phrase, and
+    for one that this version does not know.
+    """
+    rendered = [_rendered(phrase, language) for phrase in phrases]
+    if not rendered or None in rendered:
+        return otherwise
+    return GAP[language].join(filter(None, rendered))
+
+
+def done(*phrases: Phrase, boot: int = 0) -> Done:
+    """Return the answer to a call that was carried out."""
+    return Done(text=render(phrases), phrases=phrases, boot=boot)
+
+
+def in_language(words: Words, language: Language) -> str:
+    """Return a pair of texts in one language."""
+    return words[LANGUAGES.index(language)]
+
+
+def _rendered(phrase: Phrase, language: Language) -> str | None:
+    words = TEXTS.get(phrase.name)
+    if words is None:
+        return None
+
+    def value(found: "re.Match[str]") -> str:
+        return _value(phrase.fields.get(found[1]), found[2] or "", language)
+
+    return PLACEHOLDER.sub(value, in_language(words, language))
+
+
+def _value(value: Field, form: str, language: Language) -> str:
+    if isinstance(value, tuple):
+        return COMMA[language].join(_value(each, form, language) for each in value)
+    if form == "word":
+        words = WORDS.get(str(value))
+        return in_language(words, language) if words else str(value).replace("_", " ")
+    return format(value, form) if form and isinstance(value, float | int) else str(value)
