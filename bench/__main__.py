@@ -17,9 +17,9 @@ from bench.figures import Column, Figures, Limits, columns, compared
 from bench.processes import MissingError
 from bench.reaction import PACKAGE, is_granted
 from verification.harness.host import StallRecorder, description
-from verification.harness.results import table
+from verification.harness.results import filled, table
 
-PAGE = Path(__file__).with_name("page.md")
+PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 HEAD = ["question", "figure", "compared with", "ratio", "target", "verdict"]
 
 
@@ -113,15 +113,15 @@ def measured(benchmark: Benchmark) -> Result:
 
 
 def page(results: Mapping[str, Result]) -> str:
-    """Return the document."""
+    """Return the document with its generated blocks replaced."""
     blocks, rows = dict[str, str](), list[list[str]]()
     for name, one in results.items():
         it = BENCHMARKS[name]
-        blocks[f"{name}_where"] = one.where
-        blocks[f"{name}_table"] = columns(it.heads, it.columns, one.figures)
+        figures = columns(it.heads, it.columns, one.figures)
+        blocks[name] = f"Measured on {one.where}.\n\n{figures}"
         rows += compared(it.question, it.limits, one.figures)
     blocks["summary"] = table(HEAD, rows)
-    return PAGE.read_text(encoding="utf-8").format(**blocks)
+    return filled(PAGE.read_text(encoding="utf-8"), blocks)
 
 
 if __name__ == "__main__":

@@ -7,30 +7,38 @@ from pathlib import Path
 from statistics import mean, median
 
 from verification.harness.host import description
-from verification.harness.results import percentile, table
+from verification.harness.results import filled, percentile, table
 from verification.search.draw import ranges
 from verification.search.judge import CHI2_95
 from verification.search.run import Result
 
-TEMPLATE = Path(__file__).with_name("page.md")
+PAGE = Path(__file__).parents[2] / "docs" / "vehicles.md"
 WORST = 10
 FAULTS = [one.name for one in ranges() if one.fault]
 
 
 def page(results: Sequence[Result]) -> str:
-    """Return the page of these results."""
+    """Return the page with the blocks of these results."""
     sound = [result for result in results if not result.faulty]
     faulty = [result for result in results if result.faulty]
-    return TEMPLATE.read_text(encoding="utf-8").format(
-        date=datetime.now(UTC).date().isoformat(),
-        runs=f"{len(results):,}",
-        hours=f"{sum(result.seconds for result in results) / 3600:.1f}",
-        machine=description(),
-        python=platform.python_version(),
-        cpu=f"{median(result.cpu_s / result.seconds for result in results):.2f}",
-        results=summary({"no fault": sound, "with faults": faulty}),
-        worst=worst(results),
-        odometry=odometry(sound),
+    blocks = {
+        "made": made(results),
+        "results": summary({"no fault": sound, "with faults": faulty}),
+        "worst": worst(results),
+        "odometry": odometry(sound),
+    }
+    return filled(PAGE.read_text(encoding="utf-8"), blocks)
+
+
+def made(results: Sequence[Result]) -> str:
+    """Return when, how and where the runs were made."""
+    hours = sum(result.seconds for result in results) / 3600
+    cpu = median(result.cpu_s / result.seconds for result in results)
+    return (
+        f"Made on {datetime.now(UTC).date().isoformat()} by {len(results):,} runs, "
+        f"{hours:.1f} hours of simulated time: {description()}, "
+        f"Python {platform.python_version()}. "
+        f"A second of simulated time took {cpu:.2f} s of CPU at the median."
     )
 
 
