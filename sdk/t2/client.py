@@ -6,13 +6,13 @@
 phase      tick with a request tick without a request
 ========== =================== =========================================
 SILENT     zero; DRIVING       nothing
-DRIVING    the request         zero; RELEASING, two zeros remain
-RELEASING  zero; DRIVING       zero; SILENT after the last one
+DRIVING    the request         zero; ENDING, two zeros remain
+ENDING  zero; DRIVING       zero; SILENT after the last one
 ========== =================== =========================================
 
 A request is a twist, or a release off a pressed bumper. The zero before it is the neutral request
 that arms safety and the bridge; it is sent again when a release begins, ends or changes its
-direction. ``stop`` leads to RELEASING with three zeros from any phase. Each message echoes the
+direction. ``stop`` leads to ENDING with three zeros from any phase. Each message echoes the
 newest heartbeat of safety, which bounds its age without synchronized clocks.
 
 **Denied.** A router whose access rules forbid a message drops it without an error, and announces
@@ -66,14 +66,14 @@ class Phase(Enum):
 
     SILENT = "silent"
     DRIVING = "driving"
-    RELEASING = "releasing"
+    ENDING = "ending"
 
 
 class DriveRequests(Struct):
     """The sequence of drive requests, one tick at a time."""
 
     phase: Phase = Phase.SILENT
-    zeros: int = 0  # left to send while RELEASING
+    zeros: int = 0  # left to send while ENDING
     release: ReleaseRequest = "none"  # requested in the last tick of DRIVING
 
     def tick(self, requested: Drive | None) -> Drive | None:
@@ -93,7 +93,7 @@ class DriveRequests(Struct):
 
     def stop(self) -> None:
         """Send the final zeros in the next ticks, from any phase."""
-        self.phase, self.zeros = Phase.RELEASING, ZEROS
+        self.phase, self.zeros = Phase.ENDING, ZEROS
 
 
 class Access(Struct):
@@ -148,7 +148,8 @@ class EstopRepetition(Struct):
     """An emergency stop that is repeated until safety has latched it."""
 
     ticks: int = 0  # left; 0 when no stop is pending
-    unsure: int = 0  # ticks left that the latch must still last
+    needed: int = 0  # ticks in a row in which the latch must show
+    shown: int = 0  # ticks in a row in which it has shown
 
     @property
     def is_pending(self) -> bool:
@@ -158,18 +159,20 @@ class EstopRepetition(Struct):
     def start(self, state: SafetyState | None, ticks: int | None = None) -> None:
         """Start, or start again, after the first stop was sent; ``state`` is the newest one."""
         self.ticks = ESTOP_TICKS if ticks is None else ticks
-        self.unsure = 1 if state is not None and "estop" not in state.latched else KEPT_TICKS
+        self.shown = 0
+        self.needed = 1 if state is not None and "estop" not in state.latched else KEPT_TICKS
 
     def tick(self, state: SafetyState | None) -> EstopStep:
         """Return the action of this tick; ``state`` is None without a fresh state of safety."""
         if not self.ticks:
             return EstopStep.NONE
-        if state is None or "estop" not in state.latched:
-            self.unsure = KEPT_TICKS if state is None else 1
+        if state is not None and "estop" in state.latched:
+            self.shown += 1
         else:
-            self.unsure -= 1
-        self.ticks = self.ticks - 1 if self.unsure else 0
-        if not self.unsure:
+            self.shown, self.needed = 0, KEPT_TICKS if state is None else 1
+        is_confirmed = self.shown >= self.needed
+        self.ticks = 0 if is_confirmed else self.ticks - 1
+        if is_confirmed:
             return EstopStep.NONE
         return EstopStep.REPEAT if self.ticks else EstopStep.LAST
 

@@ -1,14 +1,17 @@
 """Which ``cmd_vel`` may become a drive request. Pure.
 
-ROS messages carry the time of the sender's clock, which need not agree with ours. For each
-publisher the difference of our receive time and that time has a minimum: the fastest delivery so
-far. A command that took ``HELD_BACK_NS`` longer, until it was judged, was held back by the network
-or by a busy host, and must not move the robot. A burst of old commands at the start has no such
-minimum yet: commands are taken only when the minimum has been steady for ``SETTLE_NS``. It rises
-slowly, as clocks drift.
+**Delay.** ROS messages carry the time of the sender's clock, which need not agree with ours. For
+each publisher the difference of our receive time and that time has a minimum, the fastest delivery
+so far. It rises slowly, as clocks drift. A command that took ``HELD_BACK_NS`` longer than that was
+held back by the network or by a busy host, and must not move the robot. At the start there is no
+such minimum: a publisher *settles* until the minimum has been steady for ``SETTLE_NS``.
 
-One publisher drives at a time, and each was neutral before. In ROS no request is silence, so a
-pause of ``PAUSE_NS`` is neutral, by its clock and ours: what a network held back or lost is none.
+**Neutral.** In ROS no request is silence. So a pause of ``PAUSE_NS``, by the publisher's clock and
+by ours, counts as neutral: silence, or zeros. With ``by_zero`` only zeros count, after settling. A
+lost command may have commanded motion, so a gap in the sequence is no pause. Of a new publisher the
+first ``UNHEARD`` commands may be lost, because ROS does not wait for a match.
+
+**States of a publisher.** One drives at a time. The state changes before the command is judged:
 
 | state      | event                                              | next       | to safety         |
 | ---------- | -------------------------------------------------- | ---------- | ----------------- |
@@ -23,14 +26,8 @@ pause of ``PAUSE_NS`` is neutral, by its clock and ours: what a network held bac
 | any        | motion while safety bars it, or another one drives | must pause |                   |
 | any        | a command after ``LAPSE_NS`` without one           | must pause |                   |
 
-The state changes before the command is judged: after a silence the same command begins anew. What
-is lost may have commanded motion, so it is no pause. Of a new publisher the first ``UNHEARD`` may
-be lost, as ROS does not wait for a match. Before a later one it may have driven for long, while its
-link was down: no pause is known. The neutral request is sent when the pause ends, and for each
-command until the publisher has settled: safety wants a new one when the vehicle stood without a
-request. What bars motion in between shows in safety's state, and the publisher must pause again.
-With ``by_zero`` a pause is not neutral: a publisher settles first, and its next zero counts. A
-command is passed on once, as it is.
+Safety wants a new neutral request when the vehicle stood without one, so each command of a settling
+publisher sends it.
 """
 
 from typing import NamedTuple

@@ -209,11 +209,11 @@ class SafetyService:
             reset=reset,
         )
         self._estop_due = False
-        for output in self._policy.decide(before, inputs, now_ns):
-            if isinstance(output, Motion):
-                self._send(output, is_tick=is_tick)
-            else:
-                self._state = output
+        if hit := self._policy.brake_for_hit(before, inputs):
+            self._send(hit, is_tick=is_tick)
+        decision = self._policy.decide(before, inputs, now_ns)
+        self._state = decision.state
+        self._send(decision.motion, is_tick=is_tick)
         self._report(before, answer, now_ns)
 
     def _send(self, motion: Motion, *, is_tick: bool) -> None:

@@ -10,9 +10,9 @@ from common import clock
 from common.freshness import NS_PER_S
 from services.odom.config import OdomConfig
 from services.odom.odometer import Odometer
-from t2.words import render
 from t2 import keys
 from t2 import messages as m
+from t2.words import render
 from tests.factories import safety_state
 from tests.fake_bus import FakeNode
 
@@ -42,7 +42,8 @@ class Odometry:
         """Set the pose; return what was replied, or the refusal."""
         answers: list[str] = []
         caller: Any = SimpleNamespace(
-            refuse=lambda *reasons: answers.append(render(reasons)), reply=lambda done: answers.append(done.text)
+            refuse=lambda *reasons: answers.append(render(reasons)),
+            reply=lambda done: answers.append(done.text),
         )
         self.node.fake.served[keys.SET_POSE.path](m.PoseRequest(**request), caller)
         return answers[0]

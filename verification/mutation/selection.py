@@ -8,7 +8,7 @@ import subprocess
 import tomllib
 from pathlib import Path
 
-UNMIRRORED = "services"  # a folder that the tests do not repeat
+UNMIRRORED = {"services", "t2"}  # folders that the tests do not repeat
 FOLDERS = {"core", "wire"}  # their tests belong to every file of them
 
 Cores = dict[str, list[str]]  # tests of each file
@@ -27,7 +27,7 @@ def cores() -> Cores:
 
 def tests_of(core: Path) -> list[str]:
     """Return the test files of a core."""
-    folder = Path("tests", *(name for name in core.parent.parts if name != UNMIRRORED))
+    folder = Path("tests", *(name for name in core.parent.parts if name not in UNMIRRORED))
     name = "test_*.py" if core.parent.name in FOLDERS else f"test_{core.stem}*.py"
     if not (found := sorted(map(str, folder.glob(name)))):
         raise ValueError(f"{core}: no test in {folder}")

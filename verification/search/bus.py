@@ -17,7 +17,8 @@ from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
 from common.loop import Timer
 from t2.keys import SAFETY, Call, Topic
-from t2.messages import Message, SourceMessage
+from t2.messages import Message, Phrase, SourceMessage
+from t2.words import render
 
 MS = NS_PER_S // 1000
 ECHO_MS, HOLD_MS = 30, 45  # later than the first copy; later than its neighbours
@@ -165,8 +166,8 @@ class Caller:
     def reply(self, message: Any) -> None:
         self.done, self.answer = True, message
 
-    def refuse(self, reason: str) -> None:
-        self.done, self.text = False, reason
+    def refuse(self, *reasons: Phrase) -> None:
+        self.done, self.text = False, render(reasons)
 
 
 class Watch(Protocol):
@@ -338,7 +339,7 @@ class Process:
     def answer(self, key: str, make: Callable[[], bytes], encoding: str) -> None:
         """Do nothing: nobody asks for JSON here."""
 
-    def event(self, name: str, level: str, text: str, **about: object) -> None:
+    def event(self, name: str, level: str, *phrases: Phrase, **about: object) -> None:
         """Discard events."""
 
     def serve(self, call: Call[Any, Any], handler: Callable[[Any, Any], None]) -> None:

@@ -1,7 +1,7 @@
 """Operator calls to the board: emergency brakes and lamps. Pure.
 
-Both are answered with the board's echo, or with the reason for its absence. The call for the brakes
-must also echo safety's heartbeat, so that a delayed call is refused.
+Both are answered with the board's confirmation, or with the reason for its absence. The call for
+the brakes must also echo safety's heartbeat, so that a delayed call is refused.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from t2.messages import Phrase
 
 
 class Pending(Struct, frozen=True):
-    """A call that waits for the board's echo."""
+    """A call that waits for the board's confirmation."""
 
     caller: Any
     until_ns: int
@@ -34,7 +34,7 @@ class Calls:
     def __init__(
         self, readiness: Readiness, timeout_s: float, ask: Callable[[Frame, int], Send]
     ) -> None:
-        """Set up with the timeout of the board's echo (s), and what sends it a frame."""
+        """Set up with the timeout of the board's confirmation (s), and what sends it a frame."""
         self._readiness = readiness
         self._timeout_s = timeout_s
         self._ask = ask
@@ -46,7 +46,7 @@ class Calls:
         self._echoes = self._echoes.received(state, received_ns)
 
     def on_switches(self, request: m.SwitchesRequest, caller: Any, now_ns: int) -> Outputs:
-        """Request positions of the board's brakes; their echo answers the caller."""
+        """Request positions of the board's brakes; their confirmation answers the caller."""
         late = self._echoes.refusal(request.echo, now_ns)
         if reason := late or self._refusal("switches"):
             yield Refuse(caller, reason)
@@ -60,14 +60,14 @@ class Calls:
                 brake.want(on, now_ns)
 
     def on_led(self, request: m.LedRequest, caller: Any, now_ns: int) -> Outputs:
-        """Set a lamp channel; the echo answers the caller."""
+        """Set a lamp channel; the confirmation answers the caller."""
         if reason := self._refusal("lamps"):
             yield Refuse(caller, reason)
             return
         self._begin("lamps", caller, now_ns)
         yield self._ask(LedSet(**asdict(request)), now_ns)
 
-    def on_led_echo(self, done: bool) -> Outputs:
+    def on_led_answer(self, done: bool) -> Outputs:
         """Process the board's answer to a lamp command."""
         if call := self._pending.pop("lamps", None):
             if done:
@@ -76,7 +76,7 @@ class Calls:
                 yield Refuse(call.caller, (Phrase("board.failure"),))
 
     def on_tick(self, now_ns: int) -> Outputs:
-        """Answer the calls whose echo was received or is overdue."""
+        """Answer the calls that the board has confirmed, or not in time."""
         if "switches" in self._pending and self._readiness.settled:
             yield Reply(self._pending.pop("switches").caller, self._readiness.message())
         for what, call in list(self._pending.items()):

@@ -13,8 +13,8 @@ motions.on_motion  a message on ``@cmd/motion`` the frame that the lease allows
 motions.on_estop   an emergency stop            BRAKE
 motions.stop,      the end of the process       STOP or BRAKE
 motions.on_exit
-calls.on_switches, an operator's call           a frame or a refusal; the board's echo answers it
-calls.on_led                                    later
+calls.on_switches, an operator's call           a frame or a refusal; the board's confirmation
+calls.on_led                                    answers it later
 calls.on_safety    each state of safety         nothing: calls echo its heartbeat
 ================== ============================ ==================================================
 
@@ -38,7 +38,8 @@ from services.bridge.core.output import Event, Outputs, Publish, Send
 from services.bridge.core.polling import Polling
 from services.bridge.core.ports import Ports
 from services.bridge.core.readiness import Readiness
-from services.bridge.core.translate import BumperFilter, Translator, driver, restarted
+from services.bridge.core.restart_detection import restarted
+from services.bridge.core.translate import Translator, driver
 from t2 import keys
 from t2 import messages as m
 from t2.messages import Field, Phrase
@@ -58,6 +59,27 @@ QUERIES: tuple[tuple[str, Frame, float], ...] = (
     ("driver_left", commands.DriverQuery(Side.LEFT), keys.DRIVER.rate_hz),
     ("driver_right", commands.DriverQuery(Side.RIGHT), keys.DRIVER.rate_hz),
 )
+
+
+class BumperFilter:
+    """Debounces the bumper: one sample is a hit, three consecutive samples are clear.
+
+    The header of a frame has no CRC. Make a new filter after a link loss or a restart of the board.
+    """
+
+    CLEAR_SAMPLES = 3
+
+    def __init__(self) -> None:
+        self.pressed: bool | None = None  # None until the first hit or three clear samples
+        self._clear = 0
+
+    def take(self, pressed: bool) -> bool:
+        """Process a sample; return whether a hit begins with it."""
+        hit = pressed and not self.pressed
+        self._clear = 0 if pressed else self._clear + 1
+        if pressed or self._clear >= self.CLEAR_SAMPLES:
+            self.pressed = pressed
+        return hit
 
 
 class Core:
@@ -96,13 +118,13 @@ class Core:
             reports.DistanceReport: self._on_distance,
             reports.UltrasonicReport: self._on_ultrasonic,
             reports.DriverReport: self._on_driver,
-            reports.UltrasonicBrakeReport: lambda frame, *_: readiness.on_echo(
+            reports.UltrasonicBrakeReport: lambda frame, *_: readiness.on_confirmation(
                 readiness.ultrasonic, frame.on
             ),
-            reports.BumperBrakeReport: lambda frame, *_: readiness.on_echo(
+            reports.BumperBrakeReport: lambda frame, *_: readiness.on_confirmation(
                 readiness.bumper, frame.on
             ),
-            reports.LedReport: lambda frame, *_: self.calls.on_led_echo(frame.done),
+            reports.LedReport: lambda frame, *_: self.calls.on_led_answer(frame.done),
         }
 
     # --- input from the board ----------------------------------------------------------
@@ -194,7 +216,7 @@ class Core:
             yield from self.readiness.on_restart(now_ns)
             self._bumper = BumperFilter()
             # 1 equivalent mutant: None is as false as False.
-            self.motions.on_ready(False)  # also where a firmware without echoes stays ready
+            self.motions.on_ready(False)  # also where a firmware that confirms nothing stays ready
             after = self._translator.mileage(frame, self.readiness.epoch)
         self._mileage = Latest(after, asked_ns)
         self.motions.on_mileage(after, now_ns)

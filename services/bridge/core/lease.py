@@ -15,7 +15,7 @@ uncommanded  leaving a standstill while the  a motion message with safety's latc
              lease was over: BRAKE at once   its ``predecessor`` is the bridge itself
 latch owner  an authority that ended with a  its successor has latched in its place, and names
              latch that was not reset        the owner of that latch in ``predecessor``
-ready        link lost, brakes unverified,   both emergency brakes on and echoed
+ready        link lost, brakes unverified,   both emergency brakes on, confirmed
              board restarted, stopping
 neutral      start, not ready, lease over,   a STOP, BRAKE or RUN of 0 from the authority, while
              a new authority                 ready: no motion on reconnect alone

@@ -12,11 +12,12 @@ these steps, always in this order, so that a trip wins over a reset that arrives
              (``causes.py``)
 
 RUN has one origin: the end of ``_conclude``, when no held cause demands STOP or BRAKE and a fresh
-request exists. A new contact yields BRAKE before all these steps, which latch it.
+request exists. ``brake_for_hit`` comes before all these steps, which latch a new contact.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
@@ -49,6 +50,13 @@ SETTLE_NS = NS_PER_S // 2  # of good inputs until a cause clears
 LONGEST_STEP_S = 0.1  # between two decisions; a stalled process must not skip ahead
 
 COMMANDS: dict[VerdictName, Command] = {"run": RUN, "slow": RUN, "stop": STOP, "brake": BRAKE}
+
+
+class Decision(Struct, frozen=True):
+    """What a decision leads to."""
+
+    state: State
+    motion: Motion
 
 
 class Policy:
@@ -99,12 +107,16 @@ class Policy:
         stands = state.motion.standstill.displacement.is_standing
         return state.arbiter.at_rest(now_ns) if stands else state.arbiter
 
-    def decide(self, state: State, inputs: Inputs, now_ns: int) -> Iterator[Motion | State]:
-        """Yield what to send, urgent first, then the new state."""
+    def brake_for_hit(self, state: State, inputs: Inputs) -> Motion | None:
+        """Return BRAKE for a new contact, before the decision that latches it; None without one."""
         bumper = inputs.bumper
-        if bumper is not None and bumper.value.pressed and "contact" not in state.latches:
-            hit = Verdict(command=BRAKE, judged=_judged(inputs))
-            yield _motion(hit, inputs, state.estop, is_latched=True)
+        if bumper is None or not bumper.value.pressed or "contact" in state.latches:
+            return None
+        hit = Verdict(command=BRAKE, judged=_judged(inputs))
+        return _motion(hit, inputs, state.estop, is_latched=True)
+
+    def decide(self, state: State, inputs: Inputs, now_ns: int) -> Decision:
+        """Return the new state, and the motion for the bridge."""
         step_s = min((now_ns - (state.decided_ns or now_ns)) / NS_PER_S, LONGEST_STEP_S)
         # 2 equivalent mutants: any step tells one decision from the next.
         state = replace(state, decision=state.decision + 1)
@@ -124,8 +136,8 @@ class Policy:
             estop_connection=inputs.estop_connection or state.estop_connection,
             estop=inputs.link.value.estop if inputs.link else None,
         )
-        yield _motion(verdict, inputs, state.estop, is_latched=bool(latched(state.latches)))
-        yield state
+        is_latched = bool(latched(state.latches))
+        return Decision(state, _motion(verdict, inputs, state.estop, is_latched=is_latched))
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         sent, counters = state.verdict, inputs.mileage

@@ -9,15 +9,9 @@ from common.freshness import NS_PER_S
 from common.motion import STOP
 from common.wire import reports
 from common.wire.commands import BumperBrakeSet, MotionKind, UltrasonicBrakeSet
+from services.bridge.core.brakes import AGAIN_NS, ASK_NS, UNCONFIRMED, Brake
 from services.bridge.core.output import Event, Output
-from services.bridge.core.readiness import (
-    AGAIN_NS,
-    ASK_NS,
-    RELAY_SILENCE_NS,
-    UNECHOED,
-    Brake,
-    RelayStatus,
-)
+from services.bridge.core.relay_status import RELAY_SILENCE_NS, RelayStatus
 from services.relay.core import REPORT, Relay
 from t2 import messages as m
 from t2.messages import Phrase
@@ -82,7 +76,7 @@ def test_silence_loses_the_link(bench: Bench, age: int, state: str) -> None:
 
 def echoed(on: bool = True) -> Brake:
     brake = Brake(BumperBrakeSet)
-    brake.on_echo(on)
+    brake.on_confirmation(on)
     return brake
 
 
@@ -99,7 +93,7 @@ def test_it_is_sent_until_echoed_and_then_again_and_again() -> None:
     for echo, wait_ns in ((None, ASK_NS), (False, ASK_NS), (True, AGAIN_NS), (None, AGAIN_NS)):
         assert brake.due(due_ns) == UltrasonicBrakeSet(True)
         if echo is not None:
-            brake.on_echo(echo)
+            brake.on_confirmation(echo)
         assert brake.settled is bool(brake.position)
         assert brake.due(due_ns + wait_ns - 1) is None
         due_ns += wait_ns
@@ -110,7 +104,7 @@ def test_an_operator_may_switch_it_off_until_the_board_returns() -> None:
     brake.want(False, NS_PER_S)
     assert (brake.position, brake.settled, brake.assumed_on) == (None, False, False)
     assert brake.due(NS_PER_S) == BumperBrakeSet(False)
-    brake.on_echo(False)
+    brake.on_confirmation(False)
     assert (brake.position, brake.settled) == (False, True)
     brake.on_return(2 * NS_PER_S)
     assert (brake.wanted, brake.position, brake.since_ns) == (True, None, 2 * NS_PER_S)
@@ -120,11 +114,11 @@ def test_an_operator_may_switch_it_off_until_the_board_returns() -> None:
 def test_an_on_counts_for_five_sends_and_an_off_until_an_on() -> None:
     brake = echoed()
     for second in range(1, 9):
-        assert sends(brake, UNECHOED, second * NS_PER_S).position is True
-        brake.on_echo(True)
-    assert sends(brake, UNECHOED + 1, 9 * NS_PER_S).position is None
+        assert sends(brake, UNCONFIRMED, second * NS_PER_S).position is True
+        brake.on_confirmation(True)
+    assert sends(brake, UNCONFIRMED + 1, 9 * NS_PER_S).position is None
     assert brake.assumed_on, "enough where the settings accept that"
-    assert sends(echoed(False), 3 * UNECHOED).position is False
+    assert sends(echoed(False), 3 * UNCONFIRMED).position is False
 
 
 # --- both brakes ----------------------------------------------------------------------------------

@@ -11,7 +11,8 @@ from common.settings import AngularUnit, Vehicle, Wire
 from common.wire.commands import MotionCommand, MotionKind
 from common.wire.frame import Side
 from common.wire.reports import DistanceReport, DriverReport, UltrasonicReport, VelocityReport
-from services.bridge.core.translate import (
+from services.bridge.core.core import BumperFilter
+from services.bridge.core.restart_detection import (
     DRIVEN_MPS,
     FAST_MPS,
     FAST_RADPS,
@@ -20,11 +21,9 @@ from services.bridge.core.translate import (
     TURNED_RADPS,
     ZERO_M,
     ZERO_RAD,
-    BumperFilter,
-    Translator,
-    driver,
     restarted,
 )
+from services.bridge.core.translate import Translator, driver
 from t2.messages import Command, Mileage, Motion
 
 

@@ -89,7 +89,9 @@ def test_a_call_is_replied_to_or_refused_with_a_reason(
 ) -> None:
     server.refuses = refusal
     client.asked()
-    assert (client.replies, client.refusals) == (([], [f"The message is invalid: {refusal}."]) if refusal else ([DONE], []))
+    assert (client.replies, client.refusals) == (
+        ([], [f"The message is invalid: {refusal}."]) if refusal else ([DONE], [])
+    )
 
 
 def test_a_flood_of_queries_is_answered_one_at_a_time(
@@ -129,7 +131,10 @@ def test_without_a_server_or_router_the_refusal_comes_at_once(buses: BusFixture)
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
-        (lambda query, key: query.reply(key, msgpack.packb({"text": 5})), "The message is invalid: not a ResetDone: "),
+        (
+            lambda query, key: query.reply(key, msgpack.packb({"text": 5})),
+            "The message is invalid: not a ResetDone: ",
+        ),
         (lambda query, _: query.reply_err("not with us"), "not with us"),  # without an encoding
     ],
 )

@@ -100,12 +100,10 @@ class PolicyFixture:
         inputs = replace(
             self.inputs, estop_connection=self.estop_connection, estop=estop, reset=reset
         )
-        self.motions = []
-        for output in self.policy.decide(self.state, inputs, self.now_ns):
-            if isinstance(output, Motion):
-                self.motions.append(output)
-            else:
-                self.state = output
+        hit = self.policy.brake_for_hit(self.state, inputs)
+        decision = self.policy.decide(self.state, inputs, self.now_ns)
+        self.motions = [*filter(None, [hit]), decision.motion]
+        self.state = decision.state
         self.verdict = self.state.verdict
         return self.verdict
 

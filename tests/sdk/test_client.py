@@ -48,10 +48,10 @@ DRIVE_TABLE = [  # before, requested, request, after
     (SILENT, None, None, SILENT),
     (SILENT, GO, NEUTRAL, DRIVING),
     (DRIVING, GO, GO, DRIVING),
-    (DRIVING, None, NEUTRAL, DriveRequests(Phase.RELEASING, 2)),
-    (DriveRequests(Phase.RELEASING, 2), None, NEUTRAL, DriveRequests(Phase.RELEASING, 1)),
-    (DriveRequests(Phase.RELEASING, 1), None, NEUTRAL, SILENT),
-    (DriveRequests(Phase.RELEASING, 2), GO, NEUTRAL, DriveRequests(Phase.DRIVING, 2)),
+    (DRIVING, None, NEUTRAL, DriveRequests(Phase.ENDING, 2)),
+    (DriveRequests(Phase.ENDING, 2), None, NEUTRAL, DriveRequests(Phase.ENDING, 1)),
+    (DriveRequests(Phase.ENDING, 1), None, NEUTRAL, SILENT),
+    (DriveRequests(Phase.ENDING, 2), GO, NEUTRAL, DriveRequests(Phase.DRIVING, 2)),
     (SILENT, BACK, NEUTRAL, OFF),
     (OFF, BACK, BACK, OFF),
     (DRIVING, BACK, NEUTRAL, OFF),
@@ -72,7 +72,7 @@ def test_the_table_of_drive_requests(
 def test_a_neutral_request_asks_for_nothing() -> None:
     assert request() == NEUTRAL == Drive(linear=0.0, angular=0.0, release="none", echo=0)
     assert request(0.2, 0.1, "forward") == structs.replace(GO, release="forward")
-    assert [phase.value for phase in Phase] == ["silent", "driving", "releasing"]
+    assert [phase.value for phase in Phase] == ["silent", "driving", "ending"]
 
 
 @pytest.mark.parametrize("phase", Phase)
@@ -192,7 +192,7 @@ def test_a_second_stop_starts_the_time_again() -> None:
     estop.start(AFTER)
     estop.tick(None)
     estop.start(SEEN)
-    assert (estop.ticks, estop.unsure) == (ESTOP_TICKS, KEPT_TICKS) == (60, 10)
+    assert (estop.ticks, estop.needed) == (ESTOP_TICKS, KEPT_TICKS) == (60, 10)
     estop.start(SEEN, 600)  # a client whose link may be down
     assert estop.ticks == 600
     assert len({step.value for step in EstopStep}) == len(EstopStep) == 3
