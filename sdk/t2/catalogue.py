@@ -302,6 +302,7 @@ PHRASES: dict[str, Words] = {
     ),
     # control
     "control.of": ("{source} is in control.", "{source} 取得控制权。"),
+    "control.you": ("You are in control.", "您已取得控制权。"),  # to the operator of that source
     "control.none": ("No source is in control.", "没有请求源取得控制权。"),
     # the next step at a latch
     "next.reset": ("Reset to go on.", "复位后方可行驶。"),
@@ -513,8 +514,12 @@ PHRASES: dict[str, Words] = {
         "指令要求 linear.x 和 angular.z 之外的运动：此接口不支持横向行驶。",
     ),
     # operators
-    "operator.by": ("({by})", "（{by}）"),
-    "driver.taken": ("{who} has taken over control.", "{who} 已接管控制权。"),
+    "operator.by": ("Certificate: {by}.", "证书：{by}。"),
+    "driver.taken": (
+        "{who:operator} has taken over control.", "{who:operator} 已接管控制权。",
+    ),
+    # events that a screen has not received
+    "events.missing": ("{count} events are missing here.", "此处缺少 {count} 条事件。"),
 }  # fmt: skip
 
 LATCHED: Any = (  # names of both causes and events
@@ -744,16 +749,20 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "teleop, dashboard, estop", "estop", "warning",
-        ("Emergency stop requested by {by}.", "{by} 请求急停。"),
+        ("Emergency stop requested by {by:operator}.", "{by:operator} 请求急停。"),
         ("see `estop` of safety", "见安全服务的 `estop`"),
     ),
     EventRow(
         "teleop, dashboard", "reset_request", "info",
-        ("Reset requested by {by}.", "{by} 请求复位。"), NOTHING,
+        ("Reset requested by {by:operator}.", "{by:operator} 请求复位。"), NOTHING,
     ),
     EventRow(
         "teleop, dashboard", "take_over", "info",
-        ("{by} takes control from {other}.", "{by} 从 {other} 接管控制权。"), NOTHING,
+        (
+            "{by:operator} takes control from {other:operator}.",
+            "{by:operator} 从 {other:operator} 接管控制权。",
+        ),
+        NOTHING,
     ),
     EventRow(
         "teleop", "overruled", "warning",
@@ -767,7 +776,7 @@ EVENTS: tuple[EventRow, ...] = (
         ),
     ),
     EventRow(
-        "teleop, dashboard", "estop_denied", "error",
+        "teleop", "estop_denied", "error",
         (
             "EMERGENCY STOP NOT CONFIRMED, probably not allowed: use the vehicle's own switch.",
             "急停未被确认，可能无权急停：请使用车身上的急停开关。",
@@ -775,7 +784,7 @@ EVENTS: tuple[EventRow, ...] = (
         (f"{OWN_SWITCH[0]}, `t2 keys list`", f"{OWN_SWITCH[1]}、`t2 keys list`"),
     ),
     EventRow(
-        "teleop, dashboard", "estop_unconfirmed", "error",
+        "teleop", "estop_unconfirmed", "error",
         (
             "EMERGENCY STOP NOT CONFIRMED: use the vehicle's own switch.",
             "急停未被确认：请使用车身上的急停开关。",
@@ -783,7 +792,7 @@ EVENTS: tuple[EventRow, ...] = (
         OWN_SWITCH,
     ),
     EventRow(
-        "teleop, dashboard", "reset_unconfirmed", "error",
+        "teleop", "reset_unconfirmed", "error",
         (
             "RESET NOT CONFIRMED: safety's state does not show the effect of the reset.",
             "复位未被确认：安全服务的状态没有变化。",
@@ -816,7 +825,7 @@ EVENTS: tuple[EventRow, ...] = (
         ),
     ),
     EventRow(
-        "teleop, dashboard", "barred", "error",
+        "teleop", "barred", "error",
         (
             "NOT ALLOWED: the router drops the requests of this certificate; it may only watch.",
             "未获许可：路由器丢弃了此证书的请求，只能观看。",
@@ -907,6 +916,7 @@ WORDS: dict[str, Words] = {
     "encoder": ("encoder", "编码器"),
     "under_voltage": ("under voltage", "欠压"),
     "overload": ("overload", "过载"),
+    "viewer": ("viewer", "观看者"),
     "bridge": ("bridge", "桥接服务"),
     "safety": ("safety", "安全服务"),
     "contact": ("contact", "防撞条触发"),
@@ -916,5 +926,9 @@ WORDS: dict[str, Words] = {
 TEXTS: dict[str, Words] = {
     **PHRASES,
     **{name: entry.text for name, entry in CAUSES.items()},
-    **{f"event.{row.name}": row.text for row in reversed(EVENTS)},
+    # An event of safety has its own phrases: a name that others publish, too, has their text.
+    **{
+        f"event.{row.name}": row.text
+        for row in sorted(EVENTS, key=lambda row: row.services != "safety")
+    },
 }

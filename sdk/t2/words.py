@@ -3,6 +3,7 @@
 A cause, an event or a refusal is a name with fields, so that each screen shows it in the language
 of its reader. A template has a placeholder for each field: ``{name}``, with an optional format of
 Python's, as in ``{age:.1f}``. ``{name:word}`` is a word of the catalogue, or several.
+``{name:operator}`` is the name of an operator, or ``viewer 3`` for one without a name.
 """
 
 import re
@@ -14,6 +15,7 @@ from t2.messages import Done, Field, Phrase
 
 Language = Literal["en", "zh"]
 LANGUAGES: tuple[Language, ...] = get_args(Language)
+VIEWER = re.compile(r"viewer (\d+)")
 PLACEHOLDER = re.compile(r"\{(\w+)(?::([^}]*))?\}")
 GAP = {"en": " ", "zh": ""}  # between two sentences
 COMMA = {"en": ", ", "zh": "、"}  # between two words of a list
@@ -58,4 +60,7 @@ def _value(value: Field, form: str, language: Language) -> str:
     if form == "word":
         words = WORDS.get(str(value))
         return in_language(words, language) if words else str(value).replace("_", " ")
+    if form == "operator":
+        found = VIEWER.fullmatch(str(value))
+        return f"{in_language(WORDS['viewer'], language)} {found[1]}" if found else str(value)
     return format(value, form) if form and isinstance(value, float | int) else str(value)
