@@ -1,7 +1,8 @@
 """The first part between a screen and the wheels that is missing, and what follows from it. Pure.
 
 Safety reports what it lacks, so a missing part shows as several causes of it. A screen names the
-part, in this order, and folds the causes below it. It changes no decision.
+part, in this order, and folds the causes below it. It changes no decision. The text of a part is
+``root.PART`` in the catalogue.
 
 ====== ===========================================================================
 part   missing when
@@ -18,17 +19,18 @@ from typing import Literal
 
 from msgspec import Struct
 
-from t2.messages import CauseName, Link, SafetyState
+from t2.messages import CauseName, Link, Phrase, SafetyState
+from t2.words import render
 
 Part = Literal["", "router", "safety", "bridge", "relay", "board"]
 
-TEXTS: dict[Part, str] = {
-    "bridge": "The bridge does not run, or it hangs: start it on the robot.",
-    "relay": "The relay is silent: check its power and cable.",
-    "board": "The board is silent: check its power and cable.",
-}
 # Without one of these no command reaches the wheels, and a board may keep its last one.
-MAY_MOVE = "The vehicle may still move: use its own switch."
+TEXTS: dict[Part, str] = {
+    "bridge": render((Phrase("root.bridge"),)),
+    "relay": render((Phrase("root.relay"),)),
+    "board": render((Phrase("root.board"),)),
+}
+MAY_MOVE = render((Phrase("root.may_move"),))
 # Causes of safety that it has without a bridge, and others that follow from a missing bridge, relay
 # or board. One that latches, or that brakes a moving vehicle, is not among them.
 WITHOUT_BRIDGE: tuple[CauseName, ...] = ("starting", "bumper", "silent", "link")
