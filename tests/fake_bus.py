@@ -11,7 +11,7 @@ from common.config import Loaded
 from common.service import Node
 from common.settings import Shared
 from t2.keys import Call, Topic
-from t2.messages import Message
+from t2.messages import Message, Refusal
 from verification.harness.bus import at
 
 C = TypeVar("C", bound=Shared)
@@ -24,7 +24,7 @@ class FakeBus(Bus):
         self.handlers: dict[str, list[Callable[[Arrival[Any]], None]]] = {}
         self.served: dict[str, Callable[[Any, Any], None]] = {}
         self.asked: list[tuple[str, Any]] = []
-        self.answers: list[tuple[Callable[[Any], None], Callable[[str], None]]] = []
+        self.answers: list[tuple[Callable[[Any], None], Callable[[Refusal], None]]] = []
         self.estops = 0
         super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
 

@@ -30,7 +30,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from common import clock
 from services.dashboard.config import Dashboard
 from services.dashboard.guess_limit import GuessLimit
-from services.dashboard.i18n import TEXTS
+from services.dashboard.i18n import LABELS
 
 COOKIE = "t2_dashboard"
 TOKEN_MIN = 8
@@ -173,7 +173,7 @@ def page_of(request: Request) -> str:
 
 
 def _token_page(text: str, page: str, wait_s: float = 0.0) -> Response:
-    lines = (html.escape(line.replace("{}", str(math.ceil(wait_s)))) for line in TEXTS[text])
+    lines = (html.escape(line.replace("{}", str(math.ceil(wait_s)))) for line in LABELS[text])
     content = Template(TOKEN_PAGE).substitute(text="<br>".join(lines), page=html.escape(page))
     if not wait_s:
         return HTMLResponse(content, status_code=401)

@@ -48,7 +48,7 @@ class Hold(ClientMessage, frozen=True):
 
 
 class Free(ClientMessage, frozen=True):
-    """All controls are released."""
+    """All controls are let go."""
 
 
 class Gear(ClientMessage, frozen=True):

@@ -14,6 +14,7 @@ from common.service import Node
 from services.dashboard import client_messages as client
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import DashboardConfig
+from services.dashboard.i18n import label
 from services.dashboard.robot_page import RobotPage, Send, notice
 from t2 import keys
 
@@ -42,7 +43,7 @@ class Fleet:
         if robot in self._pages or len(self._pages) < PAGES_MAX:
             self._open(robot).join(viewer)
         else:
-            self.send([viewer], notice("warning", "too_many_robots"), False)
+            self.send([viewer], notice("warning", label("too_many_robots")), False)
 
     def leave(self, robot: str, viewer: str) -> None:
         """Remove a browser and free its driver lock."""
@@ -85,7 +86,7 @@ class Fleet:
         """Free all driver locks; the loop stops after the final zeros."""
         self._leaving = True
         for page in self._pages.values():
-            page.robot.release_driver()
+            page.robot.free_driver()
 
     def close(self) -> None:
         """Close every robot's session."""

@@ -14,6 +14,7 @@ from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
+from services.dashboard.i18n import Texts, label, phrase, rendered
 from services.dashboard.snapshot import DriverState
 from services.dashboard.telemetry_cache import EVENTS_DEPTH, TelemetryCache, path_of
 from t2 import keys
@@ -29,9 +30,9 @@ from t2.client import (
     reset_request,
 )
 from t2.keys import Topic
+from t2.words import render
 
-# Takes the level, the text or its key in ``i18n``, and the key of the result that it explains.
-Notify = Callable[[m.Level, str, str], None]
+Notify = Callable[[m.Level, Texts], None]
 
 FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.VELOCITY, keys.ULTRASONIC, keys.BUMPER, keys.LINK, keys.SWITCHES,
@@ -65,7 +66,7 @@ class Robot:
         self._requests_path = path_of(keys.DRIVE.on(bus.robot, source=settings.source))
         self._estop_until_ns = 0
         self._stopped_by = ""  # who requested the last emergency stop
-        self._resets: list[tuple[ResetCheck, str, Notify]] = []  # with the text of the answer
+        self._resets: list[tuple[ResetCheck, m.ResetDone, Notify]] = []  # with the answer
         self._log = Logger(robot=bus.robot)
         self._events = bus.publisher(keys.EVENTS, service="dashboard")
         for topic in FIXED_TOPICS:
@@ -117,17 +118,21 @@ class Robot:
         """Whether no request is being sent."""
         return self._requests.phase is Phase.SILENT
 
-    def release_driver(self) -> None:
+    def free_driver(self) -> None:
         """End the driver's hold, with zeros, and free the driver lock."""
         if self.driver_lock.driver is not None:
             self.driver_lock.leave(self.driver_lock.driver)
 
-    def event(self, name: m.EventName, level: m.Level, text: str) -> None:
+    def event(self, name: m.EventName, level: m.Level, **about: m.Field) -> None:
         """Publish and log what a viewer did, with the certificate of this dashboard."""
         by = common_name(self.bus.where)
-        text = f"{text} ({by})" if by else text
-        self._events.put(m.Event(name=name, level=level, text=text))
-        getattr(self._log, level)(text, event_name=name)
+        phrases = (
+            m.Phrase(f"event.{name}", about),
+            *((m.Phrase("operator.by", {"by": by}),) if by else ()),
+        )
+        text = render(phrases)
+        self._events.put(m.Event(name=name, level=level, text=text, phrases=phrases, about=about))
+        getattr(self._log, level)(text, event_name=name, **about)
 
     def estop(self, requested_by: str, age_s: float = 0.0) -> None:
         """Stop the robot; the stop is repeated until safety has latched it.
@@ -144,7 +149,7 @@ class Robot:
         # A page sends its request twice, and repeats it.
         is_stopped = self._estop.is_pending or (state is not None and "estop" in state.latched)
         if not is_stopped or requested_by != self._stopped_by:
-            self.event("estop", "warning", f"emergency stop requested by {requested_by}")
+            self.event("estop", "warning", by=requested_by)
         self._stopped_by = requested_by
         self._estop.start(state)
 
@@ -159,27 +164,26 @@ class Robot:
         """Clear the causes that a snapshot showed as latched; report the confirmation later."""
         shown = self.telemetry.shown(echo)
         if shown is None:
-            notify("warning", "too_late", "")
+            notify("warning", label("reset_refused", phrase("call.unknown_echo")))
             return
         check = ResetCheck(shown.value)
-        self.event("reset_request", "info", f"reset requested by {requested_by}")
+        self.event("reset_request", "info", by=requested_by)
 
         def answered(done: m.ResetDone) -> None:
             check.answer(done)
-            self._resets.append((check, done.text, notify))
+            self._resets.append((check, done, notify))
 
-        self.bus.call(
-            keys.RESET,
-            reset_request(shown.value),
-            answered,
-            lambda refusal: notify("warning", refusal.text, "reset_refused"),
-        )
+        def refused(refusal: m.Refusal) -> None:
+            text = rendered(refusal.phrases, refusal.text)
+            notify("warning", label("reset_refused", text))
+
+        self.bus.call(keys.RESET, reset_request(shown.value), answered, refused)
 
     # --- requests -----------------------------------------------------------------------------
 
     def _on_denied(self) -> None:
-        self.release_driver()
-        self._broadcast("error", "barred", "")
+        self.free_driver()
+        self._broadcast("error", phrase("event.barred"))
 
     def _yield(self, safety: m.SafetyState | None) -> None:
         """End a hold while another source drives: its end must not resume our motion."""
@@ -202,24 +206,23 @@ class Robot:
         if step is not EstopStep.NONE:
             self.bus.estop()
         if step is EstopStep.LAST:
-            self._broadcast("error", "estop_unconfirmed" if self.may_drive else "estop_denied", "")
+            name = "estop_unconfirmed" if self.may_drive else "estop_denied"
+            self._broadcast("error", phrase(f"event.{name}"))
             if self.may_drive and now_ns < self._estop_until_ns:
                 self._estop.start(safety)
 
     def _check_resets(self, state: m.SafetyState | None, now_ns: int) -> None:
         """Report the resets that safety's state confirms, or does not confirm in time."""
         waiting, self._resets = self._resets, []
-        for check, text, notify in waiting:
+        for check, done, notify in waiting:
             outcome = check.outcome(state, now_ns)
             if outcome is None:
-                self._resets.append((check, text, notify))
+                self._resets.append((check, done, notify))
             elif outcome:
-                if state is not None and state.latched:
-                    notify("warning", text, "reset_partial")
-                else:
-                    notify("info", text, "reset_done")
+                is_partial = state is not None and state.latched
+                notify("warning" if is_partial else "info", rendered(done.phrases, done.text))
             else:
-                notify("error", "reset_unconfirmed", "")
+                notify("error", phrase("event.reset_unconfirmed"))
 
     # --- telemetry ----------------------------------------------------------------------------
 

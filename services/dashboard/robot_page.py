@@ -15,6 +15,7 @@ from common.heartbeat import MAX_CALL_AGE_NS
 from services.dashboard import client_messages as client
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import HOLD_S, Push
+from services.dashboard.i18n import Texts, label, phrase
 from services.dashboard.robot import Robot
 from services.dashboard.snapshot import fast_snapshot, slow_snapshot
 from t2.messages import Level
@@ -25,9 +26,9 @@ SLOW_TICKS = 10  # between two slow snapshots
 Send = Callable[[Collection[str], bytes, bool], None]
 
 
-def notice(level: Level, text: str, about: str = "") -> bytes:
-    """Return a message: a text or its key in ``i18n``, and the key of the result it explains."""
-    return msgspec.json.encode({"k": "notice", "level": level, "text": text, "about": about})
+def notice(level: Level, text: Texts) -> bytes:
+    """Return a message with a text for a viewer."""
+    return msgspec.json.encode({"k": "notice", "level": level, "text": text})
 
 
 class RobotPage:
@@ -73,7 +74,7 @@ class RobotPage:
             case _ if self.robot.driver_lock.driver == viewer:
                 self._drive(viewer, message)
             case client.Gear() | client.Reset():
-                self._notify(viewer, "warning", "take_first")
+                self._notify(viewer, "warning", label("take_first"))
 
     def tick(self, now_ns: int, robots: Mapping[str, bool]) -> None:
         """Send the requests of the robot's driver, and the snapshots."""
@@ -106,15 +107,15 @@ class RobotPage:
 
     def _take(self, viewer: str, message: client.Take) -> None:
         lock = self.robot.driver_lock
-        before, by = lock.driver, lock.name or f"viewer {lock.driver}"
+        before, other = lock.driver, lock.name or f"viewer {lock.driver}"
         if not self.robot.may_drive:
-            self._notify(viewer, "error", "barred")
+            self._notify(viewer, "error", phrase("event.barred"))
         elif not lock.take(viewer, message.force, message.name):
             self._send([viewer], {"k": "taken"})
         elif before not in (None, viewer):
             who = message.name or f"viewer {viewer}"
-            self._notify(str(before), "warning", f"{who} has taken over control.")
-            self.robot.event("take_over", "info", f"{who} takes control from {by}")
+            self._notify(str(before), "warning", phrase("driver.taken", who=who))
+            self.robot.event("take_over", "info", by=who, other=other)
 
     def _drive(self, viewer: str, message: client.AnyMessage) -> None:
         robot, lock, notify = self.robot, self.robot.driver_lock, partial(self._notify, viewer)
@@ -131,12 +132,12 @@ class RobotPage:
             case client.Reset(echo, name=name):
                 robot.reset(echo, name or f"viewer {viewer}", notify)
 
-    def _notify(self, viewer: str, level: Level, text: str, about: str = "") -> None:
-        self._send_text([viewer], notice(level, text, about), False)
+    def _notify(self, viewer: str, level: Level, text: Texts) -> None:
+        self._send_text([viewer], notice(level, text), False)
 
-    def _broadcast(self, level: Level, text: str, about: str = "") -> None:
+    def _broadcast(self, level: Level, text: Texts) -> None:
         for viewer in self.viewers:
-            self._notify(viewer, level, text, about)
+            self._notify(viewer, level, text)
 
     def _send_events(self) -> None:
         lines, are_all = self.robot.telemetry.take_new()

@@ -23,7 +23,7 @@ from starlette.websockets import WebSocket
 from services.dashboard.auth import AuthMiddleware, Credentials
 from services.dashboard.client_messages import NAME_MAX, ROBOT
 from services.dashboard.config import Dashboard
-from services.dashboard.i18n import phrases, table
+from services.dashboard.i18n import table
 from services.dashboard.listener import BACKLOG, Listener
 from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub
 from t2.errors import LinkError
@@ -134,7 +134,7 @@ def page(settings: Dashboard, router: Sequence[str], words: Sequence[str]) -> st
     doctor = f"t2 doctor --robot {ROBOT_ID} {shlex.join(words)}".strip()
     template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
     return template.substitute(
-        robot=ROBOT_ID, texts=_script(table()), phrases=_script(phrases()),
+        robot=ROBOT_ID, texts=_script(table()),
         camera=html.escape(settings.camera), router=html.escape(", ".join(router)),
         doctor=html.escape(doctor),
     )  # fmt: skip

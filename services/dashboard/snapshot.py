@@ -5,30 +5,40 @@ Two snapshots are sent to the browsers as JSON, each encoded once for all viewer
 there is no fresh message. Distances are metres, angles radians, times seconds.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Literal
 
 from msgspec import Struct
 
 from common.root_cause import RootCause, root_cause
+from common.text import line
 from services.dashboard.driver_lock import HoldState
+from services.dashboard.i18n import Texts, rendered
 from services.dashboard.telemetry_cache import TelemetryCache
 from t2 import keys
 from t2.messages import (
     SONAR_NAMES,
+    Action,
     Cause,
+    CauseName,
     Driver,
     Health,
+    Limits,
+    Phrase,
+    Phrases,
     RangeStatus,
+    Release,
     SafetyState,
     Switches,
     Ultrasonic,
+    Verdict,
 )
 
 Tone = Literal["dark", "clear", "slow", "stop", "fault"]  # of a sonar sector
 WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")
 OF_STATUS: dict[RangeStatus, Tone] = {"no_echo": "clear", "too_near": "stop", "fault": "fault"}
-OF_CAUSE: dict[str, Tone] = {"obstacle": "slow", "blocked": "stop", "sonar": "fault"}
+OF_CAUSE: dict[CauseName, Tone] = {"obstacle": "slow", "blocked": "stop"}
+YOU = Phrase("control.you")
 
 
 class DriverState(Struct, frozen=True):
@@ -42,6 +52,30 @@ class DriverState(Struct, frozen=True):
     overruled: bool  # by that one, during a hold
     may: bool  # false: the router drops the requests of this certificate
     may_stop: bool  # false: its emergency stops, too
+
+
+class CauseView(Struct, frozen=True):
+    """A cause of safety, with its texts."""
+
+    name: CauseName
+    action: Action
+    age: float
+    text: Texts
+
+
+class SafetyView(Struct, frozen=True):
+    """The state of safety, with its texts."""
+
+    verdict: Verdict
+    latched: tuple[CauseName, ...]
+    causes: tuple[CauseView, ...]
+    source: str | None
+    limits: Limits
+    heartbeat: int
+    text: Texts
+    own_text: Texts  # the same, for the viewer that is in control
+    release: Release | None
+    release_refusal: Texts | None
 
 
 class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
@@ -58,7 +92,7 @@ class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
     tones: tuple[Tone, ...]
     bumper: bool | None
     link: str | None
-    safety: SafetyState | None
+    safety: SafetyView | None
     driver: DriverState
     keeper: str | None  # the viewer whose page keeps the emergency stop alive
 
@@ -105,10 +139,10 @@ def fast_snapshot(
         pose=(odometry.x, odometry.y, odometry.heading) if odometry else None,
         epoch=odometry.epoch if odometry else 0,
         ranges=sonar.ranges if sonar else (None,) * 8,
-        tones=tones(sonar if state else None, state.causes if state else ()),
+        tones=tones(sonar, state),
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
-        safety=state,
+        safety=safety_view(state) if state else None,
         driver=driver,
         keeper=keeper,
     )
@@ -131,26 +165,56 @@ def slow_snapshot(
     )
 
 
-def tones(ultrasonic: Ultrasonic | None, causes: Sequence[Cause]) -> tuple[Tone, ...]:
-    """Return the tone of each sector, by the sonar's status and the causes that name the sonar."""
-    if ultrasonic is None:
+def safety_view(state: SafetyState) -> SafetyView:
+    """Return the part of a state of safety that the page shows."""
+    return SafetyView(
+        verdict=state.verdict,
+        latched=state.latched,
+        causes=tuple(
+            CauseView(it.name, it.action, it.age, rendered(it.phrases, it.text))
+            for it in state.causes
+        ),
+        source=line(state.source) if state.source else None,
+        limits=state.limits,
+        heartbeat=state.heartbeat,
+        text=rendered(state.phrases, state.text),
+        own_text=rendered(addressed(state.phrases), state.text),
+        release=state.release,
+        release_refusal=(
+            rendered(state.refusal_phrases, state.release_refusal)
+            if state.release_refusal
+            else None
+        ),
+    )
+
+
+def addressed(phrases: Phrases) -> Phrases:
+    """Return the phrases as they are shown to the operator whose source is in control."""
+    return tuple(YOU if one.name == "control.of" else one for one in phrases)
+
+
+def tones(ultrasonic: Ultrasonic | None, state: SafetyState | None) -> tuple[Tone, ...]:
+    """Return the tone of each sector, by the sonar's status and by what safety has against it."""
+    if ultrasonic is None or state is None:
         return tuple("dark" for _ in SONAR_NAMES)
-    own: list[Tone] = [
-        OF_STATUS.get(status) or ("dark" if reading is None else "clear")
-        for status, reading in zip(ultrasonic.status, ultrasonic.ranges, strict=True)
+    own: dict[str, Tone] = {
+        name: OF_STATUS.get(status) or ("dark" if reading is None else "clear")
+        for name, status, reading in zip(
+            SONAR_NAMES, ultrasonic.status, ultrasonic.ranges, strict=True
+        )
+    }
+    found = [
+        (name, OF_CAUSE[it.name])
+        for it in state.causes
+        if it.name in OF_CAUSE
+        for name in sonars_of(it)
     ]
-    for cause in causes:
-        for index in sonars_named(cause.text) if cause.name in OF_CAUSE else ():
-            own[index] = max(own[index], OF_CAUSE[cause.name], key=WORST.index)
-    return tuple(own)
+    for name, tone in [*found, *((name, "fault") for name in state.doubted_sonars)]:
+        if name in own:
+            own[name] = max(own[name], tone, key=WORST.index)
+    return tuple(own.values())
 
 
-def sonars_named(text: str) -> list[int]:
-    """Return the sonars named in a text of safety; "front left" does not name "front"."""
-    found = []
-    for name in sorted(SONAR_NAMES, key=len, reverse=True):
-        words = name.replace("_", " ")
-        if words in text:
-            text = text.replace(words, "")
-            found.append(SONAR_NAMES.index(name))
-    return found
+def sonars_of(cause: Cause) -> list[str]:
+    """Return the names of the sonars in the phrases of a cause."""
+    return [str(one.fields["sonar"]) for one in cause.phrases if "sonar" in one.fields]

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 from msgspec import Struct
 
 from common.freshness import Latest, fresh
-from common.text import line
+from services.dashboard.i18n import Texts, of_event, phrase
 from t2 import keys
 from t2.keys import Topic
 from t2.messages import Event, Message, SafetyState
@@ -34,7 +34,7 @@ class EventLine(Struct, frozen=True):
     service: str
     name: str
     level: str
-    text: str
+    text: Texts
 
 
 class Received(NamedTuple):
@@ -91,9 +91,9 @@ class TelemetryCache:
         """Store an event, and a mark where events of its service are missing before it."""
         t = event.t_ns / 1e9
         if missing := self._missing(service, event):
-            mark = EventLine(t, service, "gap", "warning", f"{missing} events are missing here.")
+            mark = EventLine(t, service, "gap", "warning", phrase("events.missing", count=missing))
             self._add(event, mark)
-        self._add(event, EventLine(t, service, event.name, event.level, line(event.text)))
+        self._add(event, EventLine(t, service, event.name, event.level, of_event(service, event)))
 
     def take_new(self) -> tuple[list[EventLine], bool]:
         """Return the new events, and whether they replace all earlier ones.

@@ -50,15 +50,15 @@ def take_control(page: Page) -> None:
 
 
 def drive_until_moving(
-    stack: RunningStack, press: Callable[[], None], release: Callable[[], None]
+    stack: RunningStack, press: Callable[[], None], let_go: Callable[[], None]
 ) -> None:
-    """Hold until the vehicle moves; release and retry after a stall of the host."""
+    """Hold until the vehicle moves; let go and retry after a stall of the host."""
     for _ in range(40):
         press()
         try:
             wait_until(lambda: abs(stack.speed()) > 0.1, "the vehicle moves", patience_s=1)
         except AssertionError:
-            release()
+            let_go()
         else:
             return
     raise AssertionError(f"never drove: {stack.log.read_text()[-3000:]}")

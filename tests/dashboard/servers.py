@@ -11,6 +11,7 @@ from t2 import keys
 from t2.messages import (
     Cause,
     Direction,
+    Phrase,
     Release,
     ResetDone,
     ResetRequest,
@@ -18,8 +19,13 @@ from t2.messages import (
 from tests.dashboard.bus_fixture import Peer
 from verification.harness.bus import bus_on, running
 
-CONTACT = Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=11)
-NEWER = Cause(name="contact", action="brake", age=0.1, text="The bumper was hit.", id=12)
+HIT = (Phrase("contact"),)
+CONTACT = Cause(
+    name="contact", action="brake", age=1.0, text="The bumper was hit.", phrases=HIT, id=11
+)
+NEWER = Cause(
+    name="contact", action="brake", age=0.1, text="The bumper was hit.", phrases=HIT, id=12
+)
 FREE = Release(believed_free="backward", travelled=0.4, age=2.0, forbidden=(), left=0.15)
 
 

@@ -64,7 +64,7 @@ def test_the_content_of_the_page(page: Page) -> None:
     wait_for_text(page, "#driver", "No driver")
     wait_for_text(page, "#bumper", "clear")
     assert page.locator("#sonar-view .sector[data-tone=clear]").count() == 8  # an empty world
-    wait_for_text(page, "#events", "Link up: the board is connected")
+    wait_for_text(page, "#events", "The board is connected.")
     page.keyboard.down("w")  # without control; it says so while it is held
     wait_for_text(page, "#hold", "Take control first.")
     page.keyboard.up("w")
@@ -169,7 +169,7 @@ def test_driving_by_gamepad(page: Page, stack: RunningStack) -> None:
     page.evaluate(PAD)
     wait_for_text(page, "#gamepad", "A pad")
     page.wait_for_timeout(200)
-    assert text(page, "#hold") == "Released"  # it was down when it was found
+    assert text(page, "#hold") == "Let go"  # it was down when it was found
     deadman(False)
     tremor = (
         "() => { setInterval(() => { window.pad.axes[1] = -0.99 - Math.random() / 200; }, 50); }"
@@ -193,14 +193,14 @@ LOST = (
 )
 
 
-def test_a_page_that_loses_its_input_releases(page: Page, stack: RunningStack) -> None:
+def test_a_page_that_loses_its_input_lets_go(page: Page, stack: RunningStack) -> None:
     take_control(page)
     for script in LOST:
         drive_until_moving(stack, lambda: page.keyboard.down("s"), lambda: page.keyboard.up("s"))
         page.evaluate(script)
         wait_for_standstill(stack)
         page.keyboard.down("s")  # a repeat: the key never came up
-        wait_for_text(page, "#hold", "Released")
+        wait_for_text(page, "#hold", "Let go")
         wait_for_standstill(stack)
         page.keyboard.up("s")
 

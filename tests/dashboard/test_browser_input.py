@@ -1,4 +1,4 @@
-"""Gamepads, keys and the delay of the link on the page in a real browser, at a simulated safety."""
+"""Gamepads, keystrokes and the delay of the link in a real browser, at a simulated safety."""
 
 from collections.abc import Callable
 from typing import Any
@@ -64,7 +64,7 @@ def test_a_frozen_gamepad_ends_after_2_s_until_its_deadman_was_up(page: Page) ->
         (1021, [pad(AHEAD)]),
         (2020, [pad(AHEAD)]),
         (2021, [pad(AHEAD)]),
-        (9000, [pad(TREMOR)]),  # it is back, and was not released
+        (9000, [pad(TREMOR)]),  # it is back, and was not let go
         (9010, [pad(AHEAD, deadman=False)]),
         (9020, [pad(AHEAD)]),
     )
@@ -135,8 +135,8 @@ def test_a_gamepad_that_freezes_while_it_drives(driver: Page, peer: Peer) -> Non
     wait_until(lambda: peer.zeros() >= 3, "the end of them")
 
 
-def key(page: Page, kind: str, **fields: object) -> None:
-    """Send an event of a key to the page."""
+def keystroke(page: Page, kind: str, **fields: object) -> None:
+    """Send an event of a keystroke to the page."""
     script = """([kind, fields]) => {
       const event = new KeyboardEvent(kind, { bubbles: true, cancelable: true, ...fields });
       if (fields.keyCode) Object.defineProperty(event, 'keyCode', { value: fields.keyCode });
@@ -165,7 +165,7 @@ def test_e_stops_by_its_place_and_by_its_letter(
     page: Page, peer: Peer, letter: str, code: str
 ) -> None:
     peer.estops.clear()
-    key(page, "keydown", key=letter, code=code, isComposing=letter == "Process")
+    keystroke(page, "keydown", key=letter, code=code, isComposing=letter == "Process")
     wait_until(lambda: peer.estops, "the emergency stop")
     confirm_estop(page, peer)
 
@@ -186,12 +186,14 @@ def confirm_estop(page: Page, peer: Peer) -> None:
         ("x", "KeyX", "The key x does nothing"),
     ],
 )
-def test_a_key_that_means_nothing_says_so(page: Page, letter: str, code: str, notice: str) -> None:
-    key(page, "keydown", key=letter, code=code)
+def test_a_keystroke_without_a_function_says_so(
+    page: Page, letter: str, code: str, notice: str
+) -> None:
+    keystroke(page, "keydown", key=letter, code=code)
     wait_for_text(page, "#toasts", notice)
 
 
-def until_moving(peer: Peer, press: Callable[[], None], release: Callable[[], None]) -> None:
+def until_moving(peer: Peer, press: Callable[[], None], let_go: Callable[[], None]) -> None:
     """Press until requests arrive; a hold lapses when the host stalls."""
     peer.requests.clear()
     for _ in range(20):
@@ -199,32 +201,32 @@ def until_moving(peer: Peer, press: Callable[[], None], release: Callable[[], No
         try:
             wait_until(peer.moving, "requests", patience_s=1)
         except AssertionError:
-            release()
+            let_go()
         else:
             return
     raise AssertionError("never drove")
 
 
 @pytest.mark.parametrize(("letter", "code"), [("\uff57", ""), ("\u0446", "KeyW"), ("w", "")])
-def test_the_other_keys_count_in_every_layout(
+def test_the_other_keystrokes_count_in_every_layout(
     driver: Page, peer: Peer, letter: str, code: str
 ) -> None:
     def hold(kind: str) -> None:
-        key(driver, kind, key=letter, code=code)
+        keystroke(driver, kind, key=letter, code=code)
 
     until_moving(peer, lambda: hold("keydown"), lambda: hold("keyup"))
-    key(driver, "keydown", key="\u3000", code="")  # a full-width space
+    keystroke(driver, "keydown", key="\u3000", code="")  # a full-width space
     wait_until(lambda: peer.zeros() >= 3, "the end of them")
 
 
-def test_a_key_that_stops_repeating_was_released(driver: Page, peer: Peer) -> None:
+def test_a_keystroke_that_stops_repeating_was_let_go(driver: Page, peer: Peer) -> None:
     def press() -> None:
         for repeat in (False, True):
-            key(driver, "keydown", key="w", code="KeyW", repeat=repeat)
+            keystroke(driver, "keydown", key="w", code="KeyW", repeat=repeat)
 
-    until_moving(peer, press, lambda: key(driver, "keyup", key="w", code="KeyW"))
+    until_moving(peer, press, lambda: keystroke(driver, "keyup", key="w", code="KeyW"))
     wait_until(lambda: peer.zeros() >= 3, "the end of them")
-    wait_for_text(driver, "#hold", "Released")
+    wait_for_text(driver, "#hold", "Let go")
 
 
 SLOW = """(delay) => {
@@ -252,7 +254,7 @@ def test_on_a_slow_link_a_hold_says_why_it_does_nothing(
     assert delay_s > 2 * delay_ms / 1000
     assert page.get_attribute("#delay", "data-tone") == "late"
     page.keyboard.up("w")
-    wait_for_text(page, "#hold", "Released")
+    wait_for_text(page, "#hold", "Let go")
     if delay_ms > 500:  # safety would refuse a reset, too, and a repetition cannot help
         peer.latched = ("contact",)
         page.wait_for_selector("#reset.due")

@@ -6,6 +6,7 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
+from msgspec.structs import asdict
 
 from common import clock
 from common.bus.bus import Arrival
@@ -15,6 +16,7 @@ from services.dashboard import fleet as module
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.fleet import IDLE_S, KNOWN_MAX, PAGES_MAX, Fleet
+from services.dashboard.i18n import label
 from services.dashboard.robot_page import SLOW_TICKS
 from t2 import keys
 from t2.messages import Event
@@ -123,7 +125,7 @@ def test_fifty_robots_are_listed_some_shown_and_any_stopped(
     for name in names[: PAGES_MAX + 1]:
         fleet.join(name, name)
     assert set(buses) == set(names[:PAGES_MAX])
-    refused = {"k": "notice", "level": "warning", "text": "too_many_robots", "about": ""}
+    refused = {"k": "notice", "level": "warning", "text": asdict(label("too_many_robots"))}
     assert sent[-1] == ([names[PAGES_MAX]], refused)
     fleet.handle(names[PAGES_MAX], names[PAGES_MAX], client.Take())  # of the one without a page
     fleet.estop(names[-2], "somebody")
@@ -143,7 +145,7 @@ def test_only_new_events_are_sent(fleet: Fleet, buses: dict[str, Mock], sent: li
     def events() -> list[tuple[list[str], list[str]]]:
         found = [(to, it["lines"]) for to, it in sent if it["k"] == "events"]
         sent.clear()
-        return [(to, [line["text"] for line in lines]) for to, lines in found]
+        return [(to, [line["text"]["en"] for line in lines]) for to, lines in found]
 
     def after(*texts: str) -> list[tuple[list[str], list[str]]]:
         for t_ns, text in enumerate(texts):
@@ -155,12 +157,12 @@ def test_only_new_events_are_sent(fleet: Fleet, buses: dict[str, Mock], sent: li
 
     fleet.join("001", "1")
     assert events() == [(["1"], [])]
-    assert after("first", "second") == [(["1"], ["first", "second"])]
-    assert after("third\x1b") == [(["1"], ["third\\u001b"])]
+    assert after("first", "second") == [(["1"], ["Stopped: first", "Stopped: second"])]
+    assert after("third\x1b") == [(["1"], ["Stopped: third\\u001b"])]
     assert after() == []
     fleet.join("001", "2")
     assert [(to, len(texts)) for to, texts in events()] == [(["2"], 3)]
-    assert after("fourth") == [(["1", "2"], ["fourth"])]
+    assert after("fourth") == [(["1", "2"], ["Stopped: fourth"])]
 
 
 def test_one_viewer_drives_and_a_takeover_asks(
@@ -180,13 +182,14 @@ def test_one_viewer_drives_and_a_takeover_asks(
     fleet.handle("001", "2", client.Free())
     assert lock.state is HoldState.HELD
     fleet.handle("001", "2", client.Take())
-    assert sent[-2][1]["text"] == "take_first"
+    assert sent[-2][1]["text"]["en"] == "Take control first."
     assert sent[-1] == (["2"], {"k": "taken"})
     assert lock.driver == "1"
     fleet.handle("001", "2", client.Take(force=True))
     assert lock.driver == "2"
-    told = (sent[-1][0], sent[-1][1]["text"], lock.name)
-    assert told == (["1"], "viewer 2 has taken over control.", "")
+    text = {"en": "viewer 2 has taken over control.", "zh": "观看者 2 已接管控制权。"}
+    assert [(to, it["text"]) for to, it in sent[-1:]] == [(["1"], text)]
+    assert lock.name == ""
     fleet.handle("001", "2", client.Gear(3))
     assert lock.gear == 3
     fleet.leave("001", "2")
@@ -200,7 +203,7 @@ def test_a_reset_of_an_unknown_state_is_refused(
     fleet.handle("001", "1", client.Take())
     receive(buses["001"], keys.SAFETY, safety_state(heartbeat=5))
     fleet.handle("001", "1", client.Reset(4))
-    assert sent[-1][1]["text"] == "too_late"
+    assert sent[-1][1]["text"]["en"].startswith("Reset refused: The call echoes an unknown")
     assert not buses["001"].call.called
     fleet.handle("001", "1", client.Reset(5))
     assert buses["001"].call.call_args.args[1].echo == 5

@@ -3,21 +3,37 @@
 import math
 
 import pytest
+from msgspec.structs import replace
 
 from common import clock
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
+from services.dashboard import robot
 from services.dashboard.config import Dashboard
 from services.dashboard.driver_lock import HoldState, Push
+from services.dashboard.i18n import Texts, phrase
 from services.dashboard.robot import ESTOP_KEPT_S, Robot
 from t2 import keys
 from t2.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
-from t2.messages import Direction, Drive, Event, ResetDone, ResetRequest
+from t2.messages import (
+    Direction,
+    Drive,
+    Event,
+    Level,
+    Phrase,
+    Refusal,
+    ResetDone,
+    ResetRequest,
+)
+from t2.words import render
 from tests.dashboard.servers import CONTACT, NEWER
 from tests.factories import safety_state
 from tests.fake_bus import FakeBus
 
 TICK_NS = 50_000_000
+DONE = ResetDone(text=phrase("reset.done").en, phrases=(Phrase("reset.done"),))
+UNCONFIRMED = phrase("event.estop_unconfirmed").en
+NOT_CONFIRMED = phrase("event.reset_unconfirmed").en
 
 
 class RobotFixture:
@@ -25,17 +41,20 @@ class RobotFixture:
 
     def __init__(self) -> None:
         self.bus = FakeBus()
-        self.notices: list[tuple[str, str, str]] = []
+        self.notices: list[tuple[Level, str]] = []  # in English
         self.robot = Robot(
             self.bus,
             Dashboard(),
-            lambda *words: self.notices.append(words),
+            self.notify,
         )
         self.now_ns = 0
         self.delay_ns = 0  # of the browser's answers
         self.release: Direction | None = None
         self.latched: tuple[str, ...] = ()
         assert self.robot.driver_lock.take("1", force=False)
+
+    def notify(self, level: Level, text: Texts) -> None:
+        self.notices.append((level, text.en))
 
     def ticks(self, number: int, source: str | None, *, held: bool = True) -> None:
         lock = self.robot.driver_lock
@@ -123,14 +142,16 @@ def test_an_unconfirmed_estop_is_reported_and_a_viewer_has_no_driver(
 ) -> None:
     fixture.robot.estop("a test", ESTOP_KEPT_S)
     fixture.ticks(ESTOP_TICKS, None)
-    assert fixture.notices == [("error", "estop_unconfirmed", "")]
+    assert fixture.notices == [("error", UNCONFIRMED)]
     monkeypatch.setattr(Publisher, "passed_on", False)
     fixture.ticks(DENIED_AFTER, None)
     driver = fixture.robot.driver_state()
     assert (driver.may, driver.id) == (False, None)
     fixture.robot.estop("a test")
     fixture.ticks(ESTOP_TICKS, None)
-    assert fixture.notices[1:] == [("error", "barred", ""), ("error", "estop_denied", "")]
+    barred, denied = (text for _, text in fixture.notices[1:])
+    assert barred.startswith("NOT ALLOWED: ")
+    assert "probably not allowed" in denied
 
 
 @pytest.mark.parametrize(("age_s", "kept_s"), [(0.0, 30.0), (20.0, 10.0), (1e9, 0.0), (-9.0, 30.0)])
@@ -144,7 +165,7 @@ def test_an_estop_is_repeated_while_the_robot_is_cut_off_and_the_stop_is_young(
         fixture.now_ns += TICK_NS
         fixture.robot.tick(fixture.now_ns)
     assert fixture.bus.estops == 1 + ESTOP_TICKS * max(1, rounds)
-    assert set(fixture.notices) == {("error", "estop_unconfirmed", "")}
+    assert set(fixture.notices) == {("error", UNCONFIRMED)}
 
 
 @pytest.fixture
@@ -153,23 +174,23 @@ def reset(fixture: RobotFixture) -> RobotFixture:
     for heartbeat, cause in ((1, CONTACT), (2, NEWER)):
         state = safety_state(heartbeat=heartbeat, latched=("contact",), causes=(cause,))
         fixture.bus.deliver(keys.SAFETY, state, 0)
-    fixture.robot.reset(1, "Anna", lambda *words: fixture.notices.append(words))
+    fixture.robot.reset(1, "Anna", fixture.notify)
     return fixture
 
 
 @pytest.mark.parametrize(
     ("boot", "latched", "notice"),
     [
-        (0, (), ("info", "Reset.", "reset_done")),
-        (0, ("estop",), ("warning", "Reset.", "reset_partial")),
-        (1, (), ("error", "reset_unconfirmed", "")),  # an answer that is not safety's
+        (0, (), ("info", DONE.text)),
+        (0, ("estop",), ("warning", DONE.text)),
+        (1, (), ("error", NOT_CONFIRMED)),  # an answer that is not safety's
     ],
 )
 def test_a_reset_is_confirmed_by_the_state_of_safety(
-    reset: RobotFixture, boot: int, latched: tuple[str, ...], notice: tuple[str, str, str]
+    reset: RobotFixture, boot: int, latched: tuple[str, ...], notice: tuple[Level, str]
 ) -> None:
     assert reset.bus.asked == [(keys.RESET.path, ResetRequest(echo=1, causes=(CONTACT.id,)))]
-    done = ResetDone(text="Reset.", boot=boot, heartbeat=3, cleared=(CONTACT.id,))
+    done = replace(DONE, boot=boot, heartbeat=3, cleared=(CONTACT.id,))
     reset.bus.answers[-1][0](done)
     assert reset.notices == []
     reset.latched = latched
@@ -178,18 +199,33 @@ def test_a_reset_is_confirmed_by_the_state_of_safety(
 
 
 def test_a_refusal_is_reported(reset: RobotFixture) -> None:
-    reset.bus.answers[-1][1]("The call is 1.4 s old.")
-    assert reset.notices == [("warning", "The call is 1.4 s old.", "reset_refused")]
+    phrase = Phrase("call.late", {"age": 1.4, "limit": 1.0})
+    reset.bus.answers[-1][1](Refusal(text="late", phrases=(phrase,)))
+    expected = "Reset refused: The call is 1.4 s old, allowed is 1 s: repeat it."
+    assert reset.notices == [("warning", expected)]
 
 
 def test_an_event_names_who_stopped_and_who_reset(reset: RobotFixture) -> None:
     events = next(p for p in reset.bus.publishers if p.topic is keys.EVENTS)
     assert isinstance(events.last, Event)
-    assert (events.last.name, events.last.text) == ("reset_request", "reset requested by Anna")
-    for name in ("Bob", "Eve"):
+    assert (events.last.name, events.last.text) == ("reset_request", "Reset requested by Anna.")
+    for name in ("Bob", "viewer 3"):
         reset.robot.estop(name)
         assert isinstance(events.last, Event)
-        assert (events.last.name, events.last.text) == (
+        text = f"Emergency stop requested by {name}."
+        assert (events.last.name, events.last.text, events.last.about) == (
             "estop",
-            f"emergency stop requested by {name}",
+            text,
+            {"by": name},
         )
+    assert render(events.last.phrases, "zh") == "观看者 3 请求急停。"
+
+
+def test_an_event_names_the_certificate(
+    fixture: RobotFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robot, "common_name", lambda _: "driver.hall")
+    events = next(p for p in fixture.bus.publishers if p.topic is keys.EVENTS)
+    fixture.robot.estop("Anna")
+    assert isinstance(events.last, Event)
+    assert events.last.text == "Emergency stop requested by Anna. Certificate: driver.hall."

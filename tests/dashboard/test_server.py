@@ -28,7 +28,7 @@ def ada(server: Server, peer: Peer) -> Iterator[Client]:
         yield it
 
 
-def test_a_hold_drives_and_a_release_sends_three_zeros(ada: Client, peer: Peer) -> None:
+def test_a_hold_drives_and_letting_go_sends_three_zeros(ada: Client, peer: Peer) -> None:
     ada.take_control()
     peer.requests.clear()
     drive(ada, peer)
@@ -42,7 +42,7 @@ def test_a_hold_drives_and_a_release_sends_three_zeros(ada: Client, peer: Peer) 
     assert peer.zeros() == 3
 
 
-def test_a_browser_that_answers_nothing_ends_the_hold_until_a_release(
+def test_a_browser_that_answers_nothing_ends_the_hold_until_it_lets_go(
     ada: Client, peer: Peer
 ) -> None:
     ada.take_control()

@@ -1,12 +1,11 @@
 """Snapshots from telemetry."""
 
-from typing import Any
-
 import pytest
 
 from common.freshness import NS_PER_S
 from services.dashboard import snapshot
 from services.dashboard.driver_lock import HoldState
+from services.dashboard.i18n import Texts
 from services.dashboard.telemetry_cache import TelemetryCache
 from services.safety import report
 from t2 import keys
@@ -14,10 +13,12 @@ from t2.messages import (
     SONAR_NAMES,
     Bumper,
     Cause,
+    CauseName,
     Command,
     Drive,
     Driver,
     Motion,
+    Phrase,
     RangeStatus,
     Switches,
     Ultrasonic,
@@ -98,26 +99,51 @@ def test_the_slow_snapshot() -> None:
 
 
 @pytest.mark.parametrize(
-    ("status", "cause", "text", "tone"),
+    ("status", "cause", "sonar", "doubted", "tone"),
     [
-        ("ok", "obstacle", "Slowed by an obstacle at 4.00 m (front).", "slow"),
-        ("ok", "blocked", "No room toward the front: 4.00 m.", "stop"),
-        ("ok", "sonar", "Sonar not trusted: front left, front.", "fault"),
-        ("ok", "blocked", "No room toward the front left: 4.00 m.", "clear"),
-        ("ok", "contact", "The front was hit.", "clear"),
-        ("no_echo", "contact", "", "clear"),
-        ("too_near", "obstacle", "(front)", "stop"),
-        ("fault", "contact", "", "fault"),
+        ("ok", "obstacle", "front", (), "slow"),
+        ("ok", "blocked", "front", (), "stop"),
+        ("ok", "sonar", "front", ("front_left", "front"), "fault"),
+        ("ok", "blocked", "front_left", (), "clear"),
+        ("ok", "contact", "front", (), "clear"),
+        ("ok", "blocked", "roof", ("roof",), "clear"),  # of a foreign publisher
+        ("no_echo", "contact", "front", (), "clear"),
+        ("too_near", "obstacle", "front", (), "stop"),
+        ("fault", "contact", "front", (), "fault"),
     ],
 )
-def test_the_tone_of_a_sector(status: RangeStatus, cause: Any, text: str, tone: str) -> None:
-    sonar = Ultrasonic(ranges=(4.0,) * 8, status=(status,) * 8)
-    causes = [Cause(name=cause, action="slow", age=1.0, text=text)]
-    assert snapshot.tones(sonar, causes)[SONAR_NAMES.index("front")] == tone
+def test_the_tone_of_a_sector(
+    status: RangeStatus, cause: CauseName, sonar: str, doubted: tuple[str, ...], tone: str
+) -> None:
+    ultrasonic = Ultrasonic(ranges=(4.0,) * 8, status=(status,) * 8)
+    phrases = (Phrase("blocked.near", {"sonar": sonar, "distance": 4.0}), Phrase("next.reset"))
+    causes = (Cause(name=cause, action="slow", age=1.0, text="", phrases=phrases),)
+    state = factories.safety_state(causes=causes, doubted_sonars=doubted)
+    assert snapshot.tones(ultrasonic, state)[SONAR_NAMES.index("front")] == tone
 
 
 @pytest.mark.parametrize("name", SONAR_NAMES)
-def test_the_page_finds_the_sonar_in_the_texts_of_safety(name: str) -> None:
+def test_safety_names_the_sonar_in_its_phrases(name: str) -> None:
     state, index = PolicyFixture().ready().state, SONAR_NAMES.index(name)
-    for text in (report._blocked_text(state, index), report._slowed_text(state, index)):
-        assert snapshot.sonars_named(text) == [index]
+    for phrases in (report._blocked(state, index), report._slowed(state, index)):
+        cause = Cause(name="blocked", action="stop", age=1.0, text="", phrases=phrases)
+        assert snapshot.sonars_of(cause) == [name]
+
+
+def test_the_texts_of_safety_in_both_languages() -> None:
+    phrases = (Phrase("contact"), Phrase("control.of", {"source": "web"}))
+    newer = Cause(name="contact", action="stop", age=1.0, text="a\x1b", phrases=(Phrase("newer"),))
+    view = snapshot.safety_view(
+        factories.safety_state(
+            source="w\x1b", text="old", phrases=phrases, causes=(newer,), release_refusal="no"
+        )
+    )
+    assert view.text == Texts(
+        "The bumper was hit. web is in control.", "防撞条已触发。web 取得控制权。"
+    )
+    assert view.own_text == Texts(
+        "The bumper was hit. You are in control.", "防撞条已触发。您已取得控制权。"
+    )
+    assert view.causes[0].text == Texts("a\\u001b", "a\\u001b")  # of a newer safety
+    assert view.release_refusal == Texts("no", "no")
+    assert view.source == "w\\u001b"

@@ -19,7 +19,7 @@ BUMPER = "tel/bridge/bumper"
 
 
 def event(number: int) -> Event:
-    return Event(name="stop", level="info", text=str(number), t_ns=number)
+    return Event(name="slip", level="info", text=str(number), t_ns=number)
 
 
 def test_the_newest_message_until_it_is_too_old() -> None:
@@ -52,7 +52,7 @@ def test_events_are_in_the_order_of_their_arrival_and_bounded() -> None:
     for number in (*range(8 * 3600, 8 * 3600 + EVENTS_MAX), 100):  # a clock 8 h ahead, corrected
         telemetry.add_event("safety", event(number))
     assert len(telemetry.events) == EVENTS_MAX
-    assert [telemetry.events[at].text for at in (0, -1)] == [str(8 * 3600 + 1), "100"]
+    assert [telemetry.events[at].text.en for at in (0, -1)] == [str(8 * 3600 + 1), "100"]
     assert telemetry.take_new() == (telemetry.events, False)
     assert telemetry.take_new() == ([], False)
     telemetry.add_event("bridge", event(1))
@@ -68,14 +68,14 @@ def test_the_histories_of_a_host_are_merged_by_its_own_clock() -> None:
             telemetry.add_event(service, replace(event(t), mono_ns=mono, host=7, text=str(mono)))
     telemetry.add_event("teleop", replace(event(9), mono_ns=0, host=8, text="another host"))
     lines, are_all = telemetry.take_new()
-    assert [line.text for line in lines] == [*"123456", "another host"]
+    assert [line.text.en for line in lines] == [*"123456", "another host"]
     assert are_all
     for _ in range(HISTORY_TURNS):  # later ones come when they come
         telemetry.add_event("safety", replace(event(9), mono_ns=9, host=7))
         telemetry.take_new()
     telemetry.add_event("bridge", replace(event(1), mono_ns=8, host=7, text="last"))
     assert telemetry.take_new()[1] is False
-    assert telemetry.events[-1].text == "last"
+    assert telemetry.events[-1].text.en == "last"
 
 
 def test_a_history_of_all_services_fits_and_lost_events_are_marked() -> None:
@@ -87,18 +87,18 @@ def test_a_history_of_all_services_fits_and_lost_events_are_marked() -> None:
     last = keys.EVENT.history
     for seq, boot in ((last + 4, 1), (last + 5, 1), (1, 2), (3, 2)):
         telemetry.add_event("safety", replace(event(seq), seq=seq, boot=boot))
-    shown = [(line.name, line.text) for line in telemetry.events[-6:]]
+    shown = [(line.name, line.text.en) for line in telemetry.events[-6:]]
     assert [text for name, text in shown if name == "gap"] == [
         "3 events are missing here.",
         "1 events are missing here.",
     ]
-    assert [name for name, _ in shown] == ["gap", "n", "n", "n", "gap", "n"]
+    assert [name for name, _ in shown] == ["gap", "slip", "slip", "slip", "gap", "slip"]
 
 
 def test_an_event_of_any_length_costs_little() -> None:
     telemetry = TelemetryCache()
     telemetry.add_event("safety", replace(event(1), text="\x1b" * 4000))
-    assert telemetry.events[0].text == "\\u001b" * 166 + "\\u00"
+    assert telemetry.events[0].text.en == "\\u001b" * 166 + "\\u00"
 
 
 def test_services_by_token_or_by_health() -> None:

@@ -1,4 +1,6 @@
 // Charts of requested, allowed and measured motion over the last 30 s.
+import { t } from "./i18n.js";
+
 const SPAN_MS = 30000;
 const LINES = ["requested", "allowed", "measured"];
 const EVERY = 2; // snapshots per drawing
@@ -22,7 +24,7 @@ export function fitted(canvas) {
   return [pen, width, height];
 }
 
-export function draw(t) {
+export function draw() {
   count += 1;
   if (count % EVERY) return;
   const css = getComputedStyle(document.documentElement);

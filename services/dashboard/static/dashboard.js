@@ -2,8 +2,9 @@
 import * as charts from "./charts.js";
 import * as delay from "./delay.js";
 import * as driving from "./driving.js";
+import * as i18n from "./i18n.js";
+import { t } from "./i18n.js";
 import * as notices from "./notices.js";
-import * as phrases from "./phrases.js";
 import * as panels from "./panels.js";
 import * as sonarView from "./sonar_view.js";
 import * as stateBar from "./state_bar.js";
@@ -18,21 +19,19 @@ const CONGESTED = 2048; // bytes that wait in the browser
 const $ = (id) => document.getElementById(id);
 const estop = window.T2Estop;
 // A browser may forbid storage: then a reload forgets.
-const stored = (key, otherwise, from = "localStorage") => {
+const stored = (item, otherwise, from = "localStorage") => {
   try {
-    return window[from].getItem(`t2.${key}`) ?? otherwise;
+    return window[from].getItem(`t2.${item}`) ?? otherwise;
   } catch {
     return otherwise;
   }
 };
-const store = (key, value, to = "localStorage") => {
+const store = (item, value, to = "localStorage") => {
   try {
-    window[to].setItem(`t2.${key}`, value);
+    window[to].setItem(`t2.${item}`, value);
   } catch { /* it is forbidden */ }
 };
 
-let texts = {};
-let language = stored("language", navigator.language.startsWith("zh") ? "zh" : "en");
 let socket = null;
 let fast = null; // the newest snapshots
 let fastAt = -Infinity;
@@ -43,8 +42,6 @@ let hello = null;
 let showChange = () => {}; // that this page shows another robot than before
 let drawn; // the drawn snapshot; null without a connection
 
-// A text of the catalogue; values take the places of its `{}`.
-const t = (key, ...values) => values.reduce((text, it) => text.replace("{}", () => it), texts[language][key] ?? key);
 const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
 const name = () => $("name").value.trim();
@@ -107,15 +104,15 @@ const HANDLERS = {
   alive: (message) => delay.answered(message, performance.now()),
   slow(message) {
     slow = message;
-    panels.showSlow(message, t);
+    panels.showSlow(message);
     showRobots();
   },
   events(message) {
     events = [...(message.all ? [] : events), ...message.lines].slice(-EVENTS_MAX); // in the order of their arrival
-    panels.showEvents(events, t, language);
+    panels.showEvents(events);
   },
-  notice: (message) => toast(message.text, message.level, message.about),
-  taken: () => confirm("take_over", t("take_over_from", stateBar.driverName(fast, t)),
+  notice: (message) => toast(message.text, message.level),
+  taken: () => confirm("take_over", t("take_over_from", stateBar.driverName(fast)),
     () => send({ k: "take", force: true, name: name() })),
 };
 const handle = (message) => HANDLERS[message.k]?.(message);
@@ -127,7 +124,7 @@ const newest = () => (lost() ? null : fast);
 
 /** What the state bar and the header show; `fast` is null without a connection. */
 const view = () => ({
-  fast: newest(), t, language, robot, router, doctor, isDriver: isDriver(), viewer: hello?.id,
+  fast: newest(), robot, router, doctor, isDriver: isDriver(), viewer: hello?.id,
   ...delayNow(), keepsAlive: !!hello?.keepalive, viewers: slow?.viewers ?? 0,
 });
 
@@ -142,10 +139,10 @@ function draw() {
   $("awake").hidden = !wakeLock.update(isDriver() || (!!hello?.keepalive && newest()?.keeper === hello.id));
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
   if (lost()) return;
-  sonarView.draw(fast, t);
-  panels.showCauses(fast, t, language);
+  sonarView.draw(fast);
+  panels.showCauses(fast);
   trail.draw(fast.pose);
-  charts.draw(t);
+  charts.draw();
 }
 
 // The page of another robot is another page: a link.
@@ -164,11 +161,11 @@ function showRobots() {
 // --- language, commands ------------------------------------------------------------------
 
 function showTexts() {
-  document.documentElement.lang = language;
+  document.documentElement.lang = i18n.language;
   for (const it of document.querySelectorAll("[data-t]")) it.textContent = t(it.dataset.t);
   showChange();
-  if (slow) panels.showSlow(slow, t);
-  panels.showEvents(events, t, language);
+  if (slow) panels.showSlow(slow);
+  panels.showEvents(events);
   drawn = undefined;
 }
 
@@ -202,8 +199,7 @@ function showCamera(url) {
 }
 
 function begin() {
-  texts = JSON.parse($("texts").textContent);
-  phrases.begin(JSON.parse($("phrases").textContent));
+  i18n.begin(stored("language", ""));
   const on = (id, call) => { $(id).onclick = call; };
   $("name").value = stored("name", "");
   $("name").onchange = () => store("name", name());
@@ -211,12 +207,11 @@ function begin() {
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
   $("language").onclick = () => {
-    language = language === "en" ? "zh" : "en";
-    store("language", language);
+    store("language", i18n.change());
     showTexts();
   };
-  notices.begin({ t, language: () => language });
-  driving.begin({ send, reset, toast, isStopKey: estop.isKey, delay: delayNow, t, language: () => language, gears: () => hello?.gears ?? [] });
+  notices.begin();
+  driving.begin({ send, reset, toast, isStopKeystroke: estop.isKeystroke, delay: delayNow, gears: () => hello?.gears ?? [] });
   const stopToast = (text) => toast(text, text === "estop_asked" ? "warning" : "error");
   estop.begin({ send, off, cut, toast: stopToast, name, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
   showCamera($("page").dataset.camera.split("{robot}").join(robot));

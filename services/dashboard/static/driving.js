@@ -1,17 +1,17 @@
-// Input of the driver: stick, keys, gamepad, release. Only held controls drive. Every loss of input
-// releases them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
+// Input of the driver: stick, keystrokes, gamepad, release. Only held controls drive. Every loss of
+// input lets go of them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
 // as the answer to a snapshot, with its heartbeat of safety, which bounds the age of the hold.
 import * as gamepads from "./gamepad.js";
-import { gap, translated } from "./phrases.js";
+import { joined, t } from "./i18n.js";
 import { duration } from "./panels.js";
 import { isUsedUp, nextStep, resetRefusal } from "./state_bar.js";
 
-const KEYS = {
+const KEYSTROKES = {
   KeyW: [1, 0], ArrowUp: [1, 0], KeyS: [-1, 0], ArrowDown: [-1, 0],
   KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
 };
-const RELEASE_KEYS = { KeyF: "forward", KeyB: "backward" };
-const REPEATS_MS = 1000; // without a repeat of a key that repeated: the system has lost the key-up
+const RELEASE_KEYSTROKES = { KeyF: "forward", KeyB: "backward" };
+const REPEATS_MS = 1000; // without a repeat of a keystroke that repeated: the system has lost the key-up
 const $ = (id) => document.getElementById(id);
 const down = new Set();
 let page = null;
@@ -22,9 +22,9 @@ let mustReset = false; // another cause is latched beside the contact: safety re
 let driving = false; // whether this viewer has the driver lock
 let another = null; // another source that drives
 let barred = ""; // why this page may not drive
-let refused = null; // { code, key }: a key that is held, and why it is refused
+let refused = null; // { code, reason }: a held keystroke, and why it is refused
 let pad = { push: null, state: "" }; // what the gamepads say
-let repeats = null; // { code, at }: the held key that repeats, and its last repeat
+let repeats = null; // { code, at }: the held keystroke that repeats, and its last repeat
 let isHeld = false; // a control, at the last snapshot
 let sent = false; // whether the server has a hold from here
 
@@ -35,7 +35,7 @@ function held() {
   if (releasing) return { x: 0, y: 0, release: releasing };
   if (stick) return { x: stick.push[0], y: stick.push[1] };
   if (down.size) {
-    const pushes = [...down].map((code) => KEYS[code]);
+    const pushes = [...down].map((code) => KEYSTROKES[code]);
     return { x: clamped(pushes.reduce((sum, it) => sum + it[0], 0)), y: clamped(pushes.reduce((sum, it) => sum + it[1], 0)) };
   }
   return pad.push;
@@ -44,7 +44,7 @@ function held() {
 function readGamepads() {
   if (!driving) gamepads.drop();
   pad = gamepads.read(gamepads.connected(), performance.now());
-  write("gamepad", pad.name && page.t(pad.isUsable ? "gamepad" : "gamepad_unusable", pad.name));
+  write("gamepad", pad.name && t(pad.isUsable ? "gamepad" : "gamepad_unusable", pad.name));
 }
 
 export function answer(echo, isDriver, hold, safety) {
@@ -59,7 +59,7 @@ export function answer(echo, isDriver, hold, safety) {
   const controls = held();
   isHeld = !!controls;
   if (controls) sent = page.send({ k: "hold", echo, ...controls });
-  // After a lapse the server requires a release before the next hold.
+  // After a lapse the server requires that the controls are let go before the next hold.
   else if (sent || hold !== "free") free();
 }
 
@@ -83,7 +83,7 @@ function knob(x, y) {
   if (it) it.style.transform = `translate(calc(-50% + ${-y * 78}%), calc(-50% + ${-x * 78}%))`;
 }
 
-/** Return why this page may not drive, as a key; empty if it may, or if that is unknown. */
+/** Return why this page may not drive, as the name of a text; empty if it may, or if that is unknown. */
 export const viewOnly = (fast) => {
   if (fast?.driver.may !== false) return "";
   return fast.driver.may_stop ? "view_only_why" : "view_only_stop";
@@ -100,7 +100,7 @@ export function show(isDriver, fast) {
   panel.classList.toggle("is-driver", isDriver);
   barred = viewOnly(fast);
   panel.classList.toggle("view-only", !!barred);
-  write("view-only", barred && page.t(barred));
+  write("view-only", barred && t(barred));
   $("estop").classList.toggle("unable", barred === "view_only_stop");
   panel.dataset.hold = hold;
   panel.dataset.pad = isDriver ? pad.state : "";
@@ -109,17 +109,16 @@ export function show(isDriver, fast) {
   const off = !fast || !!fast.root.part; // nothing can drive
   disable($("take"), isDriver || off);
   disable($("reset"), !isDriver || !!noReset);
-  $("reset").title = noReset ? page.t(noReset) : "";
+  $("reset").title = noReset ? t(noReset) : "";
   $("stick").classList.toggle("disabled", off);
   $("reset").classList.toggle("due", next === "reset");
   $("release").classList.toggle("due", next === "release" || next === "by_hand");
-  showRelease(isDriver, releasing ? fast?.safety?.release_refusal : "");
+  showRelease(isDriver, releasing ? fast?.safety?.release_refusal : null);
 }
 
 function holdText(isDriver, driver) {
-  const { t } = page;
   if (isDriver && driver.overruled) return t("hold.overruled");
-  if (refused) return t(refused.key);
+  if (refused) return t(refused.reason);
   if (!isDriver) return "";
   const { delay, limit } = page.delay();
   const isSlow = driver.hold !== "held" && (isHeld || driver.hold === "lapsed") && delay > limit;
@@ -128,36 +127,36 @@ function holdText(isDriver, driver) {
   return t(driver.hold === "free" && isHeld ? "hold.waiting" : `hold.${driver.hold}`);
 }
 
-// Why safety refuses a release in this direction now, as a key; empty if it does not.
+// Why safety refuses a release in this direction now, as the name of a text; empty if it does not.
 function refusal(direction) {
-  if (!release) return "release_no_contact";
-  if (isUsedUp(release)) return "release_by_hand";
-  if (release.forbidden.includes(direction)) return `release_forbidden_${direction}`;
-  return mustReset ? "release_reset_first" : "";
+  if (!release) return "release.no_contact";
+  if (isUsedUp(release)) return "next.by_hand";
+  if (release.forbidden.includes(direction)) return `release.forbidden_${direction}`;
+  return mustReset ? "next.reset_first" : "";
 }
 
 function showRelease(isDriver, answer) {
   $("release").hidden = !release;
-  const reasons = new Set(answer ? [translated(answer, page.language())] : []);
+  const reasons = new Set([t(answer)]);
   for (const direction of ["forward", "backward"]) {
     const refused = refusal(direction);
-    if (refused) reasons.add(page.t(refused));
+    if (refused) reasons.add(t(refused));
     const it = $(`release-${direction}`);
     disable(it, !isDriver || !!refused);
-    it.title = refused ? page.t(refused) : "";
+    it.title = refused ? t(refused) : "";
     it.classList.toggle("free", release?.believed_free === direction);
   }
   if (!release) return;
   write("release-free", isUsedUp(release) ? "" : believed());
-  write("release-left", page.t("release_left", metres(release.left)));
-  write("release-forbidden", [...reasons].join(gap(page.language())));
+  write("release-left", t("release_left", metres(release.left)));
+  write("release-forbidden", joined([...reasons]));
 }
 
 // The direction that safety believes free, with the last motion, its distance and its age.
 function believed() {
   const { believed_free: free, travelled, age } = release;
-  if (!free) return page.t("release_unknown");
-  return page.t(`believed_${free}`, metres(Math.abs(travelled)), duration(age));
+  if (!free) return t("release_unknown");
+  return t(`believed_${free}`, metres(Math.abs(travelled)), duration(age));
 }
 
 const metres = (value) => (Number.isFinite(value) ? `${value.toFixed(2)} m` : "– m");
@@ -187,9 +186,9 @@ const ready = (code = "") => {
   return driving;
 };
 
-function refuse(code, key) {
-  page.toast(key, "warning");
-  if (code) refused = { code, key };
+function refuse(code, reason) {
+  page.toast(reason, "warning");
+  if (code) refused = { code, reason };
 }
 
 function listenToStick() {
@@ -221,11 +220,11 @@ function listenToStick() {
   it.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
-// Two directions at once release.
+// Two directions at once let go.
 function holdRelease(direction, code = "") {
   if (!ready(code)) return;
-  const key = refusal(direction);
-  if (key) refuse(code, key);
+  const reason = refusal(direction);
+  if (reason) refuse(code, reason);
   else if (releasing && releasing !== direction) letGo();
   else releasing = direction;
 }
@@ -249,23 +248,23 @@ const modified = (event) =>
   event.ctrlKey || event.altKey || event.metaKey || MODIFIERS.includes(event.key);
 const typing = (event) => event.target.matches?.("input");
 
-// The place of a key, whatever the layout; by its letter where no place is reported.
+// The place of a keystroke, whatever the layout; by its letter where no place is reported.
 function placeOf(event) {
-  const key = (event.key ?? "").normalize("NFKC"); // a form that is filled in sends none
+  const letter = (event.key ?? "").normalize("NFKC"); // a form that is filled in sends none
   if (event.code) return event.code;
-  if (key === " ") return "Space";
-  if (/^[a-z]$/i.test(key)) return `Key${key.toUpperCase()}`;
-  return /^[1-5]$/.test(key) ? `Digit${key}` : key;
+  if (letter === " ") return "Space";
+  if (/^[a-z]$/i.test(letter)) return `Key${letter.toUpperCase()}`;
+  return /^[1-5]$/.test(letter) ? `Digit${letter}` : letter;
 }
 
-// A key of another script, or of an input method, that means nothing here; any other one is left alone.
+// A keystroke of another script, or of an input method, that means nothing here; any other one is left alone.
 const isForeign = (event) => ["Process", "Unidentified", "Dead"].includes(event.key)
   || (event.key.length === 1 && !/[ -~]/.test(event.key.normalize("NFKC")));
 
-function refuseKey(event) {
+function refuseKeystroke(event) {
   if (event.repeat || !event.key) return;
-  if (isForeign(event)) page.toast("key_foreign", "warning");
-  else if (event.key.length === 1) page.toast(page.t("key_unknown", event.key), "warning");
+  if (isForeign(event)) page.toast("keystroke_foreign", "warning");
+  else if (event.key.length === 1) page.toast(t("keystroke_unknown", event.key), "warning");
 }
 
 function keyDown(event) {
@@ -274,23 +273,23 @@ function keyDown(event) {
     event.preventDefault(); // it would press the focused button, too
     event.stopPropagation();
     letGo();
-    if ((!driving || another) && !event.repeat) page.toast("estop_key", "warning");
+    if ((!driving || another) && !event.repeat) page.toast("space_is_no_estop", "warning");
     return;
   }
   if (typing(event) && ["Enter", "Escape"].includes(event.code) && !event.isComposing) event.target.blur();
   if (modified(event)) letGo();
-  if (typing(event) || modified(event) || page.isStopKey(event)) return;
+  if (typing(event) || modified(event) || page.isStopKeystroke(event)) return;
   repeats = event.repeat && down.has(place) ? { code: place, at: performance.now() } : null;
   if (place === "KeyR") {
     if (!event.repeat) page.reset();
-  } else if (KEYS[place]) {
+  } else if (KEYSTROKES[place]) {
     event.preventDefault();
-    // A repeat is no press: after a release the key must come up first.
+    // A repeat is no press: after the controls were let go, the key must come up first.
     if (!event.repeat && ready(place)) down.add(place);
-  } else if (RELEASE_KEYS[place]) {
-    if (!event.repeat) holdRelease(RELEASE_KEYS[place], place);
+  } else if (RELEASE_KEYSTROKES[place]) {
+    if (!event.repeat) holdRelease(RELEASE_KEYSTROKES[place], place);
   } else if (/^Digit[1-5]$/.test(place)) page.send({ k: "gear", gear: Number(place.slice(-1)) });
-  else refuseKey(event);
+  else refuseKeystroke(event);
 }
 
 function keyUp(event) {
@@ -302,14 +301,14 @@ function keyUp(event) {
   if (modified(event)) letGo();
   repeats = null;
   if (refused?.code === place) refused = null;
-  if (releasing && RELEASE_KEYS[place] === releasing) letGo();
+  if (releasing && RELEASE_KEYSTROKES[place] === releasing) letGo();
   if (down.delete(place) && !down.size) letGo();
 }
 
 export function begin(given) {
   page = given;
   listenToStick();
-  for (const direction of Object.values(RELEASE_KEYS)) listenToRelease(direction);
+  for (const direction of Object.values(RELEASE_KEYSTROKES)) listenToRelease(direction);
   addEventListener("keydown", keyDown, true);
   addEventListener("keyup", keyUp, true);
   for (const name of ["blur", "pagehide", "gamepaddisconnected", "dragstart"]) addEventListener(name, letGo);

@@ -39,10 +39,10 @@
 
   // --- texts ------------------------------------------------------------------------------------
 
-  function text(key) {
+  function text(name) {
     if (page) return page.t.apply(null, arguments);
     var language = /^zh/.test(navigator.language || "") ? "zh" : "en";
-    var found = texts()[language][key] || key;
+    var found = texts()[language][name] || name;
     for (var i = 1; i < arguments.length; i += 1) found = found.replace("{}", arguments[i]);
     return found;
   }
@@ -81,9 +81,9 @@
   function restore() {
     try {
       for (var i = 0; i < localStorage.length; i += 1) {
-        var key = localStorage.key(i);
-        var found = key.indexOf(STORE) === 0 && PATTERN.exec(localStorage.getItem(key));
-        if (found) restoreOne(key.slice(STORE.length), Number(found[1]), found[2], found[3] === "true");
+        var item = localStorage.key(i);
+        var found = item.indexOf(STORE) === 0 && PATTERN.exec(localStorage.getItem(item));
+        if (found) restoreOne(item.slice(STORE.length), Number(found[1]), found[2], found[3] === "true");
       }
     } catch (error) { /* nothing is stored */ }
   }
@@ -162,7 +162,7 @@
       var age = now() - it.since;
       if (it.barred && age >= UNCONFIRMED_MS) {
         remove(robot);
-        ask("toast", "estop_denied");
+        ask("toast", "event.estop_denied");
       } else if (age >= KEPT_MS) {
         it.state = "late";
         store(robot);
@@ -193,7 +193,7 @@
     if (it.status === 404) return text("estop_unknown");
     var cut = it.status === 200 ? isCut() : it.status !== undefined;
     if (cut) return text("estop_not_sent", Math.ceil((KEPT_MS - age) / 1000));
-    return age > UNCONFIRMED_MS ? text("estop_unconfirmed") : "";
+    return age > UNCONFIRMED_MS ? text("event.estop_unconfirmed") : "";
   }
 
   function show() {
@@ -237,7 +237,7 @@
     return /^(INPUT|TEXTAREA|SELECT)$/.test((event.target && event.target.tagName) || "");
   }
 
-  function isKey(event) {
+  function isKeystroke(event) {
     if (isTyping(event) || event.ctrlKey || event.altKey || event.metaKey) return false;
     var letter = String(event.key || "");
     if (letter.normalize) letter = letter.normalize("NFKC"); // full width
@@ -261,7 +261,7 @@
     document.addEventListener(type, pressed, true);
   });
   document.addEventListener("keydown", function (event) {
-    if (isKey(event) && !event.repeat) request();
+    if (isKeystroke(event) && !event.repeat) request();
   }, true);
   // A script that this browser cannot run, or that did not arrive, leaves the page without its rest.
   window.addEventListener("load", function () {
@@ -272,7 +272,7 @@
   setInterval(repeat, REPEAT_MS);
 
   window.T2Estop = {
-    isKey: isKey,
+    isKeystroke: isKeystroke,
     update: update,
     isOpen: function () { return !!stops[robotShown()]; },
     begin: function (given) { page = given; show(); },

@@ -41,9 +41,9 @@ export function read(pads, now) {
   const before = known;
   known = new Map();
   const seen = usable.map((pad) => {
-    const key = `${pad.index} ${pad.id}`;
-    const state = update(before.get(key), pad, now);
-    known.set(key, state);
+    const slot = `${pad.index} ${pad.id}`;
+    const state = update(before.get(slot), pad, now);
+    known.set(slot, state);
     return { pad, state };
   });
   const driving = seen.find(({ pad, state }) => isDown(pad) && state.seenUp);
@@ -64,7 +64,7 @@ function update(last, pad, now) {
   const reading = JSON.stringify([[...pad.axes], Array.from(pad.buttons, (it) => [it.pressed, it.value])]);
   const it = last ?? { centered: new Set(), seenUp: false, isFrozen: false };
   if (it.reading !== reading) Object.assign(it, { reading, changedAt: now });
-  // A deadman that is down when the gamepad is found, or after a release, must come up first.
+  // A deadman that is down when the gamepad is found, or was let go by the page, must come up first.
   if (!isDown(pad)) Object.assign(it, { seenUp: true, isFrozen: false });
   // An axis counts once it was seen near its centre: one that rests elsewhere is no stick.
   const axis = (index) => {

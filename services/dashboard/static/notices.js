@@ -1,28 +1,20 @@
 // Notices, and questions before a consequence.
-import { capital, combined, translated } from "./phrases.js";
+import { t } from "./i18n.js";
 
 const ERROR_MS = 20000;
 const NOTICE_MS = 5000;
 const MOST = 2; // at a time: more would cover the page
 const $ = (id) => document.getElementById(id);
-let page = null;
 
-export function begin(given) {
-  page = given;
+export function begin() {
   for (const event of ["scroll", "resize"]) addEventListener(event, place);
 }
 
-// A text is a key of the catalogue, or a sentence of a service; `about` is the key of its result.
-function noticeText(text, about) {
-  const { t, language } = page;
-  if (t(text) !== text || language() === "en") return capital(t(text));
-  return combined(about && t(`event.${about}`), translated(text, language())).join("");
-}
-
-export function toast(text, level = "info", about = "") {
+/** Show a text for a while; as for `t`, it is a name in the table or a text in both languages. */
+export function toast(text, level = "info") {
   const it = document.createElement("div");
   it.dataset.level = level;
-  it.textContent = noticeText(text, about);
+  it.textContent = t(text);
   for (const old of [...$("toasts").children]) if (old.textContent === it.textContent) old.remove();
   $("toasts").append(it);
   while ($("toasts").childElementCount > MOST) $("toasts").firstChild.remove();
@@ -49,7 +41,7 @@ export function place() {
 
 // Not modal: the emergency stop must remain one tap away.
 export function confirm(title, text, yes) {
-  $("question-title").textContent = page.t(title);
+  $("question-title").textContent = t(title);
   $("question-text").textContent = text;
   $("question").setAttribute("open", ""); // as show() of newer browsers
   $("question-yes").onclick = () => { $("question").removeAttribute("open"); yes(); };

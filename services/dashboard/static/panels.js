@@ -1,5 +1,5 @@
 // The panels of text: causes, limits, drivers, switches, services, events.
-import { capital, combined, gap, translated } from "./phrases.js";
+import { joined, t } from "./i18n.js";
 
 const $ = (id) => document.getElementById(id);
 const BITS = ["over_current", "over_voltage", "encoder", "under_voltage", "overload"];
@@ -25,46 +25,28 @@ export function duration(seconds) {
   return `${Math.floor(seconds / 3600)} h ${Math.floor((seconds % 3600) / 60)} min`;
 }
 
-const LIMITS = {
-  limit: (it) => it.effect === "slow",
-  limit_stop: (it) => it.effect === "stop" && !it.silent,
-  limit_silent: (it) => it.effect === "stop" && it.silent,
-};
-
-/** Return the text of a cause; a limit with its sources and their own reasons. */
-export function causeText(cause, safety, t) {
-  const known = t(`cause.${cause.name}`) !== `cause.${cause.name}`; // a newer safety may have other causes
-  const by = (safety.limit_sources ?? []).filter(LIMITS[cause.name] ?? (() => false));
-  if (!by.length) return known ? t(`cause.${cause.name}`) : cause.text;
-  return t(`limited.${cause.name}`, by.map((it) => it.source + (it.reason && ` (${it.reason})`)).join(" · "));
-}
-
 /** Return what is missing between safety and the wheels; empty if nothing is. */
-export const rootText = ({ root }, t) => (["", "router", "safety"].includes(root.part) ? "" : t(`root.${root.part}`));
+export const rootText = ({ root }) => (["", "router", "safety"].includes(root.part) ? "" : t(`root.${root.part}`));
 
-function rootLine({ root, safety }, t, language) {
+function rootLine({ root, safety }) {
   const line = create("li", t(`root.${root.part}`), { "data-action": "stop", "data-cause": root.part });
-  const following = safety.causes.filter((it) => root.folded.includes(it.name)).map((it) => translated(it.text, language));
-  if (following.length) line.append(create("small", t("follows", following.join(gap(language)))));
+  const following = safety.causes.filter((it) => root.folded.includes(it.name)).map((it) => t(it.text));
+  if (following.length) line.append(create("small", t("follows", joined(following))));
   return line;
 }
 
-export function showCauses(fast, t, language) {
+export function showCauses(fast) {
   const { safety, root } = fast;
   const causes = (safety?.causes ?? []).filter((it) => !root.folded.includes(it.name));
   const shown = causes.map((it) => [it, it.age < 10 ? it.age?.toFixed(1) : Math.floor(it.age)]);
-  const roots = rootText(fast, t) ? [rootLine(fast, t, language)] : [];
-  const stamp = JSON.stringify([roots.map((it) => it.textContent), shown.map(([it, age]) => [it.name, it.text, age]), safety?.latched, t("why")]);
+  const roots = rootText(fast) ? [rootLine(fast)] : [];
+  const stamp = JSON.stringify([roots.map((it) => it.textContent), shown.map(([it, age]) => [it.name, t(it.text), age]), safety?.latched, t("why")]);
   if (!causes.length && !roots.length) {
     fill($("causes"), stamp, () => [create("li", t(safety ? "no_causes" : "unknown"))]);
   } else fill($("causes"), stamp, () => [...roots, ...shown.map(([it]) => {
-    const text = causeText(it, safety, t);
-    const line = create("li", text, { "data-action": it.action, "data-cause": it.name });
+    const line = create("li", t(it.text), { "data-action": it.action, "data-cause": it.name });
     const latched = safety.latched.includes(it.name) ? ` · ${t("latched")}` : "";
-    const details = translated(it.text, language);
-    const same = LIMITS[it.name] || details === text;
-    const more = same ? "" : `${details} · `;
-    line.append(create("small", more + t("since", duration(it.age)) + latched));
+    line.append(create("small", t("since", duration(it.age)) + latched));
     return line;
   })]);
   const limits = safety?.limits;
@@ -78,8 +60,8 @@ export function showCauses(fast, t, language) {
   }));
 }
 
-export function showSlow(slow, t) {
-  showDrivers(slow, t);
+export function showSlow(slow) {
+  showDrivers(slow);
   for (const name of ["ultrasonic_brake", "bumper_brake"]) {
     const on = slow.switches?.[name];
     $(name).textContent = t(name, on === true ? t("on") : on === false ? t("off") : t("unknown"));
@@ -87,7 +69,7 @@ export function showSlow(slow, t) {
   }
   $("services").replaceChildren(
     row("th", ["service", "alive", "version", "uptime", "lateness", "memory"].map((it) => [t(it)])),
-    ...Object.entries(slow.instances).map(([name, instances]) => service(name, instances, slow.health[name], t)),
+    ...Object.entries(slow.instances).map(([name, instances]) => service(name, instances, slow.health[name])),
   );
 }
 
@@ -97,7 +79,7 @@ function row(tag, cells) {
   return line;
 }
 
-function service(name, instances, health, t) {
+function service(name, instances, health) {
   const state = instances ? (health ? "alive" : "silent") : "gone";
   const line = row("td", [
     [name], [t(state) + (instances > 1 ? ` ×${instances}` : ""), state === "alive" ? "" : "bad"],
@@ -111,7 +93,7 @@ function service(name, instances, health, t) {
   return line;
 }
 
-function showDrivers(slow, t) {
+function showDrivers(slow) {
   const stamp = JSON.stringify([slow.left, slow.right, t("left")].map((it) => [it?.bits ?? it, it?.faults]));
   fill($("drivers"), stamp, () => ["left", "right"].flatMap((side) => {
     const driver = slow[side];
@@ -125,23 +107,11 @@ function showDrivers(slow, t) {
 
 const bits = (all) => [...Array(32).keys()].filter((bit) => Math.floor(all / 2 ** bit) % 2);
 
-// The kind of an event, in English by its name; its own text follows, as it has the figures.
-function eventTexts({ service, name, text }, t, language) {
-  const keys = [`event.${service}.${name}`, `event.${name}`];
-  const key = keys.find((it) => t(it) !== it); // a newer service may have other events
-  const kind = language === "en" ? name.split("_").join(" ").replace("estop", "emergency stop") : t(key ?? "");
-  const [title, details] = combined(kind, translated(text, language));
-  return [capital(title) + (details && language === "en" ? ": " : ""), details];
-}
-
-export function showEvents(events, t, language) {
+export function showEvents(events) {
   const lines = [...events].reverse().map((it) => {
     const line = create("li", "", { "data-level": it.level, "data-name": it.name });
     const clock = new Date(it.t * 1000).toLocaleTimeString([], { hour12: false });
-    const [title, details] = eventTexts(it, t, language);
-    const body = create("b", title);
-    if (details) body.append(create("small", details));
-    line.append(create("time", clock), create("span", it.service), body);
+    line.append(create("time", clock), create("span", it.service), create("b", t(it.text)));
     return line;
   });
   $("events").replaceChildren(...(lines.length ? lines : [create("li", t("no_events"))]));

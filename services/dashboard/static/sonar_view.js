@@ -1,4 +1,6 @@
 // The sonar view: the vehicle from above in metres, x up and y to the left.
+import { t } from "./i18n.js";
+
 const NS = "http://www.w3.org/2000/svg";
 const REACH = 1.9; // m of a sector at most, so that all fit
 const CREEPING = 0.02; // m/s; a slower wheel is drawn straight
@@ -57,12 +59,12 @@ function turned({ x, y }, { measured }) {
   return Math.hypot(ahead, aside) < CREEPING ? 0 : ((-Math.atan(aside / ahead) * 180) / Math.PI).toFixed(1);
 }
 
-function label(range, tone, t) {
+function label(range, tone) {
   if (range != null) return range.toFixed(2);
   return { fault: t("fault"), stop: t("near"), clear: "" }[tone] ?? "?";
 }
 
-export function draw(snapshot, t) {
+export function draw(snapshot) {
   snapshot.tones.forEach((tone, i) => {
     const range = snapshot.ranges[i];
     const reach = Math.max(0.25, Math.min(range ?? (tone === "stop" ? 0.25 : REACH), REACH));
@@ -72,7 +74,7 @@ export function draw(snapshot, t) {
     const far = Math.max(0.5, reach * 0.72);
     parts.labels[i].setAttribute("x", (-mount.y - far * Math.sin(mount.yaw)).toFixed(3));
     parts.labels[i].setAttribute("y", (-mount.x - far * Math.cos(mount.yaw)).toFixed(3));
-    parts.labels[i].textContent = label(range, tone, t);
+    parts.labels[i].textContent = label(range, tone);
   });
   parts.wheels.forEach((wheel) => wheel.part.setAttribute("transform", `rotate(${turned(wheel, snapshot)})`));
   parts.body.dataset.pressed = snapshot.bumper === true;

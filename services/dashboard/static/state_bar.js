@@ -1,9 +1,10 @@
 // The state bar and the chips of the header: verdict, reason, speed, connections, driver.
-import { causeText, rootText } from "./panels.js";
-import { gap, translated } from "./phrases.js";
+import { joined, t } from "./i18n.js";
+import { rootText } from "./panels.js";
 
 const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibited: "stop" };
-const WITHOUT_STATE = ["lost", "none", "no_router"]; // verdicts of the page, not of safety
+// Verdicts of the page, not of safety, with their sentences.
+const WITHOUT_STATE = { lost: "no_dashboard", none: "root.safety", no_router: "root.router" };
 const MOVING = ["run", "slow"];
 const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
 const $ = (id) => document.getElementById(id);
@@ -15,7 +16,7 @@ export function show(view) {
 }
 
 function showState(view) {
-  const { fast, t } = view;
+  const { fast } = view;
   const safety = fast?.safety;
   const worst = safety?.causes[0];
   const verdict = !fast ? "lost" : !fast.connected ? "no_router" : safety?.verdict ?? "none";
@@ -25,31 +26,31 @@ function showState(view) {
   $("state").dataset.tone = quiet ? "idle" : overruler ? "slow" : TONES[verdict] ?? "stop";
   $("state").dataset.verdict = verdict;
   document.title = `${t(`verdict.${verdict}`)} · ${view.robot} · T2`;
-  const known = !WITHOUT_STATE.includes(verdict);
-  const reason = known ? sentence(view) : t(`text.${verdict}`);
-  set("sentence", overruler ? t("overruled_by", overruler) + (view.language === "en" ? ". " : "。") + reason : reason);
+  const known = !(verdict in WITHOUT_STATE);
+  const reason = known ? sentence(view) : joined([t("own_switch"), t(WITHOUT_STATE[verdict])]);
+  set("sentence", reason);
   set("detail", known ? detail(view, worst) : whatNext(view, verdict));
   set("speed", !fast?.measured ? "–" : fast.measured[0].toFixed(2));
   set("turn", !fast?.measured ? "–" : fast.measured[1].toFixed(2));
 }
 
 // Which address does not answer, and the command that finds out why.
-function whatNext({ fast, t, router, doctor }, verdict) {
+function whatNext({ fast, router, doctor }, verdict) {
   const address = fast ? router : location.host;
   return `${t(verdict === "none" ? "router_at" : "no_answer_at", address)} · ${t("next_step", doctor)}`;
 }
 
 // The first missing part, the other latched causes, and what to do.
-function detail({ fast, t, language, isDriver, doctor }, worst) {
+function detail({ fast, isDriver, doctor }, worst) {
   const { safety } = fast;
-  const root = rootText(fast, t);
+  const root = rootText(fast);
   const others = safety.causes.filter((it) => (root || it !== worst) && safety.latched.includes(it.name));
-  return [
+  return joined([
     root,
-    others.length ? t("also_latched", others.map((it) => causeText(it, safety, t)).join(gap(language))) : "",
+    others.length ? t("also_latched", joined(others.map((it) => t(it.text)))) : "",
     safety.latched.length && !isDriver && fast.driver.may ? t("take_to_reset") : "",
     root ? t("next_step", doctor) : "",
-  ].filter(Boolean).join(gap(language));
+  ]);
 }
 
 /** Return the next step that safety accepts: while the bumper is pressed, a reset clears the other causes only. */
@@ -63,23 +64,21 @@ export function nextStep(fast) {
 /** Return whether safety refuses a release in either direction until a reset. */
 export const isUsedUp = (release) => release.left <= 0 || release.forbidden.length > 1;
 
-const RESET_REFUSALS = { "": "nothing_latched", release: "reset_pressed", by_hand: "release_by_hand" };
+const RESET_REFUSALS = { "": "reset.nothing", release: "next.move_off", by_hand: "next.by_hand" };
 
-/** Return why safety would refuse a reset, as a key; empty if it does not. */
-export const resetRefusal = (fast) => (fast?.connected ? RESET_REFUSALS[nextStep(fast)] ?? "" : "no_router");
+/** Return why safety would refuse a reset, as the name of a text; empty if it does not. */
+export const resetRefusal = (fast) => (fast?.connected ? RESET_REFUSALS[nextStep(fast)] ?? "" : "call.not_connected");
 
-function sentence({ fast, t, language, isDriver }) {
-  if (rootText(fast, t)) return t("root.may_move");
-  const { text, source } = fast.safety;
-  const isOwn = isDriver && !fast.driver.other;
-  return translated(isOwn ? text.replace(`${source} is in control.`, "You are in control.") : text, language);
+function sentence({ fast, isDriver }) {
+  if (rootText(fast)) return t("root.may_move");
+  return t(isDriver && !fast.driver.other ? fast.safety.own_text : fast.safety.text);
 }
 
 function showHead(view) {
-  const { fast, t, isDriver, viewer, keepsAlive, delay, limit } = view;
+  const { fast, isDriver, viewer, keepsAlive, delay, limit } = view;
   const off = !fast?.connected; // without a router all values are old
   chip("link", off ? "" : t(`link.${fast.root.part === "bridge" ? "missing" : fast.link ?? "none"}`), fast?.link === "up" ? "clear" : "stop");
-  chip("bumper", off || rootText(fast, t) ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
+  chip("bumper", off || rootText(fast) ? "" : t(`bumper.${fast.bumper ?? "none"}`), fast?.bumper === false ? "clear" : "stop");
   chip("driver", off ? "" : driver(view), isDriver && !fast.driver.other ? "clear" : "slow");
   $("delay").hidden = !fast;
   set("delay-value", `${delay.toFixed(2)} s`);
@@ -90,15 +89,15 @@ function showHead(view) {
 }
 
 /** The viewer that has control, by its name or its number. */
-export const driverName = (fast, t) => fast?.driver.name || t("viewer", fast?.driver.id ?? "");
+export const driverName = (fast) => fast?.driver.name || t("viewer", fast?.driver.id ?? "");
 
 function driver(view) {
-  const { fast, t, isDriver } = view;
+  const { fast, isDriver } = view;
   const { id, may, other, overruled } = fast.driver;
   if (!may) return t("view_only");
-  if (isDriver && overruled) return t("overruled_by", other);
+  if (isDriver && overruled) return t("taken_over", other);
   if (isDriver) return other ? t("drives", other) : t("you_drive");
-  if (id) return t("drives", driverName(fast, t));
+  if (id) return t("drives", driverName(fast));
   const source = fast.safety?.source;
   return source ? t("drives", source) : t("nobody_drives");
 }

@@ -3,7 +3,7 @@
 let lock = null;
 let isAsking = false;
 
-/** Hold or release the lock; return whether the screen may turn off although it must not. */
+/** Hold the lock or give it back; return whether the screen may turn off although it must not. */
 export function update(isNeeded) {
   if (!isNeeded) {
     lock?.release().catch(() => {});
