@@ -169,7 +169,7 @@ def test_driving_by_gamepad(page: Page, stack: RunningStack) -> None:
     page.evaluate(PAD)
     wait_for_text(page, "#gamepad", "A pad")
     page.wait_for_timeout(200)
-    assert text(page, "#hold") == "Let go"  # it was down when it was found
+    assert text(page, "#hold") == "Not held"  # it was down when it was found
     deadman(False)
     tremor = (
         "() => { setInterval(() => { window.pad.axes[1] = -0.99 - Math.random() / 200; }, 50); }"
@@ -200,7 +200,7 @@ def test_a_page_that_loses_its_input_lets_go(page: Page, stack: RunningStack) ->
         page.evaluate(script)
         wait_for_standstill(stack)
         page.keyboard.down("s")  # a repeat: the key never came up
-        wait_for_text(page, "#hold", "Let go")
+        wait_for_text(page, "#hold", "Not held")
         wait_for_standstill(stack)
         page.keyboard.up("s")
 

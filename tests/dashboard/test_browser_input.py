@@ -226,7 +226,7 @@ def test_a_keystroke_that_stops_repeating_was_let_go(driver: Page, peer: Peer) -
 
     until_moving(peer, press, lambda: keystroke(driver, "keyup", key="w", code="KeyW"))
     wait_until(lambda: peer.zeros() >= 3, "the end of them")
-    wait_for_text(driver, "#hold", "Let go")
+    wait_for_text(driver, "#hold", "Not held")
 
 
 SLOW = """(delay) => {
@@ -254,7 +254,7 @@ def test_on_a_slow_link_a_hold_says_why_it_does_nothing(
     assert delay_s > 2 * delay_ms / 1000
     assert page.get_attribute("#delay", "data-tone") == "late"
     page.keyboard.up("w")
-    wait_for_text(page, "#hold", "Let go")
+    wait_for_text(page, "#hold", "Not held")
     if delay_ms > 500:  # safety would refuse a reset, too, and a repetition cannot help
         peer.latched = ("contact",)
         page.wait_for_selector("#reset.due")
