@@ -301,9 +301,9 @@ PHRASES: dict[str, Words] = {
         "超声波传感器不可信：{sonar:word}（{fault:word}）。",
     ),
     # control
-    "control.of": ("{source} is in control.", "{source} 取得控制权。"),
-    "control.you": ("You are in control.", "您已取得控制权。"),  # to the operator of that source
-    "control.none": ("No source is in control.", "没有请求源取得控制权。"),
+    "control.of": ("{source} is in control.", "{source} 拥有控制权。"),
+    "control.you": ("You are in control.", "您拥有控制权。"),  # to the operator of that source
+    "control.none": ("No source is in control.", "没有请求源拥有控制权。"),
     # the next step at a latch
     "next.reset": ("Reset to go on.", "复位后方可行驶。"),
     "next.move_off": (
@@ -661,7 +661,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "safety", "source", "info",
-        ("Another source is in control, or none.", "控制权已切换，或没有请求源取得控制权。"), NOTHING,
+        ("Another source is in control, or none.", "控制权已切换，或没有请求源拥有控制权。"), NOTHING,
     ),
     EventRow(
         "safety", "release", "warning",
@@ -844,7 +844,7 @@ EVENTS: tuple[EventRow, ...] = (
         "recorder", "black_box_lost", "error",
         (
             "{causes:word} latched, and the black box is not written: {problem}.",
-            "{causes:word} 已锁定，黑匣子记录未写入：{problem}。",
+            "{causes:word}已锁定，黑匣子记录未写入：{problem}。",
         ),
         ("free disk space", "请释放磁盘空间"),
     ),

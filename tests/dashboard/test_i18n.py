@@ -89,13 +89,13 @@ def test_a_text_without_known_phrases_is_shown_as_its_publisher_wrote_it() -> No
             "safety",
             "reset_refused",
             "reset.nothing",
-            ("Reset refused: Nothing", "复位被拒绝：没有"),
+            ("Reset refused. Nothing", "复位被拒绝。没有"),
         ),
         (
             "safety",
             "release_refused",
             "next.by_hand",
-            ("Release refused: Push", "脱离请求被拒绝：请"),
+            ("Release refused. Push", "脱离请求被拒绝。请"),
         ),
     ],
 )

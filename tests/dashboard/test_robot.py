@@ -201,7 +201,7 @@ def test_a_reset_is_confirmed_by_the_state_of_safety(
 def test_a_refusal_is_reported(reset: RobotFixture) -> None:
     phrase = Phrase("call.late", {"age": 1.4, "limit": 1.0})
     reset.bus.answers[-1][1](Refusal(text="late", phrases=(phrase,)))
-    expected = "Reset refused: The call is 1.4 s old, allowed is 1 s: repeat it."
+    expected = "Reset refused. The call is 1.4 s old, allowed is 1 s: repeat it."
     assert reset.notices == [("warning", expected)]
 
 

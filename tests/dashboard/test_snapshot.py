@@ -139,10 +139,10 @@ def test_the_texts_of_safety_in_both_languages() -> None:
         )
     )
     assert view.text == Texts(
-        "The bumper was hit. web is in control.", "防撞条已触发。web 取得控制权。"
+        "The bumper was hit. web is in control.", "防撞条已触发。web 拥有控制权。"
     )
     assert view.own_text == Texts(
-        "The bumper was hit. You are in control.", "防撞条已触发。您已取得控制权。"
+        "The bumper was hit. You are in control.", "防撞条已触发。您拥有控制权。"
     )
     assert view.causes[0].text == Texts("a\\u001b", "a\\u001b")  # of a newer safety
     assert view.release_refusal == Texts("no", "no")
