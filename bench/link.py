@@ -55,7 +55,7 @@ ANOTHER = 3  # the last number of the laptop's address
 SETTLE_S, SECONDS, ESTOP_S, PATIENCE_S = 1.0, 4.0, 5.0, 60.0
 SURE_NS = NS_PER_S  # of driving without a stop
 NOTICE_NS = NS_PER_S // 20  # to detect the end of a lease
-SHIPPED = SafetyConfig().safety
+SHIPPED = SafetyConfig()
 FILES = ("ca", "certificate", "private_key", "members")
 
 
@@ -139,7 +139,7 @@ def measure_here() -> Figures:
         made = {name: under(hosts, faults) for name, faults in CONDITIONS.items()}
         made |= {name: outage(hosts, seconds) for name, seconds in OUTAGES_S.items()}
     made["allowed"] = {
-        "stop": [round(SHIPPED.sources["teleop"].lease * NS_PER_S) + NOTICE_NS],
+        "stop": [round(SHIPPED.leased["teleop"].lease * NS_PER_S) + NOTICE_NS],
         "gap": [round(SHIPPED.times.bumper_age * NS_PER_S)],
     }
     return {(name, what): v for name, one in made.items() for what, v in one.items()}

@@ -8,13 +8,12 @@ from common import settings
 from common.cli_args import add_sources, sources
 from common.config import flatten, load
 from common.errors import ConfigError
-from services.bridge.config import Bridge
 from services.dashboard.config import Dashboard
 from services.metrics.config import Metrics
 from services.odom.config import Odom
 from services.recorder.config import Recorder
 from services.ros2.config import Ros2
-from services.safety.config import Safety
+from services.safety.config import Safety, SafetyConfig
 from services.teleop.config import Teleop
 from sim.config import Sim
 
@@ -25,7 +24,6 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     board: settings.Board = settings.Board()
     wire: settings.Wire = settings.Wire()
     vehicle: settings.Vehicle = settings.Vehicle()
-    bridge: Bridge = Bridge()
     safety: Safety = Safety()
     odom: Odom = Odom()
     teleop: Teleop = Teleop()
@@ -34,6 +32,11 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     metrics: Metrics = Metrics()
     ros2: Ros2 = Ros2()
     sim: Sim = Sim()
+
+
+def safety_config(config: Everything) -> SafetyConfig:
+    """Return the sections of safety."""
+    return SafetyConfig(host=config.host, vehicle=config.vehicle, safety=config.safety)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

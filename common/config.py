@@ -3,8 +3,9 @@
 A setting is named by its path, ``board.port``. Sources in order of precedence, the last one wins:
 files, environment (``T2__BOARD__PORT``, in any case), ``--set board.port=4002``. Tables are merged
 across sources. Sections of other services are ignored; unknown sections and fields are refused,
-because a misspelt setting would be lost silently. A certificate's file name is relative to the
-settings file that contains it. ``~`` in a path is the home folder, in every source.
+because a misspelt setting would be lost silently. A value that takes a protection away is refused
+unless ``unsafe_overrides``, at the top of a file, names its path. A certificate's file name is
+relative to the settings file that contains it. ``~`` in a path is the home folder, in every source.
 """
 
 import difflib
@@ -19,10 +20,11 @@ import msgspec
 from msgspec import Struct
 
 from common.errors import ConfigError
-from common.removed_settings import REMOVED
+from common.settings import Section, Shared, extra_of
 from t2.text_file import expanded, read_text, typographic
 
 C = TypeVar("C", bound=Struct)
+R = TypeVar("R", bound=Shared)
 
 DEFAULT_FILE = Path(__file__).parent.parent / "config" / "t2.toml"
 ENV_PREFIX = "T2__"
@@ -39,8 +41,8 @@ QUOTES = tuple("\"'\u2018\u2019\u201c\u201d\u201e\u00ab")
 
 # Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
-    "robot", "bus", "board", "wire", "log", "vehicle",
-    "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
+    "robot", "host", "bus", "board", "wire", "log", "vehicle",
+    "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
 )  # fmt: skip
 
 
@@ -69,7 +71,7 @@ class Loaded(Struct, Generic[C], frozen=True):
     settings: Given
 
 
-def load(root: type[C], sources: Sources) -> Loaded[C]:
+def load(root: type[R], sources: Sources) -> Loaded[R]:
     """Read the sections of ``root``; raise ``ConfigError`` naming origin, field, value, allowed."""
     given = {path: Setting(value, DEFAULT) for path, value in flatten(root())}
     for file in sources.files:
@@ -85,6 +87,7 @@ def load(root: type[C], sources: Sources) -> Loaded[C]:
             raise ConfigError(f"{setting.origin}: {path}: {unknown}")
     ours = {path: setting for path, setting in given.items() if path.split(".")[0] in names}
     config = build(root, ours)
+    _check_protections(config, ours)
     default = {path: Setting(value, DEFAULT) for path, value in flatten(config)}
     return Loaded(config, default | {path: ours[path] for path in ours if path in default})
 
@@ -92,6 +95,40 @@ def load(root: type[C], sources: Sources) -> Loaded[C]:
 def build(root: type[C], given: Given) -> C:
     """Return a struct from its settings by path; raise ``ConfigError`` as ``load`` does."""
     return _struct(root, _nest(given), "", given)
+
+
+def _check_protections(config: Shared, given: Given) -> None:
+    """Refuse unsafe values without an override, and an override that has no effect.
+
+    The overrides of sections that this service does not read are left to the services that do.
+    """
+    overrides, values = config.unsafe_overrides, dict(flatten(config))
+    sections = {
+        name: part
+        for name in config.__struct_fields__
+        if isinstance(part := getattr(config, name), Section)
+    }
+    safe = {
+        f"{name}.{path}": allowed
+        for name, part in sections.items()
+        for path, allowed in part.protections().items()
+    }
+    where = f"{_origin('unsafe_overrides', given)}: unsafe_overrides names"
+    for path in overrides:
+        section = path.split(".")[0]
+        if path not in safe and (section in sections or section not in SECTIONS):
+            unknown = f"{path!r}, which takes no protection away{_suggestion(path, safe)}"
+            raise ConfigError(f"{where} {unknown}")
+    for path, allowed in safe.items():
+        value = values[path]
+        is_safe = allowed.low <= value <= allowed.high
+        if is_safe and path in overrides:
+            raise ConfigError(f"{where} {path!r}, but {value} is safe ({allowed}): remove it there")
+        if not is_safe and path not in overrides:
+            raise ConfigError(
+                f"{_origin(path, given)}: {path} = {value} takes a protection away; allowed is "
+                f"{allowed}, or name {path!r} in unsafe_overrides"
+            )
 
 
 def flatten(value: Any, path: str = "") -> Iterable[tuple[str, Any]]:
@@ -239,9 +276,8 @@ def _value(kind: Any, value: Any, path: str, given: Given) -> Any:
     except msgspec.ValidationError as error:
         what = str(error).partition(" - at `$")[0]  # the element of a tuple
         shown = f" = {given[path].value!r}" if path in given else ""
-        raise ConfigError(
-            f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(kind)}{_meaning(path)}"
-        ) from None
+        of = get_args(bare)[0] if what != str(error) and get_origin(bare) is tuple else kind
+        raise ConfigError(f"{_origin(path, given)}: {path}{shown}: {what}{_allowed(of)}") from None
 
 
 def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) -> C:
@@ -251,10 +287,9 @@ def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) ->
     values = {}
     for name, value in table.items():
         at = f"{path}.{name}" if path else name
-        if at in REMOVED:
-            raise ConfigError(f"{_origin(at, given)}: {at}: {REMOVED[at]}")
         if name not in types:
-            unknown = f"unknown{_suggestion(name, types)}"
+            elsewhere = [other for other in given if other.endswith(f".{name}") and other != at]
+            unknown = f"unknown{_suggestion(*((at, elsewhere) if elsewhere else (name, types)))}"
             raise ConfigError(f"{_origin(at, given)}: {at}: {unknown}")
         values[name] = _value(types[name], value, at, given)
     for field in msgspec.structs.fields(kind):
@@ -263,9 +298,8 @@ def _struct(kind: type[C], table: Mapping[str, Any], path: str, given: Given) ->
     try:
         return kind(**values)
     except ValueError as error:
-        shown, setting = (f"{path}: ", f"{path}.") if path else ("", "")
-        meaning = _meaning(setting + str(error).partition(" = ")[0])
-        raise ConfigError(f"{_origin(path, given)}: {shown}{error}{meaning}") from None
+        shown = f"{path}: " if path else ""
+        raise ConfigError(f"{_origin(path, given)}: {shown}{error}") from None
 
 
 def _is_struct(kind: Any) -> bool:
@@ -284,32 +318,21 @@ def _origin(path: str, given: Given) -> str:
     return ", ".join(dict.fromkeys(setting.origin for setting in named))
 
 
-def _meaning(path: str) -> str:
-    """Return a setting's unit and meaning in parentheses, as the shipped file has them.
-
-    A field of a table with free names has that of the table.
-    """
-    section = meaning = ""
-    for line in DEFAULT_FILE.read_text(encoding="utf-8").splitlines():
-        code, _, comment = line.removeprefix("# ").partition(" # ")
-        if code.startswith("["):
-            section = code.strip("[]")
-            name = section if "." in section else None
-        else:
-            name = f"{section}.{code.partition(' = ')[0]}"
-        if name and comment and f"{path}.".startswith(f"{name}."):
-            meaning = f" ({comment.partition(';')[0]})"
-    return meaning
-
-
 def _allowed(kind: Any) -> str:
     """Describe the allowed values; msgspec's own error names one end of a range only."""
-    info: Any = msgspec.inspect.type_info(kind)
+    info: Any = type_info(kind)
     words = getattr(info, "values", ())
     if words:
         return f"; allowed is {', '.join(map(repr, words))}"
     low, high = getattr(info, "ge", None), getattr(info, "le", None)
     over = getattr(info, "gt", None)
+    unit = f" {extra_of(kind).get('unit', '')}".rstrip()
     if high is None or (low is None and over is None):
-        return ""
-    return f"; allowed is {low}..{high}" if over is None else f"; allowed is over {over}..{high}"
+        return f"; the unit is{unit}" if unit else ""
+    return f"; allowed is {low if over is None else f'over {over}'}..{high}{unit}"
+
+
+def type_info(kind: Any) -> Any:
+    """Return msgspec's description of a type, without our unit."""
+    info = msgspec.inspect.type_info(kind)
+    return info.type if isinstance(info, msgspec.inspect.Metadata) else info

@@ -167,7 +167,7 @@ def run_with(
     """Run a service with these sources of settings; return its exit code."""
     try:
         loaded = load(root, settings)
-        if priority and loaded.config.robot.realtime:
+        if priority and loaded.config.host.realtime:
             realtime.request(priority)  # before threads start: they inherit it
             realtime.limit()
         log.configure(loaded.config.log, name)

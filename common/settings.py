@@ -7,18 +7,47 @@ import math
 import re
 from collections.abc import Mapping
 from ipaddress import ip_address
-from typing import Annotated, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_type_hints
 
 import msgspec
 from msgspec import Meta, Struct
 
 T = TypeVar("T", bound=Struct)
-Limits = Mapping[str, tuple[float, float]]
-Stall = Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class Safe(NamedTuple):
+    """Lowest and highest value that take no protection away, with their unit."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.low}..{self.high} {self.unit}".rstrip()
+
+
+def allowed(unit: str = "", *, safe: tuple[float, float] | None = None, **bounds: float) -> Meta:
+    """Return unit and bounds (``gt``, ``ge``, ``le``) of a number, for its type.
+
+    Outside of ``safe`` a setting makes a protection ineffective: it is refused unless
+    ``unsafe_overrides`` names its path. Zero never means "off".
+    """
+    of_type: Any = {**bounds, "extra": {"unit": unit, "safe": safe and Safe(*safe, unit)}}
+    return Meta(**of_type)
+
+
+def extra_of(kind: object) -> Mapping[str, Any]:
+    """Return what ``allowed`` has put into a type: ``unit`` and ``safe``; nothing otherwise."""
+    parts = [part.extra for part in getattr(kind, "__metadata__", ()) if isinstance(part, Meta)]
+    return next(filter(None, parts), {})
+
+
 AngularUnit = Literal["decidegree", "milliradian"]
 LogLevel = Literal["debug", "info", "warning", "error"]
 
 Port = Annotated[int, Meta(ge=1, le=65535)]
+MetresPerSecond = Annotated[float, allowed("m/s", gt=0.0, le=3.0)]
+RadiansPerSecond = Annotated[float, allowed("rad/s", gt=0.0, le=3.0)]
 # A robot's id, and other parts of a certificate's name: one chunk of a key.
 Name = Annotated[str, Meta(pattern=r"^[A-Za-z0-9_.-]{1,60}\Z")]
 # The name of a source, as in ``safety.sources`` and ``safety.limits``.
@@ -33,33 +62,16 @@ SOCKET_BYTES = 107  # of the path of a Unix socket, on Linux
 class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One table of the configuration file."""
 
-
-class ProtectedSection(Section, frozen=True, kw_only=True):
-    """A table with settings that can take a protection away.
-
-    Outside of its protective limits a setting makes a protection ineffective. It is refused unless
-    ``unsafe_overrides`` names it. Zero never means "off".
-    """
-
-    protective: ClassVar[Limits] = {}
-    unsafe_overrides: tuple[str, ...] = ()  # settings outside their protective limits, on purpose
-
-    def __post_init__(self) -> None:
-        self.check(self.protective, {name: getattr(self, name) for name in self.protective})
-
-    def check(self, limits: Limits, given: Mapping[str, float]) -> None:
-        """Raise ``ValueError`` for a value outside its limits, and for an unknown override."""
-        unknown = sorted(set(self.unsafe_overrides) - set(limits))
-        if unknown:
-            raise ValueError(
-                f"unsafe_overrides names {unknown[0]!r}, which takes no protection away"
-            )
-        for name, (low, high) in limits.items():
-            if not low <= given[name] <= high and name not in self.unsafe_overrides:
-                raise ValueError(
-                    f"{name} = {given[name]} takes a protection away; "
-                    f"allowed is {low}..{high}, or name it in unsafe_overrides"
-                )
+    def protections(self) -> dict[str, Safe]:
+        """Return the safe values of each setting that has such, by its path in this table."""
+        found = {}
+        for name, kind in get_type_hints(type(self), include_extras=True).items():
+            value = getattr(self, name)
+            if safe := extra_of(kind).get("safe"):
+                found[name] = safe
+            for row, section in value.items() if isinstance(value, dict) else ():
+                found |= {f"{name}.{row}.{at}": it for at, it in section.protections().items()}
+        return found
 
 
 def lengthened(limits: T, stall_s: float) -> T:
@@ -72,34 +84,40 @@ def lengthened(limits: T, stall_s: float) -> T:
 
 
 class Robot(Section, frozen=True, kw_only=True):
-    """Identity of the robot, and scheduling of its processes."""
+    """Identity of the robot."""
 
     id: Name = "001"
+
+
+class Host(Section, frozen=True, kw_only=True):
+    """The computer that the services run on."""
+
+    # its processes stall for so long: every time limit of bridge and safety is longer
+    stall: Annotated[float, allowed("s", ge=0.0, le=1.0, safe=(0.0, 0.0))] = 0.0
     realtime: bool = True  # whether the control chain requests SCHED_FIFO
 
 
-class BusSettings(ProtectedSection, frozen=True, kw_only=True):
+class BusSettings(Section, frozen=True, kw_only=True):
     """Zenoh router, endpoints and certificates."""
 
-    protective: ClassVar[Limits] = {"lease": (0.0, 2.0)}
     listen: tuple[str, ...] = ("tcp/127.0.0.1:7447",)  # the embedded router's endpoints
     # where services connect, bridge and safety to one router only; empty means ``listen``
     connect: tuple[str, ...] = ()
     uplink: tuple[str, ...] = ()  # the site's router, to which the robot's router connects
     # the drive link between bridge and safety, unixsock-stream/PATH; empty means derived.
     drive: str = ""
-    lease: Annotated[float, Meta(ge=0.2, le=10.0)] = 1.0  # s until a silent partition is detected
-    # s for the router's answer to its probe: a router that misses it twice is restarted.
-    probe_deadline: Annotated[float, Meta(ge=0.5, le=60.0)] = 1.0
+    # until a silent partition is detected
+    lease: Annotated[float, allowed("s", ge=0.2, le=10.0, safe=(0.2, 2.0))] = 1.0
+    # for the router's answer to its probe: a router that misses it twice is restarted
+    probe_deadline: Annotated[float, allowed("s", ge=0.5, le=60.0)] = 1.0
     ca: str = ""  # PEM files of `t2 keys`, for tls/ endpoints
     certificate: str = ""
     private_key: str = ""
     members: str = ""  # member list of `t2 keys`: accepted certificates and roles
     insecure: bool = False  # allow network endpoints without TLS
-    laptop_rate: Annotated[float, Meta(ge=1.0, le=1000.0)] = 10.0  # Hz of each stream to a laptop
+    laptop_rate: Annotated[float, allowed("Hz", ge=1.0, le=1000.0)] = 10.0  # of each stream
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         for endpoint in (*self.listen, *self.connect, *self.uplink):
             if not ENDPOINT.fullmatch(endpoint):
                 raise ValueError(f"endpoint {endpoint!r} should look like tcp/127.0.0.1:7447")
@@ -196,21 +214,22 @@ def is_local(endpoint: str) -> bool:
         return host == "localhost"
 
 
-class Board(ProtectedSection, frozen=True, kw_only=True):
-    """Addresses of the vehicle's main board and of this computer (manual 1)."""
+class Board(Section, frozen=True, kw_only=True):
+    """The vehicle's main board: addresses (manual 1), and what it must confirm."""
 
-    protective: ClassVar[Limits] = {"any_source_port": (False, False)}
     address: str = "127.0.0.1"  # 10.7.5.224 on the vehicle
     port: Port = 4003  # 4002 on the vehicle; on one host it must differ from ours
     listen_address: str = "127.0.0.1"  # 10.7.5.220 on the vehicle
     # the board sends to both; commands leave from the port that receives the velocity
     listen_ports: Annotated[tuple[Port, ...], Meta(min_length=1, max_length=2)] = (4002, 4001)
-    any_source_port: bool = False  # accept frames from every port of the board's address
+    # accept frames from every port of the board's address
+    any_source_port: Annotated[bool, allowed(safe=(False, False))] = False
     # UDP port at ``address`` that a relay reports from, 4010; 0: no relay (docs/relay.md).
     relay_port: Annotated[int, Meta(ge=0, le=65535)] = 0
+    # it must echo that its own emergency brakes are on, before anything drives
+    require_switches: Annotated[bool, allowed(safe=(True, True))] = True
 
     def __post_init__(self) -> None:
-        super().__post_init__()
         for name in ("address", "listen_address"):
             _check_ipv4(name, getattr(self, name))
         if len(set(self.listen_ports)) < len(self.listen_ports):
@@ -248,30 +267,40 @@ class Log(Section, frozen=True, kw_only=True):
 
 # What a sonar's name says must stay seen, and a wall alongside must be known as one.
 MAX_SHIFT_M, MAX_AVERT = 0.3, 0.15  # m, rad from the usual place
+GEARS = 5
 
 
 class Place(Section, frozen=True, kw_only=True):
-    """Position (m) and direction (rad) of a sonar in ``base_link``."""
+    """Position and direction of a sonar in ``base_link``."""
 
-    x: float
-    y: float
-    yaw: Annotated[float, Meta(ge=-3.2, le=3.2)]
+    x: Annotated[float, allowed("m")]
+    y: Annotated[float, allowed("m")]
+    yaw: Annotated[float, allowed("rad", ge=-3.2, le=3.2)]
 
 
 class Vehicle(Section, frozen=True, kw_only=True):
-    """Dimensions of the vehicle; the manual gives none, so measure yours.
+    """What the vehicle is, can do and may do; the manual gives no dimensions: measure yours.
 
     The origin of ``base_link`` is the middle of the wheels, on the ground.
     """
 
-    length: Annotated[float, Meta(ge=0.2, le=5.0)] = 1.10  # m, bumper to bumper
-    width: Annotated[float, Meta(ge=0.2, le=3.0)] = 0.70  # m
-    wheelbase: Annotated[float, Meta(ge=0.1, le=5.0)] = 0.70  # m, front axle to rear axle
-    track: Annotated[float, Meta(ge=0.1, le=3.0)] = 0.56  # m, left wheels to right wheels
-    sonar_min: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.05  # m, nearer cannot be measured
-    sonar_max: Annotated[float, Meta(ge=0.5, le=20.0)] = 5.0  # m, farther gives no echo
+    length: Annotated[float, allowed("m", ge=0.2, le=5.0)] = 1.10  # bumper to bumper
+    width: Annotated[float, allowed("m", ge=0.2, le=3.0)] = 0.70
+    track: Annotated[float, allowed("m", ge=0.1, le=3.0)] = 0.56  # left wheels to right wheels
+    sonar_min: Annotated[float, allowed("m", ge=0.0, le=1.0)] = 0.05  # nearer cannot be measured
+    sonar_max: Annotated[float, allowed("m", ge=0.5, le=20.0)] = 5.0  # farther gives no echo
     # where a sonar is, if not on the hull: front = { x = 0.5, y = 0.0, yaw = 0.0 }, m and rad
     sonars: dict[str, Place] = msgspec.field(default_factory=dict)
+    max_linear: Annotated[float, allowed("m/s", ge=0.05, le=3.0, safe=(0.05, 1.5))] = 1.0
+    max_angular: Annotated[float, allowed("rad/s", ge=0.05, le=3.0, safe=(0.05, 2.0))] = 1.0
+    # guaranteed: safety slows down by it, and a STOP that does not reach it becomes BRAKE sooner
+    deceleration: Annotated[float, allowed("m/s^2", gt=0.0, le=10.0, safe=(0.1, 1.0))] = 0.6
+    # likewise
+    angular_deceleration: Annotated[float, allowed("rad/s^2", gt=0.0, le=10.0, safe=(0.1, 3.0))] = (
+        1.0
+    )
+    gears_linear: tuple[MetresPerSecond, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # of operators
+    gears_angular: tuple[RadiansPerSecond, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)
 
     def __post_init__(self) -> None:
         usual = {mount.name: mount for mount in _on_the_hull(self)}
@@ -279,6 +308,10 @@ class Vehicle(Section, frozen=True, kw_only=True):
             raise ValueError(f"sonars names {unknown[0]!r}, allowed are {', '.join(usual)}")
         for mount in sonar_mounts(self):
             _check_place(mount, usual[mount.name], self)
+        for name in ("gears_linear", "gears_angular"):
+            gears = getattr(self, name)
+            if len(gears) != GEARS or list(gears) != sorted(gears):
+                raise ValueError(f"{name} {list(gears)} should be {GEARS} rising speeds")
 
 
 class Mount(Struct, frozen=True):
@@ -339,6 +372,9 @@ def _on_the_hull(vehicle: Vehicle) -> tuple[Mount, ...]:
 class Shared(Struct, frozen=True, kw_only=True):
     """Sections of every service; a service's own configuration extends them."""
 
+    # paths of settings that take a protection away, on purpose, such as "safety.margin"
+    unsafe_overrides: tuple[str, ...] = ()
     robot: Robot = Robot()
+    host: Host = Host()
     bus: BusSettings = BusSettings()
     log: Log = Log()

@@ -104,7 +104,7 @@ def run(options: argparse.Namespace) -> int:
     config = load(Config, sources(options)).config
     model = load_model(options.profile, Model(wire=config.wire, vehicle=config.vehicle))
     plan = load_plan(config.sim.world, model.vehicle)
-    if config.robot.realtime:
+    if config.host.realtime:
         realtime.request(realtime.BOARD)
     log.configure(config.log, "sim")
     with (

@@ -17,7 +17,7 @@ from verification.harness.ports import free_port
 settings.register_profile("t2", deadline=None)
 settings.load_profile("t2")
 # Four tests at a time share the cores: none may go ahead of the board that another one simulates.
-os.environ.setdefault("T2__ROBOT__REALTIME", "false")
+os.environ.setdefault("T2__HOST__REALTIME", "false")
 
 
 @pytest.fixture(autouse=True)

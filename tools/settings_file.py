@@ -6,14 +6,15 @@ The lines are comments: the defaults have one home, the sections in ``config.py`
 import json
 from collections.abc import Iterator
 from enum import Enum
-from typing import Any
+from typing import Any, get_type_hints
 
 import msgspec
 from msgspec import Struct
 
 from cli.settings import Everything
 from common import settings
-from common.config import flatten
+from common.config import flatten, type_info
+from common.settings import extra_of
 from tools.fields import fields_of
 
 HEAD = """\
@@ -22,6 +23,7 @@ HEAD = """\
 # --set board.port=4002; the later one wins. `t2 config` shows the effective settings and their
 # sources.
 # Generated from the code by `make docs`.
+
 """
 
 
@@ -33,18 +35,17 @@ def text() -> str:
 def _section(path: str, section: Struct) -> Iterator[str]:
     """Yield the lines of a section, then those of its tables."""
     kind = type(section)
-    info: Any = msgspec.inspect.type_info(kind)
-    why, protective = _comments(kind), getattr(kind, "protective", {})
+    types = get_type_hints(kind, include_extras=True)
+    why = _comments(kind)
     tables = []
     if path:
         yield f"\n[{path}] # {(kind.__doc__ or '').splitlines()[0]}\n"
-    for field in info.fields:
+    for field in msgspec.structs.fields(kind):
         at, value = f"{path}.{field.name}".lstrip("."), getattr(section, field.name)
         if isinstance(value, (Struct, dict)):
             tables.append((at, value, why.get(field.name, "")))
             continue
-        limits = _range(field.type, protective.get(field.name))
-        meaning = "; ".join(filter(None, (why.get(field.name), limits)))
+        meaning = "; ".join(filter(None, (_range(types[field.name]), why.get(field.name))))
         yield f"# {field.name} = {_toml(value)}{f' # {meaning}' if meaning else ''}\n"
     for at, table, meaning in tables:
         if isinstance(table, Struct):
@@ -56,26 +57,32 @@ def _section(path: str, section: Struct) -> Iterator[str]:
 
 def _comments(kind: type[Struct]) -> dict[str, str]:
     """Return the comment of each field: that of its line, or the lines above it."""
-    sections = [base for base in reversed(kind.__mro__) if issubclass(base, settings.Section)]
+    sections = [
+        base
+        for base in reversed(kind.__mro__)
+        if issubclass(base, (settings.Section, settings.Shared))
+    ]
     return {field.name: field.why.strip(" .") for base in sections for field in fields_of(base)}
 
 
-def _range(kind: Any, protective: tuple[float, float] | None) -> str:
-    """Return the allowed values of a field, without ``unsafe_overrides``."""
-    words = getattr(kind, "values", ())
-    if words:
+def _range(kind: Any) -> str:
+    """Return the allowed values of a field, without ``unsafe_overrides``, and their unit."""
+    info, extra = type_info(kind), extra_of(kind)
+    if item := getattr(info, "item_type", None):
+        return str((getattr(item, "extra", None) or {}).get("unit", ""))
+    if words := getattr(info, "values", ()):
         return ", ".join(json.dumps(word) for word in words)
-    low: float | None = getattr(kind, "ge", None)
-    high: float | None = getattr(kind, "le", None)
-    over: float | None = getattr(kind, "gt", None)
-    if protective and not isinstance(protective[0], bool):
-        low = max(protective[0], low or 0.0) or None
-        high = protective[1] if high is None else min(protective[1], high)
+    low: float | None = getattr(info, "ge", None)
+    high: float | None = getattr(info, "le", None)
+    if (safe := extra.get("safe")) and not isinstance(safe.low, bool):
+        low, high = safe.low or low, safe.high
     if high is None:
-        return ""
+        return str(extra.get("unit", ""))
     if high == 0.0:
         return "0 without unsafe_overrides"
-    return f"{low:g} to {high:g}" if low is not None else f"over {over or 0:g}, up to {high:g}"
+    over: float | None = getattr(info, "gt", None)
+    least = f"over {over or 0:g}, up to" if low is None else f"{low:g} to"
+    return f"{least} {high:g} {extra.get('unit', '')}".rstrip()
 
 
 def _row(row: Struct) -> str:

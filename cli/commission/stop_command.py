@@ -9,10 +9,10 @@ from cli.commission.stops import DRIVING, TURNING, Axis, Stop, Streams, find_sto
 from cli.inspect import output
 from cli.inspect.addressing import chunks
 from cli.recordings.info import open_recording
-from cli.settings import Everything
+from cli.settings import Everything, safety_config
 from common.errors import ConfigError
 from common.standstill import stopping_s
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from t2 import keys
 from t2.errors import T2Error
 
@@ -30,9 +30,10 @@ def run(options: argparse.Namespace, config: Everything) -> int:
         raise ConfigError(
             "stop: name at least one recording: start `t2 record` on the robot, drive and stop"
         )
+    settings = safety_config(config)
     stops, left_out = read(options.files, options.robot)
-    rows = [as_cells(number, stop, config.safety) for number, stop in enumerate(stops, 1)]
-    passed, lines = verdict(stops, config.safety)
+    rows = [as_cells(number, stop, settings) for number, stop in enumerate(stops, 1)]
+    passed, lines = verdict(stops, settings)
     print(output.table(HEAD, rows), "", sep="\n")
     if left_out:
         print(f"Left out: {counted(left_out)}.")
@@ -94,13 +95,15 @@ def needed(stop: Stop) -> float:
     return stop.distance + stop.speed * SENSING_S
 
 
-def reckoned(stop: Stop, safety: Safety) -> float:
+def reckoned(stop: Stop, settings: SafetyConfig) -> float:
     """Return the distance (m or rad) that safety reckons with: as its zones, by the slower axis."""
-    stop_s = stopping_s(stop.twist, safety.deceleration, safety.angular_deceleration)
-    return stop.speed * (safety.reaction + stop_s / 2)
+    stop_s = stopping_s(
+        stop.twist, settings.vehicle.deceleration, settings.vehicle.angular_deceleration
+    )
+    return stop.speed * (settings.reaction + stop_s / 2)
 
 
-def as_cells(number: int, stop: Stop, safety: Safety) -> Sequence[str]:
+def as_cells(number: int, stop: Stop, settings: SafetyConfig) -> Sequence[str]:
     """Return one stop as table cells."""
     return (
         str(number),
@@ -111,18 +114,18 @@ def as_cells(number: int, stop: Stop, safety: Safety) -> Sequence[str]:
         f"{stop.deceleration:.2f}",
         f"{stop.distance:.3f}",
         f"{needed(stop):.3f}",
-        f"{reckoned(stop, safety):.3f}",
+        f"{reckoned(stop, settings):.3f}",
         stop.file,
     )
 
 
-def verdict(stops: Sequence[Stop], safety: Safety) -> tuple[bool, Iterator[str]]:
+def verdict(stops: Sequence[Stop], settings: SafetyConfig) -> tuple[bool, Iterator[str]]:
     """Return whether the vehicle passes, and the lines below the table.
 
     It passes with a STOP, which is what an obstacle causes, forward, backward and turning to both
     sides, and without a stop that was longer than reckoned.
     """
-    spare = [reckoned(stop, safety) - needed(stop) for stop in stops]
+    spare = [reckoned(stop, settings) - needed(stop) for stop in stops]
     worst = min(range(len(stops)), key=spare.__getitem__)
     found = {stop.direction for stop in stops if stop.kind == "stop"}
     wanted = (*DRIVING.directions.values(), *TURNING.directions.values())
@@ -133,15 +136,16 @@ def verdict(stops: Sequence[Stop], safety: Safety) -> tuple[bool, Iterator[str]]
         yield (
             f"The worst is stop {worst + 1}: from the reading to standstill it needs "
             f"{needed(stops[worst]):.2f} {unit}, reckoned are "
-            f"{reckoned(stops[worst], safety):.2f} {unit}."
+            f"{reckoned(stops[worst], settings):.2f} {unit}."
         )
         yield (
             f"The slowest reaction is {max(each.reaction for each in stops) + SENSING_S:.2f} s "
-            f"from the reading (safety.react is {safety.reaction:g} s)."
+            f"from the reading (safety.react is {settings.reaction:g} s)."
         )
-        yield from of_axis(stops, DRIVING, "deceleration", safety.deceleration, safety.max_linear)
+        body = settings.vehicle
+        yield from of_axis(stops, DRIVING, "deceleration", body.deceleration, body.max_linear)
         yield from of_axis(
-            stops, TURNING, "angular_deceleration", safety.angular_deceleration, safety.max_angular
+            stops, TURNING, "angular_deceleration", body.angular_deceleration, body.max_angular
         )
         for direction in missing:
             yield f"NOT MEASURED: a STOP {direction}."
@@ -160,7 +164,7 @@ def of_axis(
     if mine := [stop for stop in stops if stop.axis is axis]:
         weakest, fastest = min(s.deceleration for s in mine), max(s.speed for s in mine)
         yield (
-            f"The weakest deceleration is {weakest:.2f} {axis.unit}/s2 (safety.{name} is "
+            f"The weakest deceleration is {weakest:.2f} {axis.unit}/s2 (vehicle.{name} is "
             f"{reckoned_with:g} {axis.unit}/s2). The fastest stop is from {fastest:.2f} "
             f"{axis.unit}/s; safety allows {allowed:g} {axis.unit}/s."
         )

@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     load_model(options.profile)  # refuses an invalid one before anything starts
     prepare(options.out)
     stall_s = host_stalls.measured()
-    options.sets = host_stalls.with_accepted_joined(
+    options.sets = host_stalls.with_overrides_joined(
         [*own_ports(), f"sim.world={WORLD}", *host_stalls.settings(stall_s), *options.sets]
     )
     config = load(Everything, sources(options)).config

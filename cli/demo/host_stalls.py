@@ -11,7 +11,8 @@ from collections.abc import Iterable
 LIMIT_S = 0.05  # the shipped limits allow stalls up to this
 SAMPLES_S = 0.005
 
-LEAST_S, MOST_S = 0.3, 1.0  # of the settings
+LEAST_S, MOST_S = 0.3, 1.0  # of ``host.stall``
+OVERRIDES = "unsafe_overrides="
 
 
 def measured(seconds: float = 1.5) -> float:
@@ -31,24 +32,16 @@ def settings(stall_s: float) -> list[str]:
         return []
     allowed_s = min(MOST_S, max(LEAST_S, stall_s))
     return [
-        "bus.unsafe_overrides=lease",
+        f"{OVERRIDES}bus.lease,host.stall",
         "bus.lease=10",
         "bus.probe_deadline=10",
-        "bridge.unsafe_overrides=stall",
-        f"bridge.stall={allowed_s}",
-        "safety.unsafe_overrides=stall",
-        f"safety.stall={allowed_s}",
+        f"host.stall={allowed_s}",
     ]
 
 
-def with_accepted_joined(sets: Iterable[str]) -> list[str]:
-    """Return the settings with the values of ``unsafe_overrides`` joined per section."""
-    accepted: dict[str, list[str]] = {}
-    others = []
-    for given in sets:
-        name, _, value = given.partition("=")
-        if name.endswith(".unsafe_overrides"):
-            accepted.setdefault(name, []).append(value.strip("[]"))
-        else:
-            others.append(given)
-    return [*(f"{name}={','.join(values)}" for name, values in accepted.items()), *others]
+def with_overrides_joined(sets: Iterable[str]) -> list[str]:
+    """Return the settings with the values of all ``unsafe_overrides`` in one."""
+    given = list(sets)
+    overrides = [one.removeprefix(OVERRIDES) for one in given if one.startswith(OVERRIDES)]
+    joined = [OVERRIDES + ",".join(overrides)] if overrides else []
+    return [*joined, *(one for one in given if not one.startswith(OVERRIDES))]

@@ -52,10 +52,10 @@ def run(options: argparse.Namespace) -> int:
         write_text(printed, options.print)
         return 0
     os.environ.setdefault(RUNTIME_ENV, READERS)  # Zenoh reads it once, on first use
-    if config.robot.realtime:
+    if config.host.realtime:
         realtime.request(realtime.ROUTER)
     log.configure(config.log, "router")
-    if config.robot.realtime and not realtime.priority():
+    if config.host.realtime and not realtime.priority():
         log.Logger().info("runs as an ordinary process: SCHED_FIFO is not granted")
     probe = RouterProbe(config.bus, config.log)
     for name in (signal.SIGINT, signal.SIGTERM):

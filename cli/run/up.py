@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
             "--profile changes the simulated vehicle: leave --no-sim or --profile out"
         )
     config = load(Everything, sources(options)).config
-    if config.robot.realtime:
+    if config.host.realtime:
         realtime.request(realtime.SUPERVISOR, alone=True)
     log.configure(config.log, "up")
     started = selected(everything(options), options.only)

@@ -29,11 +29,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ConfigError as error:
         print(f"bridge: {error}", file=sys.stderr)  # noqa: T201 - logs are not set up yet
         return EXIT_CONFIG
-    if config.robot.realtime:
+    if config.host.realtime:
         realtime.request(realtime.GUARD)
     # After the priority: the log's thread inherits it, and holds Python's lock at times.
     log.configure(config.log, "guard")
-    if config.robot.realtime:
+    if config.host.realtime:
         realtime.request(realtime.GUARD, alone=True)
         realtime.limit()
         if not realtime.priority():

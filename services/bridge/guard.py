@@ -123,7 +123,7 @@ class Guard:
     def __init__(self, config: BridgeConfig, sockets: Sockets, command: Sequence[str]) -> None:
         self._sockets = sockets
         self._command = command
-        self._missed_ms = round(config.bridge.times.heartbeat * 1000)
+        self._missed_ms = round(config.times.heartbeat * 1000)
         self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
         self._port = 0  # index of the port that the bridge uses
         self._brakes = False  # whether the bridge holds BRAKE

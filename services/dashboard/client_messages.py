@@ -8,7 +8,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from services.dashboard.config import GEARS
+from common.settings import GEARS
 from t2.messages import Direction, Number
 
 NAME_MAX = 40  # characters, of a viewer

@@ -8,16 +8,14 @@ from msgspec import Meta
 from common import settings
 from common.settings import SourceName
 
-Speed = Annotated[float, Meta(gt=0.0, le=3.0)]  # m/s or rad/s
 # Its origin is part of a Content-Security-Policy: no separator of that may occur.
 Url = Annotated[
     str, Meta(pattern=r"^(https?://[A-Za-z0-9._-]+(:[0-9]{1,5})?(/[^\s\"'<>;,\\]*)?)?\Z")
 ]
-GEARS = 5
 
 
 class Dashboard(settings.Section, frozen=True, kw_only=True):
-    """Settings of the web server and of driving.
+    """The web server, and the name that its pages drive under.
 
     The token is in a file and not in the settings, because the settings are published on the bus.
     """
@@ -32,18 +30,12 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
     # The URL of an MJPEG stream; ``{robot}`` in the path is the robot's id. Empty: none.
     camera: Url = ""
-    gears_linear: tuple[Speed, ...] = (0.2, 0.35, 0.5, 0.65, 0.8)  # m/s
-    gears_angular: tuple[Speed, ...] = (0.3, 0.45, 0.6, 0.75, 0.9)  # rad/s
 
     def __post_init__(self) -> None:
         try:
             ip_address(self.host)
         except ValueError:
             raise ValueError(f"host is {self.host!r}, allowed is an IP address") from None
-        for name in ("gears_linear", "gears_angular"):
-            gears = getattr(self, name)
-            if len(gears) != GEARS or list(gears) != sorted(gears):
-                raise ValueError(f"{name} {list(gears)} should be {GEARS} rising speeds")
         if bool(self.certificate) != bool(self.private_key):
             raise ValueError("certificate and private_key must be set together: set both or none")
 

@@ -12,7 +12,7 @@ from common.bus.session import common_name, is_viewer
 from common.freshness import NS_PER_S
 from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
-from services.dashboard.config import Dashboard
+from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
 from services.dashboard.i18n import Texts, label, phrase, rendered
 from services.dashboard.snapshot import DriverState
@@ -47,12 +47,13 @@ ESTOP_KEPT_S = 30.0
 class Robot:
     """The state of a robot and the requests to it; ``tick`` runs 20 times a second."""
 
-    def __init__(self, bus: Bus, settings: Dashboard, broadcast: Notify) -> None:
+    def __init__(self, bus: Bus, config: DashboardConfig, broadcast: Notify) -> None:
+        settings = config.dashboard
         self.bus = bus
         self.telemetry = TelemetryCache()
         self.driver_lock = DriverLock()
         self.may_stop = not is_viewer(bus.where)
-        self._settings = settings
+        self._gears = config.vehicle.gears_linear, config.vehicle.gears_angular
         self._broadcast = broadcast  # to all viewers of this robot
         self._requests = DriveRequests()
         self._source = DriveSource(bus, settings.source, self._on_denied)
@@ -198,7 +199,7 @@ class Robot:
         if push.release:
             return request(release=push.release)
         gear = self.driver_lock.gear - 1
-        linear, angular = self._settings.gears_linear[gear], self._settings.gears_angular[gear]
+        linear, angular = (speeds[gear] for speeds in self._gears)
         return request(push.linear * linear, push.angular * angular)
 
     def _repeat_estop(self, safety: m.SafetyState | None, now_ns: int) -> None:

@@ -35,7 +35,7 @@ class RobotPage:
     """One robot, and the browsers that show it."""
 
     def __init__(self, bus: Bus, config: DashboardConfig, send: Send) -> None:
-        self.robot = Robot(bus, config.dashboard, self._broadcast)
+        self.robot = Robot(bus, config, self._broadcast)
         self.viewers: set[str] = set()
         self.used_ns = 0  # the last time that it had a viewer, or was stopped
         self._config = config
@@ -50,7 +50,7 @@ class RobotPage:
             "k": "hello",
             "id": viewer,
             "vehicle": self._config.vehicle,
-            "gears": self._config.dashboard.gears_linear,
+            "gears": self._config.vehicle.gears_linear,
             "hold_s": HOLD_S,
             "call_s": MAX_CALL_AGE_NS / NS_PER_S,
             "keepalive": bool(self._config.dashboard.estop_keepalive),

@@ -5,6 +5,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from common import settings
+from common.settings import allowed
 
 
 class Recorder(settings.Section, frozen=True, kw_only=True):
@@ -12,7 +13,7 @@ class Recorder(settings.Section, frozen=True, kw_only=True):
 
     folder: Annotated[str, Meta(min_length=1)] = "recordings"  # created if missing
     everything: bool = False  # record continuously, not only after a latch
-    free: Annotated[float, Meta(ge=1.0, le=1_000_000.0)] = 1000.0  # MB to keep free on the disk
+    free: Annotated[float, allowed("MB", ge=1.0, le=1_000_000.0)] = 1000.0  # kept free on the disk
     make_room: bool = True  # remove the oldest recordings; see storage.py
 
 

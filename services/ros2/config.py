@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from common import settings
+from common.settings import allowed
 from services.ros2.names import is_valid
 
 Frame = Annotated[str, Meta(pattern=r"^([A-Za-z_][A-Za-z0-9_/]*)?\Z", max_length=60)]
@@ -24,7 +25,7 @@ class Ros2(settings.Section, frozen=True, kw_only=True):
     no_echo: Literal["max_range", "inf"] = (
         "max_range"  # without an echo; a fault is +Inf then, otherwise NaN
     )
-    sonar_fov: Annotated[float, Meta(gt=0.0, le=3.2)] = 0.5  # rad, the whole opening
+    sonar_fov: Annotated[float, allowed("rad", gt=0.0, le=3.2)] = 0.5  # the whole opening
 
     def __post_init__(self) -> None:
         if not is_valid(self.namespace):

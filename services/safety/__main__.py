@@ -13,7 +13,7 @@ def build(node: Node[SafetyConfig]) -> None:
     """Build the service."""
     # The emergency stop has its own session, so telemetry cannot delay it.
     SafetyService(node, node.open_bus())
-    accepted = node.config.safety.unsafe_overrides
+    accepted = node.config.unsafe_overrides
     if accepted:
         node.log.warning("unsafe overrides are active", settings=list(accepted))
 

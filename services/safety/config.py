@@ -1,32 +1,29 @@
-"""Settings of the safety service; unsafe values need an explicit override."""
+"""Settings of the safety service."""
 
 from functools import cache
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
 from common import settings
-from common.settings import SourceName
+from common.settings import Safe, SourceName, allowed
 
-Seconds = Annotated[float, Meta(gt=0.0, le=10.0)]
-Positive = Annotated[float, Meta(gt=0.0, le=10.0)]
 Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``messages.Text``
 
 # Programs that stop requesting when the operator releases the controls. For any other source,
 # ``sources.NAME.operator`` needs an override.
 HELD = ("teleop", "checkout", "web")
-MAX_LEASE_S = 0.5  # a longer ``sources.NAME.lease`` needs an override
-MAX_LIMIT_LEASE_S = 1.0  # a longer ``limits.NAME.lease`` likewise
 
 
 class Source(settings.Section, frozen=True, kw_only=True):
     """A source of drive requests; the fresh one of the highest priority is in control."""
 
     priority: Annotated[int, Meta(ge=0, le=1000)]
-    lease: Seconds  # s that a request holds
-    operator: bool = False  # a person holds it, and may creep past a faulty sonar
+    lease: Annotated[float, allowed("s", gt=0.0, le=10.0, safe=(0.0, 0.5))]  # of a request
+    # a person holds it, and may creep past a faulty sonar
+    operator: Annotated[bool, allowed(safe=(False, False))] = False
 
 
 Silence = Literal["ignore", "stop"]
@@ -35,7 +32,7 @@ Silence = Literal["ignore", "stop"]
 class LimitSource(settings.Section, frozen=True, kw_only=True):
     """A source of speed limits; every field is required, because no default fits all."""
 
-    lease: Seconds  # s that a limit holds
+    lease: Annotated[float, allowed("s", gt=0.0, le=10.0, safe=(0.0, 1.0))]  # of a limit
     silence: Silence  # what the end of the lease does, and a start without any limit
 
 
@@ -64,74 +61,37 @@ class TimeLimits(Struct, frozen=True, kw_only=True):
     runaway_time: float = 0.3  # that the vehicle may move otherwise than commanded
 
 
-@cache
-def _times(stall_s: float) -> TimeLimits:
-    return settings.lengthened(TimeLimits(), stall_s)
+class Safety(settings.Section, frozen=True, kw_only=True):
+    """When and how fast the vehicle may move."""
 
-
-class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
-    """When and how fast the vehicle may move; SI units."""
-
-    protective: ClassVar[settings.Limits] = {
-        "margin": (0.05, 10.0),
-        "stall": (0.0, 0.0),
-        "react": (0.1, 10.0),
-        "deceleration": (0.1, 1.0),
-        "angular_deceleration": (0.1, 3.0),
-        "max_linear": (0.0, 1.5),
-        "max_angular": (0.0, 2.0),
-        "linear_acceleration": (0.0, 1.5),
-        "angular_acceleration": (0.0, 4.0),
-        "release_speed": (0.0, 0.15),
-        "release_distance": (0.0, 0.3),
-        "creep_speed": (0.0, 0.25),
-        "estop_keepalive_timeout": (0.0, 2.0),
-        "require_switches": (True, True),
-    }
-    # s that processes of this computer stall: every time limit and ``react`` is longer
-    stall: settings.Stall = 0.0
     # sources on @cmd/drive/NAME, lease in s; operator: a person holds it, and may creep past a
     # faulty sonar
     sources: Annotated[dict[SourceName, Source], Sources] = msgspec.field(default_factory=_sources)
     # names that must be received on @cmd/estop_keepalive/NAME, or the robot brakes and latches
     estop_keepalive: Annotated[tuple[SourceName, ...], Sources] = ()
-    estop_keepalive_timeout: Seconds = 1.0  # s without one of them
+    # without one of them
+    estop_keepalive_timeout: Annotated[float, allowed("s", gt=0.0, le=10.0, safe=(0.0, 2.0))] = 1.0
     # sources of speed limits on @cmd/limit/NAME, as lidar = { lease = 0.5, silence = "stop" }
     limits: Annotated[dict[SourceName, LimitSource], Sources] = msgspec.field(default_factory=dict)
 
-    max_linear: Positive = 1.0  # m/s
-    max_angular: Positive = 1.0  # rad/s
-    linear_acceleration: Positive = 0.5  # m/s^2
-    angular_acceleration: Positive = 1.5  # rad/s^2
-    deceleration: Positive = 0.6  # m/s^2, guaranteed when slowing down
-    angular_deceleration: Positive = 1.0  # rad/s^2, likewise
+    linear_acceleration: Annotated[float, allowed("m/s^2", gt=0.0, le=10.0, safe=(0.0, 1.5))] = 0.5
+    angular_acceleration: Annotated[float, allowed("rad/s^2", gt=0.0, le=10.0, safe=(0.0, 4.0))] = (
+        1.5
+    )
+    # kept free around the vehicle
+    margin: Annotated[float, allowed("m", ge=0.0, le=2.0, safe=(0.05, 2.0))] = 0.20
+    # from reading to slowing down
+    react: Annotated[float, allowed("s", ge=0.0, le=2.0, safe=(0.1, 2.0))] = 0.25
+    # while a sonar or the bumper is doubtful
+    creep_speed: Annotated[float, allowed("m/s", gt=0.0, le=10.0, safe=(0.0, 0.25))] = 0.15
+    release_speed: Annotated[float, allowed("m/s", gt=0.0, le=10.0, safe=(0.0, 0.15))] = 0.1
+    # in total until a reset
+    release_distance: Annotated[float, allowed("m", gt=0.0, le=10.0, safe=(0.0, 0.3))] = 0.15
 
-    margin: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.20  # m kept free around the vehicle
-    react: Annotated[float, Meta(ge=0.0, le=2.0)] = 0.25  # s from reading to slowing down
-    creep_speed: Positive = 0.15  # m/s while a sonar or the bumper is doubtful
-
-    require_switches: bool = True  # requires the board's own emergency brakes
-
-    release_speed: Positive = 0.1  # m/s
-    release_distance: Positive = 0.15  # m in total until a reset
-
-    @property
-    def times(self) -> "TimeLimits":
-        """The time limits on this computer."""
-        return _times(self.stall)
-
-    @property
-    def reaction(self) -> float:
-        """Time from a reading to slowing down, on this computer, s."""
-        return self.react + 2 * self.stall
-
-    @property
-    def leased(self) -> dict[str, Source]:
-        """The sources with their leases on this computer."""
-        return {
-            name: replace(source, lease=source.lease + 3 * self.stall)
-            for name, source in self.sources.items()
-        }
+    def protections(self) -> dict[str, Safe]:
+        """Return the safe values; a program of ours that an operator holds needs no override."""
+        held = {f"sources.{name}.operator" for name in HELD}
+        return {path: it for path, it in super().protections().items() if path not in held}
 
     @property
     def operators(self) -> frozenset[str]:
@@ -139,17 +99,6 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
         return frozenset(name for name, source in self.sources.items() if source.operator)
 
     def __post_init__(self) -> None:
-        allowed = dict(self.protective)
-        given = {name: getattr(self, name) for name in allowed}
-        for name, source in self.sources.items():
-            given[f"sources.{name}.lease"] = source.lease
-            allowed[f"sources.{name}.lease"] = (0.0, MAX_LEASE_S)
-            given[f"sources.{name}.operator"] = source.operator
-            allowed[f"sources.{name}.operator"] = (False, name in HELD)
-        for name, limits in self.limits.items():
-            given[f"limits.{name}.lease"] = limits.lease
-            allowed[f"limits.{name}.lease"] = (0.0, MAX_LIMIT_LEASE_S)
-        self.check(allowed, given)
         if len(set(self.estop_keepalive)) < len(self.estop_keepalive):
             raise ValueError(f"estop_keepalive names a source twice: {self.estop_keepalive}")
         names: dict[int, str] = {}  # by priority
@@ -163,20 +112,41 @@ class Safety(settings.ProtectedSection, frozen=True, kw_only=True):
 class SafetyConfig(settings.Shared, frozen=True, kw_only=True):
     """Sections that the safety service reads."""
 
+    board: settings.Board = settings.Board()
     vehicle: settings.Vehicle = settings.Vehicle()
     safety: Safety = Safety()
 
+    @property
+    def times(self) -> TimeLimits:
+        """The time limits on this computer."""
+        return _times(self.host.stall)
+
+    @property
+    def reaction(self) -> float:
+        """Time from a reading to slowing down, on this computer, s."""
+        return self.safety.react + 2 * self.host.stall
+
+    @property
+    def leased(self) -> dict[str, Source]:
+        """The sources with their leases on this computer."""
+        return {
+            name: replace(source, lease=source.lease + 3 * self.host.stall)
+            for name, source in self.safety.sources.items()
+        }
+
     def __post_init__(self) -> None:
         # Space beyond ``sonar_max`` counts as free, so the vehicle must be able to stop within it.
-        deepest = max(
-            settings.recess(each, self.vehicle) for each in settings.sonar_mounts(self.vehicle)
-        )
-        one, range_m = self.safety, self.vehicle.sonar_max - deepest
-        needed = (
-            one.margin + one.reaction * one.max_linear + one.max_linear**2 / one.deceleration / 2
-        )
+        body = self.vehicle
+        deepest = max(settings.recess(each, body) for each in settings.sonar_mounts(body))
+        fastest, range_m = body.max_linear, body.sonar_max - deepest
+        needed = self.safety.margin + self.reaction * fastest + fastest**2 / body.deceleration / 2
         if range_m < needed:
             raise ValueError(
-                f"sonar_max {range_m:g} m is too near: from max_linear {one.max_linear:g} m/s "
+                f"sonar_max {range_m:g} m is too near: from max_linear {fastest:g} m/s "
                 f"the vehicle stops in {needed:.2f} m"
             )
+
+
+@cache
+def _times(stall_s: float) -> TimeLimits:
+    return settings.lengthened(TimeLimits(), stall_s)

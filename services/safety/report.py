@@ -253,7 +253,7 @@ def _limits(policy: Policy, state: State, now_ns: int) -> Limits:
     """Return what a drive request may reach now: nothing while a cause forbids every motion."""
     if not BARRING.isdisjoint(state.latches):
         return Limits(forward=0.0, backward=0.0, angular=0.0)
-    planner, settings = policy.planner, policy.settings
+    planner, body = policy.planner, policy.settings.vehicle
     distances = planner.cautious(state, state.verdict.source)
 
     def most(asked: Twist) -> Twist:
@@ -262,10 +262,10 @@ def _limits(policy: Policy, state: State, now_ns: int) -> Limits:
         return twist.scaled(planner.zones.limit(twist, distances).factor)
 
     return Limits(
-        forward=most(Twist(settings.max_linear)).linear,
-        backward=-most(Twist(-settings.max_linear)).linear,
+        forward=most(Twist(body.max_linear)).linear,
+        backward=-most(Twist(-body.max_linear)).linear,
         angular=min(
-            most(Twist(0.0, settings.max_angular)).angular,
-            -most(Twist(0.0, -settings.max_angular)).angular,
+            most(Twist(0.0, body.max_angular)).angular,
+            -most(Twist(0.0, -body.max_angular)).angular,
         ),
     )

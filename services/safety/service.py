@@ -60,7 +60,7 @@ class SafetyService:
     def __init__(self, node: Node[SafetyConfig], estop_bus: Bus) -> None:
         self._node = node
         self._estop_bus = estop_bus
-        self._policy = Policy(node.config.safety, node.config.vehicle)
+        self._policy = Policy(node.config)
         # Random start, so that echoes and identities of an earlier start are unknown.
         start = node.bus.boot % 2**31
         self._state = replace(self._policy.start(), heartbeat=Heartbeat(start), decision=start)

@@ -132,7 +132,7 @@ class TeleopApp(App[None]):
         self._motion.show(panels.motion(view))
         size = self._events.content_size
         self._events.show(panels.events(view, size.height, size.width))
-        self._hints.show(panels.hints(view, self._hold.hold_first, self._hold.hold))
+        self._hints.show(panels.hints(view, self._hold.hold_first))
 
     def probe(self) -> None:
         """Query the cursor position, at a place that identifies the query."""

@@ -27,7 +27,7 @@ from services.teleop.core.controls import (
     Controls,
     Stick,
 )
-from services.teleop.core.hold import Press
+from services.teleop.core.hold import GAMEPAD_SILENCE_S, Press
 from services.teleop.core.keystroke import no_function
 from services.teleop.gamepad import Gamepad
 from services.teleop.view import LINES, EventLog, View
@@ -79,7 +79,7 @@ class Controller:
         self._settings = node.config.teleop
         self._operator = operator_name(self._bus.where)
         self._may_stop = not is_viewer(self._bus.where)
-        self._controls = Controls(self._settings)
+        self._controls = Controls(self._settings, node.config.vehicle)
         self.terminal = self._controls.terminal
         self._gamepad = Gamepad("searching")
         self._drawn_ns = 0  # the last redraw of the screen
@@ -206,7 +206,7 @@ class Controller:
         if self._gamepad.status != before:
             self._node.event("gamepad", "info", device=self._gamepad.status)
         if self._controls.is_gamepad_silent:
-            self._report("gamepad_silent", seconds=self._settings.gamepad_silence)
+            self._report("gamepad_silent", seconds=GAMEPAD_SILENCE_S)
         else:
             self._reported.discard("gamepad_silent")
         self._report_ignored(self._gamepad.ignored)

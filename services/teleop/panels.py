@@ -7,6 +7,7 @@ from textwrap import wrap
 from rich.text import Text
 
 from common.root_cause import TEXTS, RootCause, root_cause
+from services.teleop.core.hold import HOLD_S
 from services.teleop.core.round_trip import ADVICE
 from services.teleop.view import Line, View
 from t2.messages import (
@@ -87,7 +88,7 @@ def _bumper(view: View) -> Part:
     return ("● bumper PRESSED", BAD) if view.bumper.pressed else ("● bumper", GOOD)
 
 
-def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
+def hints(view: View, hold_first_s: float) -> Text:
     """Return the keys, and the limit of key repeats or why keys are refused."""
     keys: tuple[Part, ...] = SLOW_KEYS if view.keys_refused or not view.may_drive else KEYS
     if not view.may_drive:
@@ -103,7 +104,7 @@ def hints(view: View, hold_first_s: float, hold_s: float) -> Text:
         return row.append(f"\n{view.key_notice[0].upper()}{view.key_notice[1:]}", style=BAD)
     limit = (
         f"\nNo key-up in terminals: a tap drives {hold_first_s:g} s, "
-        f"a hold {hold_s:g} s past its last repeat"
+        f"a hold {HOLD_S:g} s past its last repeat"
     )
     return row.append(limit, style=DIM)
 

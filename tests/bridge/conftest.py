@@ -86,8 +86,8 @@ def bridge_command(made: Board, endpoint: str) -> list[str]:
         f"board.listen_ports={made.ports}",
         f"bus.connect={endpoint}",
         # Long limits: on test machines, processes stall for tenths of a second.
-        "bridge.unsafe_overrides=stall",
-        "bridge.stall=0.2",
+        "unsafe_overrides=host.stall",
+        "host.stall=0.2",
     )
     return [sys.executable, "-m", "services.bridge", *settings]
 

@@ -14,18 +14,21 @@ def read(*sets: str) -> BridgeConfig:
 @pytest.mark.parametrize(
     ("path", "good", "bad"),
     [
-        ("bridge.stall", 0.0, 0.01),
-        ("bridge.max_linear", 1.5, 1.51),
-        ("bridge.max_angular", 2.0, 2.01),
+        ("host.stall", 0.0, 0.01),
+        ("vehicle.max_linear", 1.5, 1.51),
+        ("vehicle.max_angular", 2.0, 2.01),
+        ("vehicle.deceleration", 0.1, 0.09),
+        ("vehicle.angular_deceleration", 0.1, 0.09),
         ("board.any_source_port", "false", "true"),
+        ("board.require_switches", "true", "false"),
         ("bus.lease", 2.0, 2.1),
     ],
 )
 def test_what_takes_a_protection_away_must_be_owned_up_to(
     path: str, good: object, bad: object
 ) -> None:
-    section, name = path.split(".")
     read(f"{path}={good}")
-    with pytest.raises(ConfigError, match=f"{section}: {name} = .* or name it in unsafe_overrides"):
+    with pytest.raises(ConfigError, match=f"{path} = .* or name '{path}' in unsafe_overrides"):
         read(f"{path}={bad}")
-    read(f"{path}={bad}", f"{section}.unsafe_overrides={name}")
+    config = read(f"{path}={bad}", f"unsafe_overrides={path}")
+    assert config.unsafe_overrides == (path,)

@@ -273,7 +273,7 @@ def test_a_beat_names_the_port_waits_for_nobody_and_the_end_is_final() -> None:
 
 
 def test_a_wrong_setting_ends_it_before_anything_opens(capsys: pytest.CaptureFixture[str]) -> None:
-    assert program.main(["--set", "bridge.stall=-1"]) == EXIT_CONFIG
+    assert program.main(["--set", "host.stall=-1"]) == EXIT_CONFIG
     assert "stall" in capsys.readouterr().err
 
 

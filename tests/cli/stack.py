@@ -17,8 +17,8 @@ def ports() -> list[str]:
         f"board.listen_ports={first},{second}",
         f"bus.listen=tcp/127.0.0.1:{free_port()}",
         # Scheduling stalls of test hosts must not kill bridge or router.
-        "bridge.unsafe_overrides=stall",
-        "bridge.stall=1",
+        "unsafe_overrides=host.stall",
+        "host.stall=1",
         "bus.probe_deadline=30",
     ]
 

@@ -17,8 +17,8 @@ def test_every_setting_has_its_value_and_source(
     assert main(["config", *words]) == 0
     rows = [line.split(maxsplit=2) for line in capsys.readouterr().out.splitlines()]
     assert {path.split(".")[0] for path, _, _ in rows} == {
-        "robot", "bus", "board", "wire", "log", "vehicle",
-        "bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
+        "unsafe_overrides", "robot", "host", "bus", "board", "wire", "log", "vehicle", "safety",
+        "odom", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
     }  # fmt: skip
     assert ["bus.listen", '["tcp/127.0.0.1:7447"]', "default"] in rows
     assert ["safety.sources.demo.priority", "15", "default"] in rows
@@ -34,7 +34,7 @@ def shown(capsys: pytest.CaptureFixture[str], *words: str) -> list[list[str]]:
 def test_some_of_the_settings(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv("T2__ROBOT__REALTIME", raising=False)
+    monkeypatch.delenv("T2__HOST__REALTIME", raising=False)
     assert shown(capsys, "--changed") == []
     files = [tmp_path / name for name in ("a.toml", "b.toml", "c.toml")]
     for number, file in enumerate(files):
@@ -45,8 +45,8 @@ def test_some_of_the_settings(
     assert shown(capsys, "--changed", "safety") == []
     last = ["--config", str(files[2]), "--set", "board.listen_ports=4002,4001"]
     assert shown(capsys, "--changed", *last) == [["board.port", "5002", str(files[2])]]
-    paths = [path for path, *_ in shown(capsys, "safety.max")]
-    assert paths == ["safety.max_linear", "safety.max_angular"]
+    paths = [path for path, *_ in shown(capsys, "vehicle.max")]
+    assert paths == ["vehicle.max_linear", "vehicle.max_angular"]
     assert main(["config", "nothing"]) == EXIT_CONFIG
     assert "no setting begins with 'nothing'" in capsys.readouterr().err
 

@@ -67,14 +67,14 @@ def test_the_later_source_wins_and_every_setting_knows_its_own(
     settings_dir: SettingsFixture,
 ) -> None:
     loaded = settings_dir.load(
-        "[board]\nport = 1\n[bridge]\nmax_linear = 0.1\n[odom]\nhold = 0.2",
-        environ={"T2__BOARD__PORT": "2", "T2__Bridge__max_linear": "0.15", "PATH": "/bin"},
+        "[board]\nport = 1\n[vehicle]\nmax_linear = 0.1\n[odom]\nturn_noise = 0.2",
+        environ={"T2__BOARD__PORT": "2", "T2__Vehicle__max_linear": "0.15", "PATH": "/bin"},
         sets=["board.port=3"],
     )
-    given = ("board.port", "bridge.max_linear", "odom.hold", "robot.id")
+    given = ("board.port", "vehicle.max_linear", "odom.turn_noise", "robot.id")
     assert [(loaded.settings[path].value, loaded.settings[path].origin) for path in given] == [
         (3, "--set board.port=3"),
-        (0.15, "environment T2__Bridge__max_linear"),
+        (0.15, "environment T2__Vehicle__max_linear"),
         (0.2, "over0.toml"),
         ("001", DEFAULT),
     ]
@@ -97,10 +97,12 @@ def test_the_files_of_a_certificate_lie_beside_the_file_that_names_them(
 
 
 def test_a_service_leaves_the_sections_of_others_alone(settings_dir: SettingsFixture) -> None:
-    file = settings_dir.file("[safety]\nnonsense = 1\n[robot]\nid = 'x'")
-    loaded = load(Shared, Sources((file,), {"T2__BRIDGE__NONSENSE": "1"}))
+    file = settings_dir.file(
+        "unsafe_overrides = ['safety.x']\n[safety]\nnonsense = 1\n[robot]\nid = 'x'"
+    )
+    loaded = load(Shared, Sources((file,), {"T2__ODOM__NONSENSE": "1"}))
     assert loaded.config.robot.id == "x"
-    assert not any(path.startswith(("safety", "bridge")) for path in loaded.settings)
+    assert not any(path.startswith(("safety", "odom")) for path in loaded.settings)
 
 
 # --- how values are read ------------------------------------------------------------------------
@@ -115,7 +117,7 @@ def test_a_service_leaves_the_sections_of_others_alone(settings_dir: SettingsFix
         ("bus.listen=tcp/[::1]:1,ws/[::1]:2", "bus.listen", ("tcp/[::1]:1", "ws/[::1]:2")),
         ("bus.connect=", "bus.connect", ()),
         ("teleop.gamepad=false", "teleop.gamepad", False),
-        ("odom.hold=5e-2", "odom.hold", 0.05),
+        ("odom.turn_noise=5e-2", "odom.turn_noise", 0.05),
         ("log.format=json", "log.format", "json"),
         ("safety.sources.web.priority=3", "safety.sources.web.priority", 3),
     ],
@@ -156,40 +158,46 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
     ("text", "sentence"),
     [
         ("[bord]\nport = 1", "over0.toml: bord.port: no section 'bord'; did you mean 'board'?"),
-        (
-            "[wire]\nangular_unit = 'milliradian'",
-            "over0.toml: wire.angular_unit: was replaced by wire.command_angular_unit and "
-            "wire.feedback_angular_unit",
-        ),
-        (
-            "[bridge]\nbumper_rate = 40.0",
-            "over0.toml: bridge.bumper_rate: is no setting any more, always 50 Hz",
-        ),
+        ("[bridge]\nbumper_rate = 40.0", "over0.toml: bridge.bumper_rate: no section 'bridge'"),
+        ("[safety]\nstall = 1", "over0.toml: safety.stall: unknown; did you mean 'host.stall'?"),
         ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
-        ("[sim.drive]\ncoast = 1", "over0.toml: sim.drive: is no setting any more; a profile"),
-        ("[safety]\nprotective = 1", "over0.toml: safety.protective: unknown"),
+        ("[sim.drive]\ncoast = 1", "over0.toml: sim.drive: unknown"),
+        ("[safety]\nprotections = 1", "over0.toml: safety.protections: unknown"),
         ("[sim]\nzzz = 1", "over0.toml: sim.zzz: unknown; there are control_port, seed, world"),
         ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),
         ("[board]\nport = 70000", "port = 70000: Expected `int` <= 65535; allowed is 1..65535"),
         ("safety.sources = 3", "over0.toml: safety.sources = 3: Expected `object`, got `int`"),
-        ("[odom]\nhold = nan", "odom.hold = nan: Expected `float` >= 0.02; allowed is 0.02..0.5"),
-        ("[odom]\nturn_noise = 0", "Expected `float` > 0.0; allowed is over 0.0..10.0"),
-        ("[odom]\nhold = 2", "allowed is 0.02..0.5 (s that a velocity is valid)"),
-        ("[safety]\nmargin = 5", "allowed is 0.0..2.0 (m kept free around the vehicle)"),
-        ("[safety]\nmargin = 0", "name it in unsafe_overrides (m kept free around the vehicle)"),
-        ("[safety.sources.web]\nlease = 99", "10.0 (sources on @cmd/drive/NAME, lease in s)"),
-        ("[bus]\nca = 1", "bus.ca = 1: Expected `str`, got `int` (PEM files of `t2 keys`, for"),
+        ("[vehicle]\nwidth = nan", "vehicle.width = nan: Expected `float` >= 0.2; allowed is 0.2"),
+        ("[odom]\nturn_noise = 0", "allowed is over 0.0..10.0 rad per sqrt(rad) turned"),
+        ("[safety]\nmargin = 5", "Expected `float` <= 2.0; allowed is 0.0..2.0 m"),
+        ("[safety.sources.web]\nlease = 99", "allowed is over 0.0..10.0 s"),
+        ("[vehicle]\ngears_linear = [9, 9, 9, 9, 9]", "<= 3.0; allowed is over 0.0..3.0 m/s"),
+        ("[vehicle.sonars.front]\nx = ''", "Expected `float`, got `str`; the unit is m"),
+        ("[bus]\nca = 1", "bus.ca = 1: Expected `str`, got `int`"),
         ("[sim]\nseed = -1", "over0.toml: sim.seed = -1: Expected `int` >= 0"),
         ("[log]\nlevel = 'loud'", "allowed is 'debug', 'error', 'info', 'warning'"),
         ("[board]\nlisten_ports = [1, 70000]", "board.listen_ports = [1, 70000]: Expected `int`"),
         ("[safety.sources.web]\nprio = 1", "over0.toml: safety.sources.web.prio: unknown; did you"),
         ("[safety.sources.new]\nlease = 0.1", "over0.toml: safety.sources.new: needs 'priority'"),
-        ("[safety]\nmargin = 0.0", "over0.toml: safety: margin = 0.0 takes a protection away"),
-        ("[board]\nport = 4001", "over0.toml: board: port 4001 of 127.0.0.1 is both the board's"),
         (
-            "[safety]\nunsafe_overrides = ['x']",
-            "unsafe_overrides names 'x', which takes no protection away",
+            "[safety]\nmargin = 0",
+            "over0.toml: safety.margin = 0.0 takes a protection away; allowed is 0.05..2.0 m, or "
+            "name 'safety.margin' in unsafe_overrides",
         ),
+        (
+            "unsafe_overrides = ['safety.react']\n[safety]\nmargin = 0",
+            "over0.toml: safety.margin = 0.0 takes a protection away",
+        ),
+        (
+            "unsafe_overrides = ['safety.margin']",
+            "over0.toml: unsafe_overrides names 'safety.margin', but 0.2 is safe (0.05..2.0 m): "
+            "remove it there",
+        ),
+        ("[safety]\nunsafe_overrides = ['margin']", "over0.toml: safety.unsafe_overrides: unknown"),
+        ("unsafe_overrides = ['log.level']", "'log.level', which takes no protection away"),
+        ("unsafe_overrides = ['safty.margin']", "away; did you mean 'safety.margin'?"),
+        ("unsafe_overrides = [1]", "unsafe_overrides = [1]: Expected `str`, got `int`"),
+        ("[board]\nport = 4001", "over0.toml: board: port 4001 of 127.0.0.1 is both the board's"),
     ],
 )  # fmt: skip
 def test_a_wrong_file_is_refused_by_name_value_and_range(

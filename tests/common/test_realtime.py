@@ -39,9 +39,9 @@ def test_without_the_right_all_stays_as_it_was() -> None:
 @needs_right
 def test_all_threads_of_a_service_have_one_priority(shared_router: str) -> None:
     """Otherwise an ordinary thread that holds Python's lock and does not run delays the others."""
-    sets = "--set", f"bus.connect={shared_router}", "--set", "robot.realtime=true"
+    sets = "--set", f"bus.connect={shared_router}", "--set", "host.realtime=true"
     command = [sys.executable, "-m", "services.safety", *sets]
-    environ = {name: value for name, value in os.environ.items() if name != "T2__ROBOT__REALTIME"}
+    environ = {name: value for name, value in os.environ.items() if name != "T2__HOST__REALTIME"}
     with subprocess.Popen(command, env=environ, stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
         try:

@@ -1,7 +1,7 @@
 """Sections that several services share: what they allow and refuse; the places of sonars."""
 
 import math
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
 import msgspec
 import pytest
@@ -9,47 +9,55 @@ import pytest
 from common.settings import (
     Board,
     BusSettings,
-    Limits,
-    ProtectedSection,
     Robot,
+    Safe,
+    Section,
     Vehicle,
+    allowed,
     recess,
     sonar_mounts,
 )
 from t2.messages import SONAR_NAMES
 
 
-class Guarded(ProtectedSection, frozen=True, kw_only=True):
-    """A section with two protections."""
+class Part(Section, frozen=True, kw_only=True):
+    """A row of a table."""
 
-    protective: ClassVar[Limits] = {"margin": (0.05, 10.0), "lease": (0.0, 0.5)}
-    margin: float = 0.2
-    lease: float = 0.2
+    lease: Annotated[float, allowed("s", gt=0.0, le=10.0, safe=(0.0, 0.5))]
 
 
-NAN, INF = math.nan, math.inf
+class Guarded(Section, frozen=True, kw_only=True):
+    """A section with protections."""
+
+    margin: Annotated[float, allowed("m", safe=(0.05, 10.0))] = 0.2
+    brakes: Annotated[bool, allowed(safe=(True, True))] = True
+    title: Annotated[str, msgspec.Meta(max_length=5)] = ""
+    length: Annotated[float, allowed("m", ge=0.0)] = 1.0
+    parts: dict[str, Part] = msgspec.field(default_factory=dict)
+
+
+def test_the_safe_values_are_part_of_the_types() -> None:
+    part = Safe(0.0, 0.5, "s")
+    assert Guarded(parts={"a": Part(lease=0.1), "b": Part(lease=9.0)}).protections() == {
+        "margin": Safe(0.05, 10.0, "m"),
+        "brakes": Safe(True, True),
+        "parts.a.lease": part,
+        "parts.b.lease": part,
+    }
+    assert (str(part), str(Safe(True, True))) == ("0.0..0.5 s", "True..True")
 
 
 @pytest.mark.parametrize(
-    ("given", "refusal"),
+    "given",
     [
-        ({"margin": 0.05, "lease": 0.5}, ""),  # both ends are allowed
-        ({"margin": 10.0, "lease": 0.0}, ""),
-        ({"margin": 0.0, "unsafe_overrides": ("margin",)}, ""),
-        ({"unsafe_overrides": ("margin",)}, ""),  # an override without need
-        ({"margin": 0.04}, r"margin = 0.04 takes a protection away; allowed is 0.05\.\.10.0"),
-        ({"lease": 0.51, "unsafe_overrides": ("margin",)}, "lease = 0.51 takes a protection away"),
-        ({"margin": NAN}, "margin = nan takes a protection away"),
-        ({"lease": INF}, "lease = inf takes a protection away"),
-        ({"unsafe_overrides": ("speed",)}, "'speed', which takes no protection away"),
+        {"gears_linear": [0.2, 0.3]},
+        {"gears_angular": [0.5, 0.4, 0.6, 0.7, 0.8]},
+        {"gears_linear": [0.0, 0.3, 0.4, 0.5, 0.6]},
     ],
 )
-def test_a_protection_is_taken_away_by_name_only(given: dict[str, Any], refusal: str) -> None:
-    if not refusal:
-        Guarded(**given)
-        return
-    with pytest.raises(ValueError, match=refusal):
-        Guarded(**given)
+def test_gears_are_five_rising_speeds(given: dict[str, Any]) -> None:
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert(given, Vehicle)
 
 
 # --- the bus ------------------------------------------------------------------------------------

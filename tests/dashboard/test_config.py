@@ -18,7 +18,7 @@ from services.dashboard.config import Dashboard
     ("words", "named"),
     [
         (["--host", "robot"], "host is 'robot'"),
-        (["--set", "dashboard.gears_linear=0.5,0.4,0.3,0.2,0.1"], "should be 5 rising speeds"),
+        (["--set", "vehicle.gears_linear=0.5,0.4,0.3,0.2,0.1"], "should be 5 rising speeds"),
         (["--set", "dashboard.certificate=a.pem"], "must be set together"),
         (["--set", "dashboard.token_file=/no/such"], "/no/such"),
         (

@@ -9,7 +9,7 @@ from common import clock
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
 from services.dashboard import robot
-from services.dashboard.config import Dashboard
+from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import HoldState, Push
 from services.dashboard.i18n import Texts, phrase
 from services.dashboard.robot import ESTOP_KEPT_S, Robot
@@ -44,7 +44,7 @@ class RobotFixture:
         self.notices: list[tuple[Level, str]] = []  # in English
         self.robot = Robot(
             self.bus,
-            Dashboard(),
+            DashboardConfig(),
             self.notify,
         )
         self.now_ns = 0

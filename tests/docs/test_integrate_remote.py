@@ -85,7 +85,7 @@ def test_the_test_file_of_the_page(tmp_path: Path) -> None:
     """It drives the simulated vehicle, with settings for the stalls of this host."""
     save_files(tmp_path)
     stalls = host_stalls.settings(max(host_stalls.measured(), 0.3))
-    sets = host_stalls.with_accepted_joined([*stalls, LEASES[0]])
+    sets = host_stalls.with_overrides_joined([*stalls, LEASES[0]])
     given = dict(one.split("=", 1) for one in sets)
     env = {f"T2__{name.upper().replace('.', '__')}": value for name, value in given.items()}
     env["PATH"] = f"{Path(sys.executable).parent}:{os.environ['PATH']}"

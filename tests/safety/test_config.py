@@ -7,33 +7,48 @@ from common.errors import ConfigError
 from services.safety.config import LimitSource, Safety, SafetyConfig, Source
 
 
+def configured(*sets: str) -> SafetyConfig:
+    return load(SafetyConfig, Sources(environ={}, sets=sets)).config
+
+
 def read(*sets: str) -> Safety:
-    return load(SafetyConfig, Sources(environ={}, sets=sets)).config.safety
+    return configured(*sets).safety
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
+    ("path", "value"),
     [
-        ("margin", 0.04),
-        ("margin", 0.0),
-        ("react", 0.09),
-        ("deceleration", 0.09),
-        ("angular_deceleration", 0.09),
-        ("max_linear", 1.51),
-        ("stall", 0.01),
-        ("release_speed", 0.2),
-        ("require_switches", False),
-        ("sources.nav.lease", 0.51),
-        ("sources.nav.operator", True),
-        ("creep_speed", 0.26),
+        ("safety.margin", 0.04),
+        ("safety.margin", 0.0),
+        ("safety.react", 0.09),
+        ("vehicle.deceleration", 0.09),
+        ("vehicle.deceleration", 1.01),
+        ("vehicle.angular_deceleration", 0.09),
+        ("vehicle.angular_deceleration", 3.01),
+        ("vehicle.max_angular", 2.01),
+        ("host.stall", 0.01),
+        ("board.require_switches", False),
+        ("safety.linear_acceleration", 1.51),
+        ("safety.angular_acceleration", 4.01),
+        ("safety.release_speed", 0.2),
+        ("safety.release_distance", 0.31),
+        ("safety.sources.nav.lease", 0.51),
+        ("safety.sources.nav.operator", True),
+        ("safety.creep_speed", 0.26),
     ],
 )
-def test_what_takes_a_protection_away_must_be_owned_up_to(name: str, value: object) -> None:
-    slow = "safety.max_linear=0.5"  # it must see as far as it takes to stop
-    given = slow, f"safety.{name}={str(value).lower()}"
-    with pytest.raises(ConfigError, match=f"{name} = .* or name it in unsafe_overrides"):
+def test_what_takes_a_protection_away_must_be_owned_up_to(path: str, value: object) -> None:
+    slow = "vehicle.max_linear=0.5"  # it must see as far as it takes to stop
+    given = slow, f"{path}={str(value).lower()}"
+    with pytest.raises(ConfigError, match=f"{path} = .* or name '{path}' in unsafe_overrides"):
         read(*given)
-    assert read(*given, f"safety.unsafe_overrides={name}").unsafe_overrides == (name,)
+    assert configured(*given, f"unsafe_overrides={path}").unsafe_overrides == (path,)
+
+
+def test_the_screens_are_held_by_an_operator_without_an_override() -> None:
+    for name in ("teleop", "checkout", "web"):
+        assert f"sources.{name}.operator" not in read().protections()
+    assert "sources.nav.operator" in read().protections()
 
 
 def test_an_emergency_stop_is_kept_alive_by_a_source_once() -> None:
@@ -42,11 +57,13 @@ def test_an_emergency_stop_is_kept_alive_by_a_source_once() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["creep_speed", "estop_keepalive_timeout", "max_linear", "sources.teleop.lease"]
-)
-def test_zero_never_means_off(name: str) -> None:
-    with pytest.raises(ConfigError, match=name.split(".")[0]):
-        read(f"safety.{name}=0", f"safety.unsafe_overrides={name}")
+    "path",
+    ["safety.creep_speed", "safety.estop_keepalive_timeout", "safety.sources.teleop.lease",
+     "vehicle.max_linear", "vehicle.deceleration"],
+)  # fmt: skip
+def test_zero_never_means_off(path: str) -> None:
+    with pytest.raises(ConfigError, match=f"{path} = 0: Expected"):
+        read(f"{path}=0", f"unsafe_overrides={path}")
 
 
 def test_priorities_are_unique() -> None:
@@ -60,7 +77,7 @@ def test_priorities_are_unique() -> None:
 def test_it_must_see_as_far_as_it_takes_to_stop() -> None:
     with pytest.raises(ConfigError, match=r"sonar_max 1.2 m is too near: .* in 1.28 m"):
         read("vehicle.sonar_max=1.2")
-    assert read("vehicle.sonar_max=1.2", "safety.max_linear=0.9").max_linear == 0.9
+    assert configured("vehicle.sonar_max=1.2", "vehicle.max_linear=0.9").vehicle.max_linear == 0.9
 
 
 def test_a_limit_source_has_both_settings_and_a_short_lease() -> None:

@@ -6,7 +6,7 @@ import pytest
 from msgspec import ValidationError, convert
 from msgspec.structs import replace
 
-from services.safety.config import LimitSource, Safety, Source
+from services.safety.config import LimitSource, Safety, SafetyConfig, Source
 from services.safety.core.state import State
 from services.safety.report import (
     signature,
@@ -178,7 +178,7 @@ def test_the_longest_state_decodes() -> None:
         limits={f"l{name[1:]}": LimitSource(lease=0.5, silence="stop") for name in names},
         estop_keepalive=tuple(f"k{name[1:]}" for name in names),
     )
-    fixture = PolicyFixture(largest)
+    fixture = PolicyFixture(SafetyConfig(safety=largest))
     fixture.left_bits = fixture.right_bits = 2**32 - 1
     fixture.link = replace(fixture.link, armed=False, waiting="x" * 500)
     fixture.tick()

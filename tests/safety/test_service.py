@@ -209,7 +209,7 @@ def test_the_emergency_stop_has_a_session_of_its_own(monkeypatch: pytest.MonkeyP
         priority: int,
     ) -> int:
         assert priority == realtime.SAFETY
-        unsafe = "safety.margin=0.0", 'safety.unsafe_overrides=["margin"]'
+        unsafe = "safety.margin=0.0", 'unsafe_overrides=["safety.margin"]'
         node = make_node("tcp/127.0.0.1:1", *unsafe)
         build(node)
         assert [len(bus.sessions) for bus in node.buses] == [2, 1]  # one is the drive link

@@ -12,11 +12,7 @@ pytestmark = pytest.mark.timed
 ROOT = Path(__file__).parents[2]
 UV = [str(Path(sys.executable).with_name("uv")), "--quiet"]
 # The host may stall: other tests run.
-STALLS = {
-    f"T2__{service}__{name}": value
-    for service in ("BRIDGE", "SAFETY")
-    for name, value in (("STALL", "0.3"), ("UNSAFE_OVERRIDES", "stall"))
-}
+STALLS = {"T2__HOST__STALL": "0.3", "T2__UNSAFE_OVERRIDES": "host.stall"}
 # Settings of a real robot, which are none of a simulated one.
 REAL = {"T2_CONFIG": "robot.toml", "T2__ROBOT__ID": "007", "T2__BUS__CONNECT": "tcp/127.0.0.1:9"}
 ENVIRONMENT = {**os.environ, **STALLS, **REAL, "PATH": os.defpath}  # without our own `t2`

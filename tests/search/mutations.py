@@ -18,11 +18,11 @@ from common.standstill import Displacement
 from common.wire import framing
 from common.wire.frame import Frame, Side
 from common.wire.reports import BumperBrakeReport, BumperReport
-from services.bridge.config import Bridge
+from services.bridge.config import BridgeConfig
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
 from services.ros2 import command
-from services.safety.config import LimitSource, Safety
+from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.core import causes, conditions, operator_requests, planning, sources
 from services.safety.core.causes import Held, Observation
 from services.safety.core.inputs import Inputs
@@ -215,14 +215,13 @@ def configured(service: str, **settings: Any) -> Patch:
     """Change settings of a service."""
     config: Any = CONFIGS[service]
     section = getattr(config, service)
-    unsafe = tuple(settings.keys() & section.protective.keys())
-    changed = replace(section, unsafe_overrides=unsafe, **settings)
+    changed = replace(section, **settings)
     return CONFIGS, service, replace(config, **{service: changed})
 
 
-def timed(section: type[Bridge | Safety], **limits: float) -> Patch:
+def timed(root: type[BridgeConfig | SafetyConfig], **limits: float) -> Patch:
     """Change time limits of a service."""
-    return section, "times", replace(section().times, **limits)
+    return root, "times", replace(root().times, **limits)
 
 
 def received(kind: type[m.Message], change: Callable[[Any], m.Message]) -> Patch:
@@ -333,7 +332,7 @@ def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
 
 MUTATIONS: dict[str, Mutation] = {
     "the bridge's lease never ends": (
-        timed(Bridge, lease=10.0), (lambda s: s.kill("safety", 5000),), "a RUN is held",
+        timed(BridgeConfig, lease=10.0), (lambda s: s.kill("safety", 5000),), "a RUN is held",
     ),
     "a new bridge waits too short for safety": (
         (leases, "BEGIN_NS", NS_PER_S // 10),
@@ -346,7 +345,7 @@ MUTATIONS: dict[str, Mutation] = {
          lambda s: s.net.disturbances.pop("motion")), "no neutral motion came",
     ),
     "silence is not noticed": (
-        timed(Bridge, silence=10.0), (*LATE_STREAMS, lambda s: s.freeze(240)),
+        timed(BridgeConfig, silence=10.0), (*LATE_STREAMS, lambda s: s.freeze(240)),
         "the board is silent",
     ),
     "brakes that are off": (
@@ -388,7 +387,7 @@ MUTATIONS: dict[str, Mutation] = {
         "without a BRAKE",
     ),
     "late releases are obeyed": (
-        timed(Safety, max_echo_age=10.0), (*STUCK, late_releases), "no fresh request",
+        timed(SafetyConfig, max_echo_age=10.0), (*STUCK, late_releases), "no fresh request",
     ),
     "a release needs no neutral request": (
         (operator_requests, "_not_let_go", lambda *_: ""), (held_before,), "was not neutral",
@@ -430,10 +429,10 @@ MUTATIONS: dict[str, Mutation] = {
         "safety knows of driver",
     ),
     "no input is too old": (
-        timed(Safety, velocity_age=10.0), (lambda s: s.velocities(False),), "old velocity",
+        timed(SafetyConfig, velocity_age=10.0), (lambda s: s.velocities(False),), "old velocity",
     ),
     "an old velocity is as good as a new one": (
-        timed(Safety, velocity_age=10.0),
+        timed(SafetyConfig, velocity_age=10.0),
         (*STAND, lambda s: s.estop(), lambda s: s.velocities(False, 1000), *RESET,
          lambda s: s.velocities(True, 1000), *GO),
         "safety knows of estop",

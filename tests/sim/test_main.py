@@ -121,7 +121,7 @@ def test_a_process_streams_drives_and_is_disturbed(bench: Bench) -> None:
 @needs_right
 @pytest.mark.parametrize(("asked", "priority"), [("true", realtime.BOARD), ("false", 0)])
 def test_nobody_on_board_keeps_it_waiting(bench: Bench, asked: str, priority: int) -> None:
-    with process(bench, "--set", f"robot.realtime={asked}") as running:
+    with process(bench, "--set", f"host.realtime={asked}") as running:
         assert realtime.priority(running.pid) == priority
 
 

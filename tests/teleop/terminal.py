@@ -17,7 +17,7 @@ from pathlib import Path
 
 # A host that runs tests stalls terminals for longer than a vehicle may accept.
 PATIENT = (
-    "--set", 'teleop.unsafe_overrides=["round_trip"]', "--set", "teleop.round_trip=2.0",
+    "--set", "unsafe_overrides=teleop.round_trip", "--set", "teleop.round_trip=2.0",
 )  # fmt: skip
 STRICT = ("services.teleop", "--no-gamepad")
 TELEOP = (*STRICT, *PATIENT)

@@ -5,29 +5,30 @@ from typing import Any
 import msgspec
 import pytest
 
-from services.teleop.config import Teleop
+from common.config import Sources, load
+from common.errors import ConfigError
+from services.teleop.config import Teleop, TeleopConfig
 
 
 @pytest.mark.parametrize(
     "settings",
     [
         {"source": "Tele op"},
-        {"gears_linear": [0.2, 0.3]},
-        {"gears_angular": [0.5, 0.4, 0.6, 0.7, 0.8]},
-        {"gears_linear": [0.0, 0.3, 0.4, 0.5, 0.6]},
-        {"hold": 0.5, "hold_first": 0.4},
-        {"hold": 2.0},
+        {"hold_first": 0.2},
+        {"hold_first": 2.0},
         {"linear_axis": 3},
         {"round_trip": 0.0},
-        {"round_trip": 0.31},
         {"round_trip": float("nan")},
-        {"round_trip": float("inf"), "unsafe_overrides": ["round_trip"]},
-        {"gamepad_silence": 0.0},
-        {"gamepad_silence": 3.5},
-        {"gamepad_silence": 3.5, "unsafe_overrides": ["round_trip"]},
-        {"unsafe_overrides": ["hold"]},
+        {"round_trip": float("inf")},
     ],
 )
 def test_a_bad_setting_is_refused(settings: dict[str, Any]) -> None:
     with pytest.raises(msgspec.ValidationError):
         msgspec.convert(settings, Teleop)
+
+
+def test_a_long_round_trip_must_be_owned_up_to() -> None:
+    long = "teleop.round_trip=0.31"
+    with pytest.raises(ConfigError, match=r"teleop\.round_trip = 0.31 takes a protection away"):
+        load(TeleopConfig, Sources(environ={}, sets=[long]))
+    load(TeleopConfig, Sources(environ={}, sets=[long, "unsafe_overrides=teleop.round_trip"]))

@@ -10,6 +10,7 @@ from unittest.mock import MagicMock
 
 import pytest
 
+from common.settings import Vehicle
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
 from services.teleop.gamepad import LIST_READS, SdlGamepad, find
@@ -171,7 +172,7 @@ def test_sdl_is_started_again_while_it_finds_no_device(monkeypatch: pytest.Monke
 def test_a_gamepad_of_sdl_that_freezes_while_it_drives_is_released(
     pad: SdlGamepad, virtual: VirtualGamepad
 ) -> None:
-    controls, now_ns, moved = Controls(Teleop()), 0, []
+    controls, now_ns, moved = Controls(Teleop(), Vehicle()), 0, []
     for tick in range(120):
         if tick == 1:
             virtual.press(DEADMAN)
@@ -187,7 +188,7 @@ def test_the_deadman_alone_moves_nothing_on_a_pad_with_triggers(
     pad: SdlGamepad, virtual: VirtualGamepad
 ) -> None:
     """Axes 3 and 4 are triggers: SDL reads 0 until the first report, then -1."""
-    controls, now_ns = Controls(Teleop()), 0
+    controls, now_ns = Controls(Teleop(), Vehicle()), 0
     for tick in range(60):
         virtual.push(3, -32_768 if tick >= 10 else 0)
         virtual.push(4, -32_768 if tick >= 10 else 0)

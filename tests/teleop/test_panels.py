@@ -146,7 +146,7 @@ def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
 def test_the_footer_has_the_keys_that_have_an_effect(
     fields: dict[str, Any], keys: list[str]
 ) -> None:
-    shown = panels.hints(view(**fields), 0.6, 0.3).plain.split("\n")
+    shown = panels.hints(view(**fields), 0.6).plain.split("\n")
     assert [line[: len(key)] for line, key in zip(shown, keys, strict=True)] == keys
 
 

@@ -11,6 +11,8 @@ from functools import partial
 
 from zenoh import CongestionControl
 
+from cli.settings import Everything, safety_config
+from services.bridge.config import BridgeConfig, TimeLimits
 from sim.requests import Driver, Firmware, Flood, Freeze, Mute, PowerCycle, Sonar, Wire
 from t2.messages import Command
 from verification.faults import injectors
@@ -36,19 +38,25 @@ from verification.faults.injectors import (
 )
 from verification.faults.stack_fixture import LIMIT_LEASE_S, Requirement
 
+
+def bridge(config: Everything) -> TimeLimits:
+    """Return the time limits of the bridge on this host."""
+    return BridgeConfig(host=config.host).times
+
+
 ON: tuple[Outcome, ...] = ("drives on",)
 ITSELF: tuple[Outcome, ...] = ("by itself",)
 NEUTRAL: tuple[Outcome, ...] = ("after a neutral",)
 RESET: tuple[Outcome, ...] = ("after a reset",)
 
-MOTION_LEASE = by_limit(lambda config: config.bridge.times.lease)
-LEASE_AND_COAST = by_limit(lambda config: config.bridge.times.lease + config.bridge.times.coast)
-HEARTBEAT = by_limit(lambda config: config.bridge.times.heartbeat)
-SILENCE = by_limit(lambda config: config.bridge.times.silence)
-BUMPER_AGE = by_limit(lambda config: config.safety.times.bumper_age)
-VELOCITY_AGE = by_limit(lambda config: config.safety.times.velocity_age)
-ULTRASONIC_AGE = by_limit(lambda config: config.safety.times.ultrasonic_age)
-REQUEST_LEASE = by_limit(lambda config: config.safety.leased["teleop"].lease)
+MOTION_LEASE = by_limit(lambda config: bridge(config).lease)
+LEASE_AND_COAST = by_limit(lambda config: bridge(config).lease + bridge(config).coast)
+HEARTBEAT = by_limit(lambda config: bridge(config).heartbeat)
+SILENCE = by_limit(lambda config: bridge(config).silence)
+BUMPER_AGE = by_limit(lambda config: safety_config(config).times.bumper_age)
+VELOCITY_AGE = by_limit(lambda config: safety_config(config).times.velocity_age)
+ULTRASONIC_AGE = by_limit(lambda config: safety_config(config).times.ultrasonic_age)
+REQUEST_LEASE = by_limit(lambda config: safety_config(config).leased["teleop"].lease)
 KEEPALIVE = by_limit(lambda config: config.safety.estop_keepalive_timeout)
 LIMIT_LEASE = within(LIMIT_LEASE_S + NOTICE_S)
 

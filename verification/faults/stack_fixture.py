@@ -36,7 +36,7 @@ Requirement = Literal[
     "independent board",
 ]  # fmt: skip
 # Reach the speed sooner. No time limit changes.
-QUICK = ["safety.unsafe_overrides=linear_acceleration", "safety.linear_acceleration=5"]
+QUICK = ["unsafe_overrides=safety.linear_acceleration", "safety.linear_acceleration=5"]
 QUICK_MOTORS = str(Path(__file__).with_name("quick_motors.toml"))
 ROOM_M = 900.0  # from here the vehicle is put back to the origin
 READY_S = 60.0  # on a shared host

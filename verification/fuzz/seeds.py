@@ -33,9 +33,9 @@ SETS = (
     "board.listen_ports=4002, 4001",
     "bus.listen=tcp/127.0.0.1:7447,tcp/[::1]:2",
     "safety.sources={new={priority=5,lease=0.2}}",
-    "safety.unsafe_overrides=margin\0safety.margin=0",
-    "odom.hold=5e-2\0log.level=debug",
-    "odom.hold=nan",
+    "unsafe_overrides=safety.margin\0safety.margin=0",
+    "teleop.deadzone=5e-2\0log.level=debug",
+    "teleop.deadzone=nan",
     "robot.id=t2 \0robot=5",
     "wire.command_angular_unit=milliradian\0wire.feedback_angular_unit=x",
     "board.address=10.7.5.224\0board.port",
@@ -47,7 +47,7 @@ TOML = (
     '[safety.sources]\nweb = "x"\nnew = { priority = 1, lease = 0.2 }\n',
     "[board]\nlisten_ports = [1, 70000]\n[log]\nlevel = 'loud'\n",
     '[bus]\nlisten = ["tcp/0.0.0.0:7447", """\nudp/h:1"""]\nlease = inf\n',
-    "robot = 1979-05-27\nteleop.gears_linear = [0.1, nan]\n",
+    "robot = 1979-05-27\nvehicle.gears_linear = [0.1, nan]\n",
     "[[sim]]\nworld = '''x'''\nseed = 0b101 # \\u00e9\n",
 )
 

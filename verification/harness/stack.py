@@ -177,7 +177,7 @@ def _all_settings(sets: Sequence[str], shipped: bool, listen: str, control: int)
     """Return settings with free ports, and with limits that fit the host."""
     beside_others = "PYTEST_XDIST_WORKER" in os.environ  # other tests may stall it later
     holdup_s = 0.0 if shipped else max(host_stalls.measured(), BESIDE_OTHERS_S * beside_others)
-    own = {one.partition("=")[0] for one in sets if ".unsafe_overrides" not in one}
+    own = {one.partition("=")[0] for one in sets if not one.startswith(host_stalls.OVERRIDES)}
     relaxed = [one for one in host_stalls.settings(holdup_s) if one.partition("=")[0] not in own]
     board, *listen_ports = udp_ports(3)
     ports = [
@@ -186,7 +186,7 @@ def _all_settings(sets: Sequence[str], shipped: bool, listen: str, control: int)
         f"bus.listen={listen.format(port=free_port())}",
         f"sim.control_port={control}",
     ]
-    return host_stalls.with_accepted_joined([*sets, *ports, *relaxed])
+    return host_stalls.with_overrides_joined([*sets, *ports, *relaxed])
 
 
 def _is_up(it: RunningStack, services: int) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
+from common.settings import Vehicle
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
 from services.teleop.core.hold import Press
@@ -68,7 +69,7 @@ class Operator(Source):
         self._pressed = False  # the bumper, as shown
         self._script = script(draw)[::-1]
         self._gamepad = draw.get("operator.device", "keyboard") == "gamepad"
-        self._controls = Controls(Teleop())
+        self._controls = Controls(Teleop(), Vehicle())
         self._controls.gear = int(draw.get("operator.gear", 3))
         self._events = 0
         self._stick = Stick(Deflection(), deadman=False)

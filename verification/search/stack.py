@@ -206,11 +206,12 @@ class Stack:
         """Return a new process on the bus."""
         self._boots += 1
         config = CONFIGS.get(name)
-        turning = {"angular_deceleration": self.oracle.turn_braking}
+        body = replace(self._body, angular_deceleration=self.oracle.turn_braking)
         if isinstance(config, SafetyConfig):
-            config = replace(config, vehicle=self._body, safety=replace(config.safety, **turning))
+            config = replace(config, vehicle=body)
         elif isinstance(config, BridgeConfig):
-            config = replace(config, bridge=replace(config.bridge, **turning))
+            slowing = replace(config.vehicle, angular_deceleration=body.angular_deceleration)
+            config = replace(config, vehicle=slowing)
         return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:

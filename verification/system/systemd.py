@@ -155,12 +155,12 @@ def stops_in_order(m: Container) -> str:
 
 def rejects_bad_settings(m: Container) -> str:
     """A wrong setting ends a unit for good, with the reason in its journal."""
-    append(m, "[odom]\nhold = 99.0\n")
+    append(m, "[odom]\nturn_noise = 99.0\n")
     m.run("systemctl", "start", "t2.target")
     wait_until(lambda: m.unit(ODOM)["ActiveState"] == "failed", "the failure", PATIENCE_S)
     unit = m.unit(ODOM)
     assert (unit["ExecMainStatus"], unit["Result"]) == ("78", "exit-code"), unit
-    assert "odom.hold = 99.0" in m.run("journalctl", "-u", ODOM, "-o", "cat", "-n", "20")
+    assert "odom.turn_noise = 99.0" in m.run("journalctl", "-u", ODOM, "-o", "cat", "-n", "20")
     return "exit code 78, named in the journal"
 
 

@@ -90,18 +90,17 @@ class Core:
     ) -> None:
         """Set up with the boot of our messages and the counters of the health message."""
         self.rejected: Counter[str] = Counter()  # frames and datagrams, by reason
-        self._config, settings = config, config.bridge
+        self._config, times = config, config.times
         self._counters = counters
-        limits = settings.max_linear, settings.max_angular
-        self._translator = Translator(config.wire, config.vehicle, *limits)
+        self._translator = Translator(config.wire, config.vehicle)
         self.motions = MotionOutput(
-            settings, self._translator, boot=boot, counters=counters, now_ns=now_ns
+            config, self._translator, boot=boot, counters=counters, now_ns=now_ns
         )
-        self.readiness = readiness = Readiness(settings, config.board)
-        self.calls = Calls(readiness, settings.times.echo, self._ask)
-        failover_ns = round(settings.times.failover * NS_PER_S)
+        self.readiness = readiness = Readiness(times, config.board)
+        self.calls = Calls(readiness, times.echo, self._ask)
+        failover_ns = round(times.failover * NS_PER_S)
         self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
-        self._polling = Polling(QUERIES, settings.times.answer, TICK_S)
+        self._polling = Polling(QUERIES, times.answer, TICK_S)
         self._bumper = BumperFilter()
         self._bumper_seq = 0  # of the newest bumper message, as its publisher counts
         self._mileage: Latest[m.Mileage] | None = None

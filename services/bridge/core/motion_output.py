@@ -21,7 +21,7 @@ from common.motion import BRAKE, RUN, STOP, Twist
 from common.standstill import Displacement, stopping_ns
 from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
-from services.bridge.config import Bridge as Settings
+from services.bridge.config import BridgeConfig
 from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease, Refusal
 from services.bridge.core.output import Event, Outputs, Reacted, Send
@@ -41,7 +41,7 @@ class MotionOutput:
 
     def __init__(
         self,
-        settings: Settings,
+        config: BridgeConfig,
         translator: Translator,
         *,
         boot: int,
@@ -62,11 +62,11 @@ class MotionOutput:
         self._stopping_ns: int | None = None
         # 1 equivalent mutant: no ``boot`` is an empty text.
         self._refused: int | None = None  # ``boot`` of the second authority that was reported
-        self._settings = settings
-        self._valid_ns = round(settings.times.lease * NS_PER_S)
+        self._vehicle, self._times = config.vehicle, config.times
+        self._valid_ns = round(self._times.lease * NS_PER_S)
         # 1 equivalent mutant: the first tick begins anew.
         self._over_since_ns: int | None = None  # the end of the lease that is supervised
-        self._limit_ns = round(settings.times.coast * NS_PER_S)  # from then until it must stand
+        self._limit_ns = round(self._times.coast * NS_PER_S)  # from then until it must stand
         self._displacement: Displacement | None = None  # None until standstill after that end
 
     def on_motion(self, motion: Motion, received_ns: int, now_ns: int) -> Outputs:
@@ -144,11 +144,11 @@ class MotionOutput:
             return
         self._over_since_ns = over_since_ns
         self._displacement = None
-        settings, velocity = self._settings, self._velocity
-        self._limit_ns = round(settings.times.coast * NS_PER_S)
-        if velocity and over_since_ns and fresh(velocity, over_since_ns, settings.times.silence):
+        times, vehicle, velocity = self._times, self._vehicle, self._velocity
+        self._limit_ns = round(times.coast * NS_PER_S)
+        if velocity and over_since_ns and fresh(velocity, over_since_ns, times.silence):
             limit_ns = stopping_ns(
-                velocity.value, settings.deceleration, settings.angular_deceleration
+                velocity.value, vehicle.deceleration, vehicle.angular_deceleration
             )
             self._limit_ns = min(self._limit_ns, limit_ns)
 
@@ -193,4 +193,4 @@ class MotionOutput:
         velocity = self._velocity
         if velocity is None:
             return True
-        return velocity.value.is_standing and fresh(velocity, now_ns, self._settings.times.silence)
+        return velocity.value.is_standing and fresh(velocity, now_ns, self._times.silence)

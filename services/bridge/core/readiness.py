@@ -8,7 +8,7 @@ from common.freshness import NS_PER_S
 from common.settings import Board
 from common.wire.commands import BumperBrakeSet, UltrasonicBrakeSet
 from common.wire.frame import Frame
-from services.bridge.config import Bridge as Settings
+from services.bridge.config import TimeLimits
 from services.bridge.core.brakes import Brake
 from services.bridge.core.output import Event, Outputs, Publish
 from services.bridge.core.relay_status import RelayStatus
@@ -21,7 +21,7 @@ GAP_NS = 60 * NS_PER_S // 1000  # of silence; the velocity comes every 20 ms
 class Readiness:
     """Tracks link, brakes and relay, and reports their transitions."""
 
-    def __init__(self, settings: Settings, board: Board) -> None:
+    def __init__(self, times: TimeLimits, board: Board) -> None:
         self.link: m.LinkState = "never"
         # 2 equivalent mutants: the first frame sets it.
         self.up_ns = 0  # start of the current ``up`` phase
@@ -34,9 +34,9 @@ class Readiness:
         # 1 equivalent mutant: the first frame sets it.
         self._received_ns = 0
         self._ports = ", ".join(map(str, board.listen_ports))
-        self._silence_ns = round(settings.times.silence * NS_PER_S)
-        self._echo_ns = round(settings.times.echo * NS_PER_S)
-        self._required = settings.require_switches
+        self._silence_ns = round(times.silence * NS_PER_S)
+        self._echo_ns = round(times.echo * NS_PER_S)
+        self._required = board.require_switches
         self._published = self.message()
         # 2 equivalent mutants: the first tick sets it.
         self._inhibited = False
@@ -71,7 +71,7 @@ class Readiness:
             return self.relay.waiting
         brakes = Phrase("waiting.brakes")
         if self._required and self._inhibited and self._assumed_on:
-            setting = "bridge.require_switches"
+            setting = "board.require_switches"
             return brakes, Phrase("waiting.no_confirmation", {"setting": setting})
         return (brakes,)
 

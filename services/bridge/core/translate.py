@@ -33,13 +33,13 @@ FAULT_NAMES = ("over_current", "over_voltage", "encoder", "under_voltage", "over
 class Translator:
     """Converts with the settings of one vehicle."""
 
-    def __init__(self, wire: Wire, vehicle: Vehicle, max_linear: float, max_angular: float) -> None:
+    def __init__(self, wire: Wire, vehicle: Vehicle) -> None:
         self._commanded_per_radian = PER_RADIAN[wire.command_angular_unit]
         self._measured_per_radian = PER_RADIAN[wire.feedback_angular_unit]
         self._near_mm = vehicle.sonar_min * MM
         self._far_mm = vehicle.sonar_max * MM
-        self._max_linear = max_linear
-        self._max_angular = max_angular
+        self._max_linear = vehicle.max_linear
+        self._max_angular = vehicle.max_angular
 
     def run(self, motion: Motion) -> MotionCommand:
         """Return the frame of a RUN, slowed on its curve."""

@@ -6,7 +6,7 @@
 const DEADZONE = 0.12; // of the stick's range
 const DEADMAN = 4; // left shoulder, in the browser's standard mapping
 const STICKS = { linear: 1, angular: 2 }; // left stick up and down, right stick left and right
-const SILENCE_MS = 2000; // as `teleop.gamepad_silence`
+const SILENCE_MS = 2000; // as GAMEPAD_SILENCE_S of teleop
 const PROMPT_MS = SILENCE_MS / 2;
 let known = new Map(); // by index and id: { reading, changedAt, seenUp, isFrozen, centered }
 

@@ -4,6 +4,7 @@ import { t } from "./i18n.js";
 const NS = "http://www.w3.org/2000/svg";
 const REACH = 1.9; // m of a sector at most, so that all fit
 const CREEPING = 0.02; // m/s; a slower wheel is drawn straight
+const WHEELBASE = 0.64; // of the length, as drawn
 const HALF = 0.36; // rad, half of a sector as drawn
 const parts = { sectors: [], labels: [], wheels: [], body: null, mounts: [] };
 
@@ -32,7 +33,8 @@ export function build(vehicle) {
   svg.replaceChildren();
   parts.mounts = mounts(vehicle);
   parts.sectors = parts.mounts.map(() => create(svg, "path", { class: "sector" }));
-  const { length, width, wheelbase, track } = vehicle;
+  const { length, width, track } = vehicle;
+  const wheelbase = WHEELBASE * length;
   parts.wheels = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => {
     const place = create(svg, "g", { transform: `translate(${at((x * wheelbase) / 2, (y * track) / 2)})` });
     const part = create(place, "rect", { class: "wheel", x: -0.055, y: -0.15, width: 0.11, height: 0.3, rx: 0.03 });

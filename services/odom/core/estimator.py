@@ -13,7 +13,7 @@ counters                     ``corrected`` advances by the arc segments since th
                              fitted to them; ``predicted`` becomes ``corrected``
 counters of another ``boot`` ``corrected`` becomes ``predicted`` and counting restarts: the bridge
 or ``epoch``                 or the board restarted, and the pose must not jump
-no input                     the last velocity is valid for ``hold`` seconds; after that the pose
+no input                     the last velocity is valid for ``HOLD_S``; after that the pose
                              does not change, its covariance grows, and nothing is published
 a pose from an operator      both are set; counting restarts with the next counters
 ============================ ===================================================================
@@ -29,7 +29,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S, Latest, fresh
 from common.standstill import comparable
 from services.odom.config import Odom
-from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, NoiseModel
+from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, HOLD_S, NoiseModel
 from services.odom.core.pose import (
     ArcSegment,
     Covariance,
@@ -43,6 +43,7 @@ from t2 import messages as m
 
 SEGMENTS_MAX = 512  # five seconds without counters; above that, segments are merged in pairs
 COMPARED_NS = NS_PER_S  # window of slip detection
+SLIP_M, SLIP_RAD = 0.1, 0.2  # in that window
 # The start pose is exact by definition, except for the counter resolution.
 START = Covariance(COUNTER_STEP_M**2, 0.0, COUNTER_STEP_M**2, 0.0, 0.0, COUNTER_STEP_RAD**2)
 
@@ -50,10 +51,9 @@ START = Covariance(COUNTER_STEP_M**2, 0.0, COUNTER_STEP_M**2, 0.0, 0.0, COUNTER_
 class SlipDetector:
     """Compares counters with velocities over the last second."""
 
-    def __init__(self, settings: Odom) -> None:
+    def __init__(self) -> None:
         self.residual: float | None = None  # m, counters minus velocities
         self.slip = False
-        self._settings = settings
         self._differences: deque[tuple[int, float, float]] = deque()  # time, m, rad
         self._seen = True
 
@@ -75,7 +75,7 @@ class SlipDetector:
         distance = sum(each[1] for each in self._differences)
         turn = sum(each[2] for each in self._differences)
         part = 0.5 if self.slip else 1.0
-        limits = self._settings.slip_distance * part, self._settings.slip_turn * part
+        limits = SLIP_M * part, SLIP_RAD * part
         self.slip = abs(distance) > limits[0] or abs(turn) > limits[1]
         self.residual = distance if self._differences else None
 
@@ -93,7 +93,7 @@ class Estimator:
         self._counters: m.Mileage | None = None
         self._velocity: Latest[m.Velocity] | None = None
         self._noise = NoiseModel(settings)
-        self._slip_detector = SlipDetector(settings)
+        self._slip_detector = SlipDetector()
 
     def on_velocity(self, velocity: m.Velocity, now_ns: int) -> None:
         """Process a measured velocity."""
@@ -123,7 +123,7 @@ class Estimator:
     def estimate(self, now_ns: int) -> m.Odometry | None:
         """Return pose and twist at ``now_ns``; None without a valid velocity."""
         settings, velocity = self._settings, self._velocity
-        if velocity is None or not fresh(velocity, now_ns, settings.hold):
+        if velocity is None or not fresh(velocity, now_ns, HOLD_S):
             return None
         self._advance(now_ns)
         self._slip_detector.update(now_ns)
@@ -164,7 +164,7 @@ class Estimator:
         linear = angular = 0.0
         if self._velocity is not None:
             linear, angular = self._velocity.value.linear, self._velocity.value.angular
-            held_ns = self._velocity.received_ns + round(self._settings.hold * NS_PER_S)
+            held_ns = self._velocity.received_ns + round(HOLD_S * NS_PER_S)
             held_ns = min(max(start_ns, held_ns), now_ns)
         seen_s, unseen_s = (held_ns - start_ns) / NS_PER_S, (now_ns - held_ns) / NS_PER_S
         for segment in (

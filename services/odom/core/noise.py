@@ -5,10 +5,10 @@ arc                       length                 turn                        end
 ========================= ====================== =========================== ====================
 counted                   ``distance_noise``     ``turn_noise``,             none
                                                  ``drift_noise``
-counted, over a gap       the same               the same                    ``gap_noise`` by m
+counted, over a gap       the same               the same                    ``GAP_NOISE`` by m
 by velocities             + ``velocity_noise``   + ``angular_noise``         none
-nothing, in a gap         + ``velocity_noise``   + ``angular_noise``,        ``gap_noise`` by s
-                                                 ``gap_turn_noise``
+nothing, in a gap         + ``velocity_noise``   + ``angular_noise``,        ``GAP_NOISE`` by s
+                                                 ``GAP_TURN_NOISE``
 ========================= ====================== =========================== ====================
 
 Counters that dither by one step and velocities slightly off zero are not travel: their noise would
@@ -25,6 +25,10 @@ from t2.messages import Mileage
 
 COUNTER_STEP_M = 0.001  # manual 2.3
 COUNTER_STEP_RAD = math.radians(0.1)
+HOLD_S = 0.1  # that a velocity is valid: five reports
+# Of the place (m): per sqrt(m) driven in a gap, per sqrt(s) while it lasts. Of the turn (rad): per
+# sqrt(s) while it lasts.
+GAP_NOISE, GAP_TURN_NOISE = 0.2, 0.3
 WINDOW = 1.5  # counter steps around the place of a standstill: one step, and rounding
 
 
@@ -43,7 +47,7 @@ class NoiseModel:
             length, turn = min(length, self._left[0]), min(turn, self._left[1])
             self._left = self._left[0] - length, self._left[1] - turn
         gap_m = length if self._gap_s(segment) else 0.0
-        return ProcessNoise(*self._travel(length, turn), self._settings.gap_noise**2 * gap_m)
+        return ProcessNoise(*self._travel(length, turn), GAP_NOISE**2 * gap_m)
 
     def extrapolated(self, segment: ArcSegment) -> ProcessNoise:
         """Return the noise of an arc that only velocities measured, or nothing."""
@@ -51,8 +55,8 @@ class NoiseModel:
         length, turn = self._travel(abs(segment.distance), abs(segment.turn))
         return ProcessNoise(
             length + of.velocity_noise**2 * segment.time_s,
-            turn + of.angular_noise**2 * segment.time_s + of.gap_turn_noise**2 * gap_s,
-            of.gap_noise**2 * gap_s,
+            turn + of.angular_noise**2 * segment.time_s + GAP_TURN_NOISE**2 * gap_s,
+            GAP_NOISE**2 * gap_s,
         )
 
     def update(self, counters: Mileage, segments: Sequence[ArcSegment]) -> None:
@@ -88,4 +92,4 @@ class NoiseModel:
         return of.distance_noise**2 * length, of.turn_noise**2 * turn + of.drift_noise**2 * length
 
     def _gap_s(self, segment: ArcSegment) -> float:
-        return 0.0 if segment.seen else max(0.0, segment.time_s - self._settings.hold)
+        return 0.0 if segment.seen else max(0.0, segment.time_s - HOLD_S)

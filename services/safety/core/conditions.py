@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any, TypeVar
 
 from common.freshness import NS_PER_S, Latest, fresh
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from services.safety.core.causes import Observation, Token
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch
@@ -24,7 +24,7 @@ STALL_S = 1.0
 
 
 def observe_inputs(
-    inputs: Inputs, settings: Safety, state: State, now_ns: int
+    inputs: Inputs, settings: SafetyConfig, state: State, now_ns: int
 ) -> Iterator[Observation]:
     """Yield each cause that depends on inputs and state, present or not."""
     judged = state.verdict.judged if state.verdict.judged != (0, 0) else None
@@ -85,7 +85,7 @@ def _driver(name: CauseName, side: str, latest: Latest[Driver] | None) -> Observ
     return Observation(name, faulty, (sample.boot, sample.seq), phrases)
 
 
-def _starting(inputs: Inputs, settings: Safety, keepalives: list[str]) -> Observation:
+def _starting(inputs: Inputs, settings: SafetyConfig, keepalives: list[str]) -> Observation:
     needed: dict[str, Latest[Any] | None] = {
         "velocity": inputs.velocity,
         "ultrasonic": inputs.ultrasonic,
@@ -94,7 +94,7 @@ def _starting(inputs: Inputs, settings: Safety, keepalives: list[str]) -> Observ
         "driver_right": inputs.right,
         "link": inputs.link,
     }
-    if settings.require_switches:
+    if settings.board.require_switches:
         needed["switches"] = inputs.switches
     missing = [name for name, latest in needed.items() if latest is None]
     if not inputs.estop_connection:
@@ -123,15 +123,17 @@ def _link(inputs: Inputs) -> Iterator[Observation]:
     yield Observation("predecessor", due, phrases=(Phrase("predecessor.moved"),) * moved)
 
 
-def _switches(inputs: Inputs, settings: Safety) -> Observation:
-    if inputs.switches is None or not settings.require_switches:
+def _switches(inputs: Inputs, settings: SafetyConfig) -> Observation:
+    if inputs.switches is None or not settings.board.require_switches:
         return Observation("switches", False)
     switches = inputs.switches.value
     verified = switches.ultrasonic_brake is True and switches.bumper_brake is True
     return Observation("switches", not verified)
 
 
-def _bumper(inputs: Inputs, settings: Safety, judged: Token | None, now_ns: int) -> Observation:
+def _bumper(
+    inputs: Inputs, settings: SafetyConfig, judged: Token | None, now_ns: int
+) -> Observation:
     if inputs.bumper is None:
         return Observation("bumper", False)
     if not fresh(inputs.bumper, now_ns, settings.times.bumper_age):
@@ -154,14 +156,14 @@ def _bumper_lossy(inputs: Inputs, held: bool) -> Observation:
     return Observation("bumper_lossy", lossy, phrases=phrases)
 
 
-def _silent(inputs: Inputs, settings: Safety, state: State, now_ns: int) -> Observation:
+def _silent(inputs: Inputs, settings: SafetyConfig, state: State, now_ns: int) -> Observation:
     # A sample counts from its reception; samples queued during a stall seem new afterwards.
     if _stalled(state, settings.times.bumper_age, now_ns):
         return Observation("silent", True, phrases=(Phrase("silent.stalled"),))
     too_old = {
         "velocity": _is_old(inputs.velocity, settings.times.velocity_age, now_ns),
         "link": _is_old(inputs.link, settings.times.link_age, now_ns),
-        "switches": settings.require_switches
+        "switches": settings.board.require_switches
         and _is_old(inputs.switches, settings.times.switches_age, now_ns),
         "driver_left": _is_old(inputs.left, settings.times.driver_age, now_ns),
         "driver_right": _is_old(inputs.right, settings.times.driver_age, now_ns),

@@ -36,7 +36,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S, Latest
 from common.motion import STILL, Twist
 from common.standstill import Displacement, stopping_ns
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from t2.messages import Mileage
 
 GOOD_PER_BAD = 0.5  # a good second subtracts half a bad second
@@ -139,18 +139,12 @@ class MotionWatch(Struct, frozen=True):
 class Supervisor:
     """Supervises one vehicle; holds no state."""
 
-    def __init__(self, settings: Safety) -> None:
-        self._linear = Bounds(
-            settings.deceleration, FASTER_MPS, AGAINST_MPS, settings.times.runaway_time
-        )
-        self._angular = Bounds(
-            settings.angular_deceleration,
-            FASTER_RADPS,
-            AGAINST_RADPS,
-            settings.times.runaway_time,
-        )
+    def __init__(self, settings: SafetyConfig) -> None:
+        body, patience_s = settings.vehicle, settings.times.runaway_time
+        self._linear = Bounds(body.deceleration, FASTER_MPS, AGAINST_MPS, patience_s)
+        self._angular = Bounds(body.angular_deceleration, FASTER_RADPS, AGAINST_RADPS, patience_s)
         # Assumed while the velocity is unknown.
-        self._fastest = Twist(settings.max_linear, settings.max_angular)
+        self._fastest = Twist(body.max_linear, body.max_angular)
 
     def follow(
         self,

@@ -8,7 +8,7 @@ and the release that frees it needs the reset. Causes that the reset does not na
 
 from msgspec.structs import replace
 
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from services.safety.core.causes import (
     BARRING,
     FaultBudget,
@@ -31,14 +31,15 @@ LET_GO = (Phrase("release.let_go"),)
 KEYSTROKES: dict[Direction, str] = {"forward": "F", "backward": "B"}
 
 
-def room(state: State, settings: Safety) -> float:
+def room(state: State, settings: SafetyConfig) -> float:
     """Return the remaining travel of a release in metres, less the stopping distance."""
-    stopping = stopping_distance(settings.release_speed, settings.reaction, settings.deceleration)
-    return state.release.remaining(settings.release_distance - stopping)
+    speed, deceleration = settings.safety.release_speed, settings.vehicle.deceleration
+    stopping = stopping_distance(speed, settings.reaction, deceleration)
+    return state.release.remaining(settings.safety.release_distance - stopping)
 
 
 def carry_out(
-    call: ResetRequest, state: State, inputs: Inputs, settings: Safety, now_ns: int
+    call: ResetRequest, state: State, inputs: Inputs, settings: SafetyConfig, now_ns: int
 ) -> tuple[State, Reply]:
     """Carry out a reset, or return the reason of its refusal."""
     reason = (
@@ -70,7 +71,7 @@ def _not_named(state: State, call: ResetRequest) -> Phrases:
     return ()
 
 
-def _no_reset(state: State, inputs: Inputs, call: ResetRequest, settings: Safety) -> Phrases:
+def _no_reset(state: State, inputs: Inputs, call: ResetRequest, settings: SafetyConfig) -> Phrases:
     """Return which cause forbids this reset; empty when it may clear something."""
     present = Phrase("reset.still_present")
     new = begun(state.latches, state.decision)
@@ -87,7 +88,7 @@ def _no_reset(state: State, inputs: Inputs, call: ResetRequest, settings: Safety
     return ()
 
 
-def _outcome(state: State, inputs: Inputs, settings: Safety) -> Phrases:
+def _outcome(state: State, inputs: Inputs, settings: SafetyConfig) -> Phrases:
     """Return the answer to a reset that was carried out, with the causes that stay latched."""
     held = latched(state.latches)
     if not held:
@@ -102,7 +103,7 @@ def _described(state: State) -> Phrases:
     return tuple(each for name in latched(state.latches) for each in state.latches[name].phrases)
 
 
-def _pressed(state: State, inputs: Inputs, settings: Safety) -> Phrases:
+def _pressed(state: State, inputs: Inputs, settings: SafetyConfig) -> Phrases:
     """Return the phrases of a pressed bumper with the next step."""
     step = _no_release(state, inputs, settings) or _way_off(state.release)
     return *state.latches["contact"].phrases, *step
@@ -120,7 +121,7 @@ def _way_off(release: Release) -> Phrases:
     return step, Phrase("release.into_contact", {"direction": only})
 
 
-def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Release:
+def answered(state: State, inputs: Inputs, settings: SafetyConfig, now_ns: int) -> Release:
     """Return the release with the answer to what the source in control requests.
 
     A refusal ends it until the next neutral request. Only a vehicle that does not stand yet is
@@ -131,7 +132,7 @@ def answered(state: State, inputs: Inputs, settings: Safety, now_ns: int) -> Rel
     asked = state.arbiter.channels[source].release if source else "none"
     if source is None or asked == "none":
         return replace(release, direction=None, refusal=())
-    if source not in settings.operators:
+    if source not in settings.safety.operators:
         reason: Phrases = (Phrase("release.no_operator", {"source": source}),)
     elif reason := _no_release(state, inputs, settings):
         pass
@@ -154,7 +155,7 @@ def _not_let_go(release: Release, source: str, channel: DriveChannel) -> Phrases
     return () if neutral_ns is not None and neutral_ns > release.barred_ns else LET_GO
 
 
-def _no_release(state: State, inputs: Inputs, settings: Safety) -> Phrases:
+def _no_release(state: State, inputs: Inputs, settings: SafetyConfig) -> Phrases:
     """Return why no release is possible in either direction; empty when one is."""
     if "contact" not in state.latches:
         return (Phrase("release.no_contact"),)
@@ -169,7 +170,7 @@ def _no_release(state: State, inputs: Inputs, settings: Safety) -> Phrases:
     return (*why, BY_HAND) if why else ()
 
 
-def spent(state: State, settings: Safety) -> Phrases:
+def spent(state: State, settings: SafetyConfig) -> Phrases:
     """Return why the releases of this contact are used up; empty when they are not."""
     if state.release.unknown:
         return (Phrase("release.unknown"),)
@@ -182,7 +183,7 @@ def _is_pressed(inputs: Inputs) -> bool:
     return inputs.bumper is not None and inputs.bumper.value.pressed
 
 
-def _not_standing(inputs: Inputs, settings: Safety, now_ns: int) -> Phrases:
+def _not_standing(inputs: Inputs, settings: SafetyConfig, now_ns: int) -> Phrases:
     velocity = inputs.known_velocity(now_ns, settings.times.velocity_age)
     if velocity is None:
         return (Phrase("standstill.unknown"),)

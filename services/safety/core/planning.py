@@ -17,8 +17,7 @@ from collections.abc import Iterator, Sequence
 from msgspec import Struct
 
 from common.motion import RUN, STILL, Twist, clamp
-from common.settings import Vehicle
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from services.safety.core.causes import BARRING, Latches, Observation
 from services.safety.core.release import stopping_distance, sweep
 from services.safety.core.sonars import Axis, axes
@@ -96,14 +95,14 @@ class Zones(Struct, frozen=True):
         return 2 * room / (reacting + math.sqrt(reacting * reacting + 4 * way * room))
 
 
-def zones(vehicle: Vehicle, settings: Safety) -> Zones:
-    """Return the zones of this vehicle with these settings."""
+def zones(settings: SafetyConfig) -> Zones:
+    """Return the zones of the vehicle with these settings."""
     return Zones(
-        axes(vehicle),
-        settings.margin,
+        axes(settings.vehicle),
+        settings.safety.margin,
         settings.reaction,
-        settings.deceleration,
-        settings.angular_deceleration,
+        settings.vehicle.deceleration,
+        settings.vehicle.angular_deceleration,
     )
 
 
@@ -127,13 +126,14 @@ class Plan(Struct, frozen=True):
 class Planner:
     """Plans twists for one vehicle; holds no state."""
 
-    def __init__(self, settings: Safety, vehicle: Vehicle) -> None:
-        self.zones = zones(vehicle, settings)
-        self.reach = math.hypot(vehicle.length, vehicle.width) / 2  # m, to the body's corners
-        self._settings = settings
-        self.creep_room = self.zones.room(settings.creep_speed)
-        self._up = Twist(settings.linear_acceleration, settings.angular_acceleration)
-        self._down = Twist(settings.deceleration, settings.angular_deceleration)
+    def __init__(self, settings: SafetyConfig) -> None:
+        body, own = settings.vehicle, settings.safety
+        self.zones = zones(settings)
+        self.reach = math.hypot(body.length, body.width) / 2  # m, to the body's corners
+        self._vehicle, self._settings = body, own
+        self.creep_room = self.zones.room(own.creep_speed)
+        self._up = Twist(own.linear_acceleration, own.angular_acceleration)
+        self._down = Twist(body.deceleration, body.angular_deceleration)
 
     def requested(self, state: State, now_ns: int) -> RequestedTwist | None:
         """Return the motion that the source in control requests."""
@@ -149,7 +149,7 @@ class Planner:
 
     def limited(self, asked: Twist, held: Latches) -> Twist:
         """Return the twist within the limits; at creep speed while bumper polls are lost."""
-        twist = asked.within(self._settings.max_linear, self._settings.max_angular)
+        twist = asked.within(self._vehicle.max_linear, self._vehicle.max_angular)
         if "bumper_lossy" not in held:
             return twist
         fastest = sweep(twist, self.reach)

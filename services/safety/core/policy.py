@@ -22,8 +22,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.motion import BRAKE, RUN, STILL, STOP
-from common.settings import Vehicle
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from services.safety.core.causes import (
     BARRING,
     BY_NAME,
@@ -62,9 +61,9 @@ class Decision(Struct, frozen=True):
 class Policy:
     """Decides with the settings and the vehicle's geometry; holds no state."""
 
-    def __init__(self, settings: Safety, vehicle: Vehicle) -> None:
+    def __init__(self, settings: SafetyConfig) -> None:
         self.settings = settings
-        self.planner = Planner(settings, vehicle)
+        self.planner = Planner(settings)
         self._sonar_filter = SonarFilter(self.planner.zones.axes, settings.times.ultrasonic_age)
         self._supervisor = Supervisor(settings)
 
@@ -73,8 +72,8 @@ class Policy:
         settings = self.settings
         return State(
             Arbiter(settings.leased),
-            SpeedLimits(settings.limits),
-            Keepalives(settings.estop_keepalive, settings.estop_keepalive_timeout),
+            SpeedLimits(settings.safety.limits),
+            Keepalives(settings.safety.estop_keepalive, settings.safety.estop_keepalive_timeout),
         )
 
     def accept(self, state: State, request: SourceRequest, now_ns: int) -> tuple[State, str]:
@@ -95,7 +94,7 @@ class Policy:
                 state = replace(state, speed_limits=limits, arbiter=arbiter)
                 return state, refused and f"limit_{refused}"
             case _:
-                checked = self._admission(state, settings.estop_keepalive_timeout, now_ns)
+                checked = self._admission(state, settings.safety.estop_keepalive_timeout, now_ns)
                 keepalives, refused = state.keepalives.accept(request, checked)
                 return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
 
@@ -187,7 +186,7 @@ class Policy:
             neutral = {
                 # 1 equivalent mutant: both are before any fault.
                 name: arbiter.channels[name].neutral_ns or 0
-                for name in self.settings.operators & arbiter.requesting_zero(now_ns)
+                for name in self.settings.safety.operators & arbiter.requesting_zero(now_ns)
             }
             overrides = overrides.updated(state.sonar_array.unseen, neutral, now_ns)
         return replace(state, arbiter=arbiter.overruled(now_ns), overrides=overrides)

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from common.motion import Twist, clamp
+from common.settings import Vehicle
 from services.teleop.config import Teleop
 from services.teleop.core.hold import RULES, Deadman, Keys, Press
 from services.teleop.core.round_trip import RoundTrip
@@ -33,6 +34,7 @@ from t2.client import DriveRequests, Phase, request
 from t2.messages import Direction, Drive
 
 MAX_PRESS_AGE_S = 0.5
+EXPO = 0.5  # of a stick: 0 is straight, 1 is cubic
 ESTOP, RESET, STOP, ACKNOWLEDGE = "e", "r", "space", "enter"
 RELEASE: dict[str, Direction] = {"f": "forward", "b": "backward"}
 GEARS = {"1": 1, "2": 2, "3": 3, "4": 4, "5": 5}
@@ -85,13 +87,13 @@ class Action(Enum):
 class Controls:
     """Held keys and gamepad; ``tick`` runs at the request rate."""
 
-    def __init__(self, settings: Teleop) -> None:
+    def __init__(self, settings: Teleop, vehicle: Vehicle) -> None:
         self.gear = 1
         self.terminal = RoundTrip(settings.round_trip)
         self.is_gamepad_silent = False  # deflected without a change; until its deadman is up
-        self._settings = settings
-        self._keys = Keys(settings.hold_first, settings.hold)
-        self._deadman = Deadman(settings.gamepad_silence)
+        self._settings, self._vehicle = settings, vehicle
+        self._keys = Keys(settings.hold_first)
+        self._deadman = Deadman()
         self._by_gamepad = False  # whether a stick moves the vehicle
         self._requests = DriveRequests()
 
@@ -149,7 +151,7 @@ class Controls:
 
     def top(self) -> Twist:
         """Return the twist of full deflection."""
-        return twist(Deflection(1, 1), self.gear, self._settings)
+        return twist(Deflection(1, 1), self.gear, self._vehicle)
 
     def tick(self, stick: Stick | None, now_ns: int) -> Drive | None:
         """Return the request to send now, or None; ``stick`` is None without a gamepad."""
@@ -170,7 +172,7 @@ class Controls:
             return self._moving(deflection(keys))
         if stick is None or not self._deadman.is_held:
             return None
-        push = shaped(stick.push, self._settings.deadzone, self._settings.expo)
+        push = shaped(stick.push, self._settings.deadzone)
         moves = push != Deflection()
         self.is_gamepad_silent = moves and self._deadman.is_silent(now_ns)
         if self.is_gamepad_silent:
@@ -181,7 +183,7 @@ class Controls:
         return self._moving(push)
 
     def _moving(self, push: Deflection) -> Drive:
-        moves = twist(push, self.gear, self._settings)
+        moves = twist(push, self.gear, self._vehicle)
         return request(moves.linear, moves.angular)
 
 
@@ -194,17 +196,17 @@ def deflection(held: Iterable[str]) -> Deflection:
     )
 
 
-def shaped(raw: Deflection, deadzone: float, expo: float) -> Deflection:
+def shaped(raw: Deflection, deadzone: float) -> Deflection:
     """Return a stick's deflection after deadzone and expo curve; full deflection stays 1."""
-    return Deflection(_shape(raw.linear, deadzone, expo), _shape(raw.angular, deadzone, expo))
+    return Deflection(_shape(raw.linear, deadzone), _shape(raw.angular, deadzone))
 
 
-def twist(push: Deflection, gear: int, settings: Teleop) -> Twist:
+def twist(push: Deflection, gear: int, vehicle: Vehicle) -> Twist:
     """Return the twist of a deflection in a gear, 1 to 5."""
-    linear, angular = settings.gears_linear[gear - 1], settings.gears_angular[gear - 1]
+    linear, angular = vehicle.gears_linear[gear - 1], vehicle.gears_angular[gear - 1]
     return Twist(push.linear * linear, push.angular * angular)
 
 
-def _shape(raw: float, deadzone: float, expo: float) -> float:
+def _shape(raw: float, deadzone: float) -> float:
     linear = max(0.0, min(1.0, (abs(raw) - deadzone) / (1.0 - deadzone)))
-    return math.copysign(expo * linear**3 + (1.0 - expo) * linear, raw)
+    return math.copysign(EXPO * linear**3 + (1.0 - EXPO) * linear, raw)

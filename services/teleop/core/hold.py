@@ -2,7 +2,7 @@
 
 A terminal sends a key when it goes down and again while it stays down, but nothing when it comes
 up. A key is therefore held until a deadline: ``hold_first`` seconds after its first press (most
-terminals send the first repeat after half a second) and ``hold`` seconds after each repeat. A
+terminals send the first repeat after half a second) and ``HOLD_S`` after each repeat. A
 gamepad's deadman button reports both edges, but it counts only after it was seen up.
 
 Each of these rules releases controls that are still held down (``RULES``):
@@ -19,7 +19,7 @@ unheard        no state of safety for a second, or the      after a pause      a
                program was suspended
 overruled      another source drives for half a second      after a pause      after it was up
 gamepad_silent deflected stick, reading unchanged for       not released       after it was up
-               ``gamepad_silence``
+               ``GAMEPAD_SILENCE_S``
 gamepad_gone   no gamepad, or a screen or terminal that     not released       after it was up
                hangs
 ============== ============================================ ================== ==================
@@ -40,6 +40,9 @@ from typing import NamedTuple
 
 from common.freshness import NS_PER_S
 from t2.messages import SafetyState
+
+HOLD_S = 0.3  # that a repeat drives
+GAMEPAD_SILENCE_S = 2.0  # without a change; the page's gamepad.js has the same
 
 
 class Again(Enum):
@@ -84,9 +87,9 @@ class Press:
 class Keys:
     """The held keys, by deadlines."""
 
-    def __init__(self, first_s: float, repeat_s: float) -> None:
+    def __init__(self, first_s: float) -> None:
         self._first_ns = round(first_s * NS_PER_S)
-        self._repeat_ns = round(repeat_s * NS_PER_S)
+        self._repeat_ns = round(HOLD_S * NS_PER_S)
         self._until_ns: dict[str, int] = {}
         self._muted_until_ns = 0
 
@@ -121,11 +124,10 @@ class Keys:
 class Deadman:
     """A gamepad's button that enables motion while it is down, and the changes of its reading."""
 
-    def __init__(self, silence_s: float) -> None:
+    def __init__(self) -> None:
         self.is_held = False
         # 1 equivalent mutant: None is as false as False.
         self._seen_up = False
-        self._silence_s = silence_s
         # 1 equivalent mutant: any value that is no number of changes.
         self._events: int | None = None
         # 2 equivalent mutants: the first ``update`` sets it.
@@ -144,11 +146,11 @@ class Deadman:
 
     def is_due(self, now_ns: int) -> bool:
         """Return whether the operator should move the stick to keep driving."""
-        return self._quiet_s(now_ns) > self._silence_s / 2
+        return self._quiet_s(now_ns) > GAMEPAD_SILENCE_S / 2
 
     def is_silent(self, now_ns: int) -> bool:
         """Return whether a deflected stick may no longer drive."""
-        return self._quiet_s(now_ns) > self._silence_s
+        return self._quiet_s(now_ns) > GAMEPAD_SILENCE_S
 
     def _quiet_s(self, now_ns: int) -> float:
         return (now_ns - self._event_ns) / NS_PER_S

@@ -248,7 +248,7 @@ def test_a_row_of_clear_samples_begins_anew_after_a_gap(
 
 @pytest.mark.parametrize("echoes", [True, False])
 def test_a_board_that_restarts_disarms_at_once(echoes: bool) -> None:
-    unsafe = "bridge.require_switches=false", "bridge.unsafe_overrides=require_switches"
+    unsafe = "board.require_switches=false", "unsafe_overrides=board.require_switches"
     bench = Bench(*(() if echoes else unsafe))
     bench.arm()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]

@@ -9,7 +9,7 @@ from common.motion import BRAKE, STOP
 from common.settings import Vehicle, Wire
 from common.wire import framing
 from common.wire.commands import MotionCommand, MotionKind
-from services.bridge.config import Bridge
+from services.bridge.config import BridgeConfig
 from services.bridge.core.lease import Lease
 from services.bridge.core.motion_output import MotionOutput
 from services.bridge.core.output import Event, Send
@@ -17,7 +17,7 @@ from services.bridge.core.translate import Translator
 from t2.messages import Command, Mileage, Motion, Velocity
 from tests.bridge.core.core_fixture import BOOT, MS, NOW, SAFETY
 
-SETTINGS = Bridge(deceleration=0.6, angular_deceleration=2.0)
+CONFIG = BridgeConfig(vehicle=Vehicle(deceleration=0.6, angular_deceleration=2.0))
 END = NOW + 200 * MS + 1  # of a lease from NOW on
 UNCOMMANDED = Event("uncommanded_motion", "error")
 
@@ -26,8 +26,8 @@ class Output:
     """A motion output whose lease began at NOW."""
 
     def __init__(self) -> None:
-        translator = Translator(Wire(), Vehicle(), 1.0, 1.0)
-        self.made = MotionOutput(SETTINGS, translator, boot=BOOT, counters=Counter(), now_ns=NOW)
+        translator = Translator(Wire(), Vehicle())
+        self.made = MotionOutput(CONFIG, translator, boot=BOOT, counters=Counter(), now_ns=NOW)
         self.seq = 0
         self.events: list[Event] = []
         self.renew(NOW)

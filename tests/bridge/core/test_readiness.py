@@ -19,7 +19,7 @@ from tests.bridge.core.core_fixture import MS, STANDS, Bench, events, frames, mo
 
 SILENCE = 200 * MS
 CONFIGURED = "board.relay_port=4010"
-WITHOUT_ECHOES = "bridge.require_switches=false", "bridge.unsafe_overrides=require_switches"
+WITHOUT_ECHOES = "board.require_switches=false", "unsafe_overrides=board.require_switches"
 
 
 @pytest.fixture
@@ -178,7 +178,7 @@ def test_both_must_be_on_and_echoed_unless_the_settings_accept_a_firmware_withou
 
 def test_a_board_without_echoes_is_reported_once_with_the_setting_that_helps(bench: Bench) -> None:
     bench.receive(STANDS)
-    hint = " A firmware that confirms nothing needs bridge.require_switches = false."
+    hint = " A firmware that confirms nothing needs board.require_switches = false."
     for _ in range(25):
         bench.receive(STANDS)
         assert events(bench.tick(20 * MS)) == []

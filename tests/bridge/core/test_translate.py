@@ -29,7 +29,7 @@ from t2.messages import Command, Mileage, Motion
 
 @pytest.fixture
 def by_manual() -> Translator:
-    return Translator(Wire(), Vehicle(), 1.0, 1.0)
+    return Translator(Wire(), Vehicle())
 
 
 def run(linear: float, angular: float) -> Motion:
@@ -66,14 +66,14 @@ def test_each_way_has_a_unit_of_its_own(
     command: AngularUnit, feedback: AngularUnit, raw: int, angular: float
 ) -> None:
     wire = Wire(command_angular_unit=command, feedback_angular_unit=feedback)
-    mixed = Translator(wire, Vehicle(), 1.0, 1.0)
+    mixed = Translator(wire, Vehicle())
     assert mixed.run(run(0.0, 0.3)).angular_raw == raw
     assert mixed.velocity(VelocityReport(0, 300)).angular == pytest.approx(angular)
 
 
 @given(st.integers(-5000, 5000), st.integers(-5729, 5729))
 def test_velocities_come_back_as_they_went(linear_mmps: int, angular_raw: int) -> None:
-    free = Translator(Wire(), Vehicle(), 100.0, 100.0)
+    free = Translator(Wire(), Vehicle(max_linear=100.0, max_angular=100.0))
     velocity = free.velocity(VelocityReport(linear_mmps, angular_raw))
     frame = free.run(run(velocity.linear, velocity.angular))
     assert (frame.linear_mmps, frame.angular_raw) == (linear_mmps, angular_raw)
@@ -91,7 +91,7 @@ def test_a_velocity_that_no_vehicle_has_is_refused(
 
 def test_the_fastest_plausible_velocity_is_taken() -> None:
     by_driver = Wire(feedback_angular_unit="milliradian")
-    velocity = Translator(by_driver, Vehicle(), 1.0, 1.0).velocity(VelocityReport(-5000, 10_000))
+    velocity = Translator(by_driver, Vehicle()).velocity(VelocityReport(-5000, 10_000))
     assert (velocity.linear, velocity.angular) == (-5.0, 10.0)
 
 

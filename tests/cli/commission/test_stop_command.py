@@ -21,8 +21,8 @@ from tests.recorder.samples import bare
 PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
          "mileages": "tel/bridge/mileage"}  # fmt: skip
 CAREFUL = (
-    *("--set", "safety.react=0.4", "--set", "safety.deceleration=0.5"),
-    *("--set", "safety.angular_deceleration=0.5"),
+    *("--set", "safety.react=0.4", "--set", "vehicle.deceleration=0.5"),
+    *("--set", "vehicle.angular_deceleration=0.5"),
 )
 
 
@@ -75,9 +75,9 @@ def test_stops_within_what_safety_reckons_with(
     assert "STOP backward" in printed
     assert "STOP right" in printed
     assert "The worst is stop " in printed
-    assert "m/s2 (safety.deceleration is 0.5 m/s2). The fastest" in printed
+    assert "m/s2 (vehicle.deceleration is 0.5 m/s2). The fastest" in printed
     assert "The fastest stop is from 1.00 m/s; safety allows 1 m/s.\n" in printed
-    assert "rad/s2 (safety.angular_deceleration is 0.5 rad/s2). The fastest" in printed
+    assert "rad/s2 (vehicle.angular_deceleration is 0.5 rad/s2). The fastest" in printed
     assert printed.endswith("No stop was longer than safety reckons with.\n")
     assert not errors
 

@@ -6,20 +6,23 @@ import pytest
 from cli.demo import host_stalls
 from cli.settings import Everything
 from common.config import Sources, load
+from services.bridge.config import BridgeConfig
+from services.safety.config import SafetyConfig
 
 
 @pytest.mark.parametrize(("stall_s", "allowed_s"), [(0.051, 0.3), (0.34, 0.34), (5.0, 1.0)])
 def test_every_limit_is_longer(stall_s: float, allowed_s: float) -> None:
     sets = host_stalls.settings(stall_s)
     config = load(Everything, Sources(environ={}, sets=sets)).config
-    assert config.safety.stall == config.bridge.stall == allowed_s
-    for times in (config.safety.times, config.bridge.times):
+    assert config.host.stall == allowed_s
+    safety = SafetyConfig(host=config.host)
+    for times in (safety.times, BridgeConfig(host=config.host).times):
         assert msgspec.structs.asdict(times) == {
             name: value + 3 * allowed_s
             for name, value in msgspec.structs.asdict(type(times)()).items()
         }
-    assert config.safety.leased["nav"].lease == 0.2 + 3 * allowed_s
-    assert config.safety.reaction == 0.25 + 2 * allowed_s
+    assert safety.leased["nav"].lease == 0.2 + 3 * allowed_s
+    assert safety.reaction == 0.25 + 2 * allowed_s
 
 
 def test_a_short_stall_changes_nothing() -> None:
@@ -39,13 +42,14 @@ def test_the_longest_excess_of_a_sleep_is_measured(monkeypatch: pytest.MonkeyPat
 
 
 def test_unsafe_overrides_of_host_and_caller_are_joined() -> None:
-    sets = host_stalls.with_accepted_joined(
+    sets = host_stalls.with_overrides_joined(
         [
-            "safety.unsafe_overrides=linear_acceleration",
+            "unsafe_overrides=safety.linear_acceleration",
             "safety.linear_acceleration=5",
             *host_stalls.settings(0.5),
         ]
     )
-    safety = load(Everything, Sources(environ={}, sets=sets)).config.safety
-    assert safety.linear_acceleration == 5
-    assert set(safety.unsafe_overrides) == {"linear_acceleration", "stall"}
+    config = load(Everything, Sources(environ={}, sets=sets)).config
+    assert config.safety.linear_acceleration == 5
+    wanted = {"safety.linear_acceleration", "host.stall", "bus.lease"}
+    assert set(config.unsafe_overrides) == wanted

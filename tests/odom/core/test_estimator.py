@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
 from services.odom.config import Odom
+from services.odom.core import estimator
 from services.odom.core.estimator import SEGMENTS_MAX, START, Estimator, SlipDetector
+from services.odom.core.noise import HOLD_S
 from services.odom.core.pose import ArcSegment, Pose
 from t2.messages import Velocity
 from tests.odom.core.odom_fixture import (
@@ -99,7 +101,7 @@ def test_a_long_gap_of_the_counters_is_bounded_and_exact() -> None:
 def test_a_velocity_is_valid_for_its_hold() -> None:
     assert Estimator(Odom()).estimate(NS_PER_S) is None
     odom = driving()
-    hold_ns = round(Odom().hold * NS_PER_S)
+    hold_ns = round(HOLD_S * NS_PER_S)
     odometry = odom.odometry(hold_ns)
     assert (odometry.linear, odometry.angular) == (0.8, 0.3)
     assert odometry.twist_covariance == (0.02**2, 0.0, 0.0, 0.02**2)
@@ -153,7 +155,7 @@ def test_a_restart_does_not_move_the_pose(changes: dict[str, float], pause: int)
     odom.board.now_ns += pause * TICK_NS
     before = odom.estimator._predicted.pose
     assert odom.update(velocity=False) is True
-    held_s = min(pause * TICK_NS / NS_PER_S, Odom().hold)
+    held_s = min(pause * TICK_NS / NS_PER_S, HOLD_S)
     held = before.moved(0.8 * held_s, 0.3 * held_s)
     assert apart(odom.estimator._corrected.pose, held) == EXACT
     odom.board.truth = held
@@ -197,7 +199,7 @@ def arc(distance: float, turn: float = 0.0, *, seen: bool = True) -> ArcSegment:
 
 def compared(ticks: int, counted: ArcSegment, integrated: ArcSegment) -> SlipDetector:
     """Return a detector of so many samples."""
-    detector = SlipDetector(Odom(slip_distance=0.1, slip_turn=0.2))
+    detector = SlipDetector()
     for tick in range(1, ticks + 1):
         detector.add(tick * TICK_NS, counted, integrated)
     detector.update(ticks * TICK_NS)
@@ -216,7 +218,7 @@ def test_slip_by_distance_or_by_turn(sign: int, counted: float, turned: float, s
 
 
 def test_before_the_first_comparison_nothing_slips() -> None:
-    detector = SlipDetector(Odom())
+    detector = SlipDetector()
     assert detector.slip is False
     assert detector.residual is None
 
@@ -229,8 +231,12 @@ def test_only_the_last_second_is_compared() -> None:
 
 
 @pytest.mark.parametrize("counted", [arc(1 / 64), arc(0.0, 1 / 64)])
-def test_slip_falls_at_half_of_its_limit(counted: ArcSegment) -> None:
-    detector, slips = SlipDetector(Odom(slip_distance=0.125, slip_turn=0.125)), []
+def test_slip_falls_at_half_of_its_limit(
+    counted: ArcSegment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for limit in ("SLIP_M", "SLIP_RAD"):
+        monkeypatch.setattr(estimator, limit, 0.125)  # a binary fraction adds up exactly
+    detector, slips = SlipDetector(), []
     for tick in range(1, 10):
         detector.add(tick * TICK_NS, counted, arc(0.0))
     for samples_left in (9, 5, 4):

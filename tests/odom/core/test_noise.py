@@ -13,14 +13,11 @@ from t2.messages import Mileage
 from tests.odom.core.odom_fixture import OdomFixture, started
 
 ODOM = Odom(
-    hold=0.1,
     distance_noise=0.011,
     turn_noise=0.023,
     drift_noise=0.017,
     velocity_noise=0.029,
     angular_noise=0.031,
-    gap_noise=0.2,
-    gap_turn_noise=0.3,
 )
 ONE_STEP = (
     Odom().distance_noise ** 2 * COUNTER_STEP_M,

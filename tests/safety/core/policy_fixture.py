@@ -6,8 +6,7 @@ import msgspec
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
-from common.settings import Vehicle
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from services.safety.core import operator_requests
 from services.safety.core.causes import latched
 from services.safety.core.inputs import (
@@ -66,8 +65,8 @@ BUMPER_FREE = render(operator_requests.BUMPER_FREE)
 class PolicyFixture:
     """Feeds all streams at every tick unless muted; the vehicle moves as commanded."""
 
-    def __init__(self, settings: Safety | None = None) -> None:
-        self.policy = Policy(settings or Safety(), Vehicle())
+    def __init__(self, settings: SafetyConfig | None = None) -> None:
+        self.policy = Policy(settings or SafetyConfig())
         self.state = self.policy.start()
         self.now_ns = 10 * NS_PER_S
         self.inputs = Inputs()

@@ -7,9 +7,9 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
-from common.settings import Vehicle
+from common.settings import Board
 from common.standstill import Displacement
-from services.safety.config import LimitSource, Safety
+from services.safety.config import LimitSource, SafetyConfig
 from services.safety.core.causes import Held, Observation
 from services.safety.core.conditions import observe_inputs
 from services.safety.core.inputs import Inputs
@@ -30,7 +30,7 @@ from tests.factories import link, safety_state
 NOW_NS = 100 * NS_PER_S
 BOOT, SEQ, OWN = 7, 40, 5
 STAMP: dict[str, int] = {"boot": BOOT, "seq": SEQ}
-SETTINGS = Safety()
+SETTINGS = SafetyConfig()
 LIDAR = LimitSource(lease=0.5, silence="stop")
 
 
@@ -50,11 +50,11 @@ GOOD = Inputs(
     estop_path=newest(safety_state()),
     boot=OWN,
 )
-STATE = Policy(SETTINGS, Vehicle()).start()
+STATE = Policy(SETTINGS).start()
 
 
 def observed(
-    inputs: Inputs, state: State = STATE, settings: Safety = SETTINGS
+    inputs: Inputs, state: State = STATE, settings: SafetyConfig = SETTINGS
 ) -> list[Observation]:
     """Return the observations, absent ones without their text, which nobody reads."""
     return [
@@ -166,7 +166,7 @@ def test_an_input_raises_its_cause(changes: dict[str, Any], name: str, text: str
     (switched(None, False), "switches"), (switched(True, True, 3.01), "silent"),
 ])  # fmt: skip
 def test_unneeded_switches_raise_nothing(changes: dict[str, Any], name: str) -> None:
-    lax = Safety(require_switches=False, unsafe_overrides=("require_switches",))
+    lax = SafetyConfig(board=Board(require_switches=False))
     check(name, None, replace(GOOD, **changes), STATE, lax)
 
 
@@ -199,7 +199,7 @@ BY_STATE: list[tuple[dict[str, Any], str, str | None]] = [
     (stands(**LATE), "not_stopping", "Standstill is not confirmed: no velocity is received."),
     (stands(**LATE, displacement=Displacement(steady=Twist(0.25, -0.5))), "not_stopping",
      "The vehicle does not stop: 0.25 m/s, -0.50 rad/s."),
-    ({"arbiter": Arbiter(SETTINGS.sources, {"teleop": DriveChannel(**TWICE)}),
+    ({"arbiter": Arbiter(SETTINGS.safety.sources, {"teleop": DriveChannel(**TWICE)}),
       "speed_limits": SpeedLimits({"lidar": LIDAR}, {"lidar": LimitChannel(**TWICE)})},
      "two_publishers", "Two publishers use teleop, limit lidar."),
 ]  # fmt: skip

@@ -6,7 +6,8 @@ import pytest
 
 from common.freshness import NS_PER_S
 from common.motion import STILL
-from services.safety.config import Safety
+from common.settings import Board
+from services.safety.config import SafetyConfig
 from services.safety.core.inputs import DriveRequest
 from t2.messages import Drive, Switches
 from t2.words import render
@@ -158,8 +159,8 @@ def test_more_lost_bumper_polls_stop_until_half_a_second_and_a_neutral_request()
 
 
 def test_a_board_without_echoes_can_be_driven_where_that_is_accepted() -> None:
-    accepted = Safety(require_switches=False, unsafe_overrides=("require_switches",))
-    for settings, command in ((accepted, "run"), (Safety(), "stop")):
+    accepted = SafetyConfig(board=Board(require_switches=False))
+    for settings, command in ((accepted, "run"), (SafetyConfig(), "stop")):
         fixture = PolicyFixture(settings)
         fixture.muted = {"switches"}
         fixture.tick(40)

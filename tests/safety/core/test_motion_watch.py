@@ -1,14 +1,16 @@
 """Motion watch: runaway on one axis, and the phases of a standstill."""
 
 import math
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.motion import STILL, Twist
+from common.settings import Vehicle
 from common.standstill import GRACE_NS
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from services.safety.core.motion_watch import (
     CONFIRM_NS,
     Bounds,
@@ -23,7 +25,7 @@ from tests.safety.core.policy_fixture import TICK_S
 
 TICK_NS = round(TICK_S * NS_PER_S)
 BOUNDS = Bounds(deceleration=0.6, tolerance=0.3, against=0.1, patience_s=0.3)
-SETTINGS = Safety()  # slows down at 0.6 m/s^2 and 1.0 rad/s^2
+SETTINGS = SafetyConfig()  # slows down at 0.6 m/s^2 and 1.0 rad/s^2
 
 
 def follow(axis: Runaway, commanded: float, measured: float, seconds: float) -> Runaway:
@@ -70,7 +72,7 @@ def test_bad_time_is_forgiven_half_as_fast_and_is_capped() -> None:
 class Board:
     """A vehicle for the supervisor: velocities and counters by hand."""
 
-    def __init__(self, settings: Safety = SETTINGS) -> None:
+    def __init__(self, settings: SafetyConfig = SETTINGS) -> None:
         self.watch = MotionWatch()
         self.now_ns = 10 * NS_PER_S
         self.distance = self.heading = 0.0
@@ -139,8 +141,8 @@ def test_time_to_stop_by_speed(linear: float, angular: float, due_s: float) -> N
 
 
 @pytest.mark.parametrize("slow", [{"deceleration": 0.1}, {"angular_deceleration": 0.1}])
-def test_time_to_stop_is_at_most_3_s(slow: dict[str, float]) -> None:
-    board = Board(replace(SETTINGS, **slow))
+def test_time_to_stop_is_at_most_3_s(slow: dict[str, Any]) -> None:
+    board = Board(replace(SETTINGS, vehicle=Vehicle(sonar_max=20.0, **slow)))
     board.step(1.0, 1.0, moves=True)
     board.run(3.0, 1.0, 1.0)
     assert not board.late()
@@ -152,7 +154,7 @@ def test_time_to_stop_is_at_most_3_s(slow: dict[str, float]) -> None:
 def test_an_unknown_velocity_counts_as_the_fastest(
     linear: float, angular: float, stop_s: float
 ) -> None:
-    board = Board(replace(SETTINGS, max_linear=linear, max_angular=angular))
+    board = Board(replace(SETTINGS, vehicle=Vehicle(max_linear=linear, max_angular=angular)))
     board.step(None, moves=True)
     board.step(None)
     assert board.state.due_ns == board.now_ns + round(stop_s * NS_PER_S) + GRACE_NS

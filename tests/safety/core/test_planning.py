@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from common.motion import RUN, STILL, Twist
 from common.settings import Vehicle, sonar_mounts
-from services.safety.config import Safety
+from services.safety.config import Safety, SafetyConfig
 from services.safety.core.causes import Held
 from services.safety.core.planning import (
     GRAZING,
@@ -34,13 +34,12 @@ twists = st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 
 @pytest.fixture(scope="module")
 def field() -> Zones:
-    return zones(Vehicle(), Safety())
+    return zones(SafetyConfig())
 
 
 def test_the_field_is_that_of_the_vehicle_and_the_settings() -> None:
-    vehicle = Vehicle(length=1.2, width=0.8)
-    settings = Safety(margin=0.3, react=0.2, deceleration=0.5)
-    field = zones(vehicle, settings)
+    vehicle = Vehicle(length=1.2, width=0.8, deceleration=0.5)
+    field = zones(SafetyConfig(vehicle=vehicle, safety=Safety(margin=0.3, react=0.2)))
     assert (field.margin, field.react, field.deceleration) == (0.3, 0.2, 0.5)
     assert field.angular_deceleration == 1.0
     assert [axis.swing for axis in field.axes] == [0.6, 0, 0, 0, 0.6, 0, 0, 0]
@@ -247,13 +246,13 @@ def test_a_ramp_begins_with_what_is_wanted_of_the_motion(
 
 
 def planner() -> Planner:
-    return Planner(Safety(), Vehicle())
+    return Planner(SafetyConfig())
 
 
 def under_way(sent: Twist, seen: tuple[float, ...]) -> State:
     """Return a state in which a twist was sent, and the sonars see these distances."""
     sonars = tuple(Sonar(distance=one, fault="") for one in seen)
-    state = Policy(Safety(), Vehicle()).start()
+    state = Policy(SafetyConfig()).start()
     verdict = Verdict(command=RUN, twist=sent)
     return replace(state, verdict=verdict, sonar_array=SonarArray(sonars))
 

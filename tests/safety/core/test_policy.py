@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
-from services.safety.config import Safety
+from services.safety.config import SafetyConfig
 from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
 from services.safety.core.inputs import DriveRequest, Inputs
 from t2.messages import (
@@ -331,7 +331,7 @@ def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
 @pytest.mark.parametrize(("late_ns", "command"), [(0, "run"), (1, "stop")])
 def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str) -> None:
     fixture = PolicyFixture().running()
-    fixture.now_ns += round(Safety().times.bumper_age * NS_PER_S) + late_ns
+    fixture.now_ns += round(SafetyConfig().times.bumper_age * NS_PER_S) + late_ns
     fixture.feed()
     fixture.state = replace(fixture.state, heartbeat=fixture.state.heartbeat.beat(fixture.now_ns))
     assert fixture.request(0.5).command == command

@@ -1,9 +1,11 @@
 """Speed limits and kept emergency stops of third parties through the whole decision."""
 
+from typing import Any
+
 import pytest
 
 from common.motion import STILL
-from services.safety.config import LimitSource, Safety
+from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.core.inputs import LimitRequest
 from t2.messages import Limit
 from t2.words import render
@@ -14,9 +16,15 @@ SOURCES = {
     "lidar": LimitSource(lease=LEASE_S, silence="stop"),
     "fleet": LimitSource(lease=LEASE_S, silence="ignore"),
 }
-IGNORED = Safety(limits={"lidar": LimitSource(lease=LEASE_S, silence="ignore")})
-NEEDED = Safety(limits=SOURCES)
-KEPT = Safety(estop_keepalive=("pendant",))
+
+
+def configured(**settings: Any) -> SafetyConfig:
+    return SafetyConfig(safety=Safety(**settings))
+
+
+IGNORED = configured(limits={"lidar": LimitSource(lease=LEASE_S, silence="ignore")})
+NEEDED = configured(limits=SOURCES)
+KEPT = configured(estop_keepalive=("pendant",))
 
 
 def test_a_cap_that_falls_is_reached_at_the_normal_deceleration() -> None:

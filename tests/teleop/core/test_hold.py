@@ -6,9 +6,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
 
 from common.freshness import NS_PER_S
+from common.settings import Vehicle
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
-from services.teleop.core.hold import RULES, Deadman, Keys, Press
+from services.teleop.core.hold import GAMEPAD_SILENCE_S, HOLD_S, RULES, Deadman, Keys, Press
 from t2.client import NEUTRAL, ZEROS
 
 
@@ -28,7 +29,7 @@ def at(seconds: float) -> int:
 def test_deadlines_of_keys(
     presses: list[tuple[str, float]], held: dict[float, str], released: float
 ) -> None:
-    keys = Keys(first_s=0.6, repeat_s=0.3)
+    keys = Keys(first_s=0.6)
     assert not keys.is_muted(0)
     for key, at_s in presses:
         keys.press(key, at(at_s))
@@ -38,7 +39,7 @@ def test_deadlines_of_keys(
 
 
 def test_a_deadman_counts_after_it_was_up() -> None:
-    deadman = Deadman(silence_s=1.0)
+    deadman = Deadman()
     assert deadman.is_held is False
     for down, held in ((True, False), (False, False), (True, True)):
         deadman.update(down, 0, 0)
@@ -73,7 +74,7 @@ class Hold(RuleBasedStateMachine):
     def __init__(self) -> None:
         super().__init__()
         self.settings = Teleop()
-        self.controls = Controls(self.settings)
+        self.controls = Controls(self.settings, Vehicle())
         self.now_ns = at(100)
         self.until_ns: dict[str, int] = {}  # the last moment at which a key may drive
         self.counts_ns = 0  # when keys count again
@@ -93,7 +94,7 @@ class Hold(RuleBasedStateMachine):
             self.counts_ns = self.now_ns + at(self.settings.hold_first)
             return
         repeats = self.now_ns < self.until_ns.get(key, 0)
-        hold_s = self.settings.hold if repeats else self.settings.hold_first
+        hold_s = HOLD_S if repeats else self.settings.hold_first
         self.until_ns[key] = self.now_ns + at(hold_s)
 
     @rule(name=st.sampled_from(sorted(EXPECTED)))
@@ -131,7 +132,7 @@ class Hold(RuleBasedStateMachine):
         self.was_up = self.stick is not None and (self.was_up or not self.stick.deadman)
         by_stick = self.stick is not None and self.stick.deadman and self.was_up
         push = self.stick.push.linear if self.stick else 0.0
-        is_late = self.now_ns - self.moved_ns > at(self.settings.gamepad_silence)
+        is_late = self.now_ns - self.moved_ns > at(GAMEPAD_SILENCE_S)
         if by_stick and not by_keys and abs(push) > self.settings.deadzone and is_late:
             by_stick = self.was_up = False
         is_held = bool(by_keys) or by_stick
