@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import re
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +22,6 @@ EXIT_CONFIG = 78  # EX_CONFIG: a restart does not help
 EXIT_LINK = 69  # EX_UNAVAILABLE: a port or an endpoint is taken
 NO_RESTART = (EXIT_CONFIG, EXIT_LINK)
 EXIT_CODES = {ConfigError: EXIT_CONFIG, LinkError: EXIT_LINK}  # of other errors: 1
-HINT = re.compile(r"(?<=`)t2 (call |doctor|drive|echo|estop|health|hz|ls|robots)\b[^`]*")
 WIDTH = 100  # characters, of a service's help
 
 
@@ -70,9 +68,9 @@ def source_words(options: argparse.Namespace) -> list[str]:
     return files + [word for text in options.sets for word in ("--set", text)]
 
 
-def with_options(text: str, words: Sequence[str]) -> str:
-    """Return the text with these options in each command of the bus, such as `t2 doctor`."""
-    return HINT.sub(lambda found: " ".join([found[0], *map(shlex.quote, words)]), text)
+def hint(command: str, words: Sequence[str]) -> str:
+    """Return a command of ``t2`` to paste, with the options that name sources of settings."""
+    return f"`{shlex.join(['t2', command, *words])}`"
 
 
 def add_setting(parser: argparse.ArgumentParser, option: str, path: str, text: str) -> None:
@@ -97,8 +95,7 @@ def run_program(
     try:
         return run(options)
     except T2Error as error:
-        text = with_options(str(error), source_words(options) if "sets" in options else ())
-        print(printable(f"{name}: {text}", "\n"), file=sys.stderr)  # noqa: T201 - logs may not be set up yet
+        print(printable(f"{name}: {error}", "\n"), file=sys.stderr)  # noqa: T201 - logs may not be set up yet
         return EXIT_CODES.get(type(error), 1)
 
 

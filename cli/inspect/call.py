@@ -69,7 +69,8 @@ def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace
     for answer in answers:
         output.value(read(answer.payload, answer.encoding).value, as_json=options.json)
     if seen and call is keys.RESET and not client.is_reset(seen, answers):
-        raise T2Error("not confirmed: safety's state does not show this reset; run `t2 doctor`")
+        text = "not confirmed: safety's state does not show this reset"
+        raise T2Error(f"{text}; run {client.probe.doctor}")
 
 
 def known(word: str) -> Call[Any, Any]:

@@ -148,7 +148,8 @@ class SafetyClient:
         self.forget()
         if not self.until(lambda: self.state, STATE_S) or self.state is None:
             raise T2Error(
-                f"no state of safety within {STATE_S:g} s: is safety running? run `t2 doctor`"
+                f"no state of safety within {STATE_S:g} s: is safety running? "
+                f"run {self.probe.doctor}"
             )
         return self.state
 
@@ -182,4 +183,6 @@ class SafetyClient:
         """
         runs = services(self.probe, self.robot, call.server)
         barred = runs and not self.probe.has_server(key)
-        return (not_allowed if barred else no_answer)(call.server).text
+        if barred:
+            return not_allowed(call.server).text
+        return no_answer(call.server, self.probe.doctor).text

@@ -6,6 +6,7 @@ nothing.
 """
 
 import argparse
+import shlex
 import socket
 import ssl
 import time
@@ -24,7 +25,7 @@ from cli.inspect.estop import is_barred
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
 from common.bus.probe import Probe, probe
 from common.bus.session import common_name
-from common.cli_args import VERSION, source_words, with_options
+from common.cli_args import VERSION, source_words
 from common.freshness import NS_PER_S
 from common.settings import BusSettings, Shared
 from common.text import printable
@@ -66,10 +67,12 @@ def run(options: argparse.Namespace) -> int:
     """Print all findings; return 1 if something is wrong."""
     wrong, robot = 0, ["--robot", options.robot] if options.robot else []
     for found in findings(settings(options), options.duration):
-        finding = replace(found, todo=with_options(found.todo, [*robot, *source_words(options)]))
-        wrong += finding.level == "wrong"
-        output.line(asdict(finding)) if options.json else print(as_text(finding), flush=True)
+        wrong += found.level == "wrong"
+        output.line(asdict(found)) if options.json else print(as_text(found), flush=True)
+    words = [*robot, *source_words(options)]
     if not options.json:
+        if wrong and words:
+            print(f"\nFor commands of t2 these options: {shlex.join(words)}")
         print(f"\n{wrong or 'No'} problem{'s' * (wrong != 1)} found.")
     return 1 if wrong else 0
 

@@ -8,6 +8,7 @@ from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
 from cli.inspect.payload import Reading, at, read
 from cli.inspect.session import add_duration, add_options, open_session, until_interrupt
+from common.cli_args import hint, source_words
 from common.freshness import NS_PER_S
 from common.text import printable
 from t2.codec import Sample
@@ -47,7 +48,8 @@ def run(options: argparse.Namespace) -> int:
                     break
     if not shown:
         within = f" within {duration_s:g} s" if duration_s else ""
-        raise T2Error(f"no message on {wanted}{within}; `t2 ls` lists the active keys")
+        active = hint("ls", source_words(options))
+        raise T2Error(f"no message on {wanted}{within}; {active} lists the active keys")
     return 0
 
 

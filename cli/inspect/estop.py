@@ -22,7 +22,7 @@ from cli.inspect import output
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import add_options, open_session, services, until_interrupt
 from common.bus.probe import Probe
-from common.cli_args import source_words
+from common.cli_args import hint, source_words
 from common.root_cause import WITHOUT_BRIDGE
 from common.text import printable
 from t2 import keys
@@ -105,7 +105,8 @@ def stop(client: SafetyClient, user: str, settings: Sequence[str] = (), end_s: f
     warn(dict.fromkeys(unreached, "has latched it, but does not hear the vehicle"), settings)
     if not confirmed and not expected:
         output.warn(
-            f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. `t2 robots` lists ids"
+            f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. "
+            f"{hint('robots', settings)} lists ids"
         )
     return 0 if confirmed and expected <= confirmed and not unreached else 1
 

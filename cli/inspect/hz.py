@@ -24,6 +24,7 @@ from cli.inspect.session import (
     open_session,
     until_interrupt,
 )
+from common.cli_args import hint, source_words
 from common.freshness import NS_PER_S
 from t2.codec import Sample
 from t2.errors import T2Error
@@ -95,7 +96,8 @@ def run(options: argparse.Namespace) -> int:
         with until_interrupt():
             follow(session, options, streams)
     if not streams:
-        raise T2Error(f"no message on {wanted}; `t2 ls` lists the active keys")
+        active = hint("ls", source_words(options))
+        raise T2Error(f"no message on {wanted}; {active} lists the active keys")
     return 0
 
 

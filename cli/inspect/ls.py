@@ -67,7 +67,7 @@ def active(session: BusSession, options: argparse.Namespace) -> list[dict[str, A
             kinds[sample.key] = codec.kind_of(sample.encoding) or named(sample.encoding)
     span_s = time.monotonic() - began_s
     if not counts:
-        raise T2Error(f"no active key on {', '.join(wanted)}; try `t2 doctor`")
+        raise T2Error(f"no active key on {', '.join(wanted)}; try {session.probe.doctor}")
     found = declarations(session.probe, session.robot)
     if not found:
         output.warn("t2 ls: the router shows no declarations (its admin space is closed)")
@@ -92,7 +92,8 @@ def declared(session: BusSession) -> list[dict[str, Any]]:
     """Return all declarations except those of this session."""
     found = declarations(session.probe, session.robot)
     if not found:
-        raise T2Error("no service found, or the router shows none; try `t2 doctor`")
+        text = "no service found, or the router shows none"
+        raise T2Error(f"{text}; try {session.probe.doctor}")
     return [
         {"session": each.session, "does": each.does, "key": short(each.key, session.robot)}
         for each in found

@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
         supervised = {name for name, has in found.items() if "safety" in has}
         client.until(lambda: client.states.keys() >= supervised, LISTEN_S)
     if not found:
-        raise T2Error("no robot found; try `t2 doctor`")
+        raise T2Error(f"no robot found; try {session.probe.doctor}")
     rows = [row(name, found[name], client.states.get(name)) for name in sorted(found)]
     output.rows(rows, as_json=options.json)
     return 1 if {"silent", "no safety"} & {each["verdict"] for each in rows} else 0

@@ -12,7 +12,7 @@ from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT, chunks, parse_site
 from common.bus.probe import Answer, Probe, probe
 from common.bus.session import operator_name
-from common.cli_args import add_sources, sources
+from common.cli_args import add_sources, source_words, sources
 from common.config import Sources, load
 from common.settings import Shared
 from t2 import codec, keys
@@ -93,7 +93,7 @@ def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
     """
     config = settings(options)
     several = options.robot and "*" in options.robot
-    with probe(config.bus) as opened:
+    with probe(config.bus, source_words(options)) as opened:
         robot = options.robot if several else config.robot.id
         yield BusSession(opened, robot, operator_name(config.bus))
         if opened.left_out:

@@ -389,9 +389,9 @@ def refusal(*reasons: Phrase) -> Refusal:
     return Refusal(text=render(reasons), phrases=reasons)
 
 
-def no_answer(server: str) -> Refusal:
-    """Return the refusal of a call without any answer."""
-    return refusal(Phrase("call.no_answer", {"service": server}))
+def no_answer(server: str, doctor: str = "`t2 doctor`") -> Refusal:
+    """Return the refusal of a call without any answer; ``doctor`` is the command to run."""
+    return refusal(Phrase("call.no_answer", {"service": server, "doctor": doctor}))
 
 
 def not_allowed(server: str) -> Refusal:

@@ -6,7 +6,7 @@ queue samples.
 
 import queue
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +18,7 @@ from common import clock
 from common.bus.bus import copied, is_timeout
 from common.bus.publisher import QUERY_CONGESTION, qos
 from common.bus.session import check_files, client_config
+from common.cli_args import hint
 from common.settings import BusSettings
 from t2 import codec
 from t2.codec import Sample
@@ -43,8 +44,10 @@ class Answer:
 class Probe:
     """Session of one tool."""
 
-    def __init__(self, session: zenoh.Session) -> None:
+    def __init__(self, session: zenoh.Session, words: Sequence[str] = ()) -> None:
+        """``words`` are the options of the tool, which the command in an error repeats."""
         self.zid = str(session.zid())
+        self.doctor = hint("doctor", words)
         self.left_out = 0  # samples dropped from the full queue
         self._session = session
         self._samples: queue.SimpleQueue[Sample] = queue.SimpleQueue()
@@ -112,7 +115,7 @@ class Probe:
         time.sleep(POLL_PERIOD_S)  # a lost link ends the query before it leaves this list
         info = self._session.info
         if any(map(is_timeout, replies)) or not (*info.routers_zid(), *info.peers_zid()):
-            raise LinkError("the router has not listed the services in time; run `t2 doctor`")
+            raise LinkError(f"the router has not listed the services in time; run {self.doctor}")
         return sorted(str(reply.ok.key_expr) for reply in replies if reply.ok)
 
     def has_reader(self, *of: str) -> bool:
@@ -146,7 +149,7 @@ class Probe:
 
 
 @contextmanager
-def probe(where: BusSettings) -> Iterator[Probe]:
+def probe(where: BusSettings, words: Sequence[str] = ()) -> Iterator[Probe]:
     """Connect to the bus for the context; raise ``LinkError`` when no router answers."""
     check_files(where, where.endpoints)
     for attempt in range(len(where.endpoints)):
@@ -156,11 +159,11 @@ def probe(where: BusSettings) -> Iterator[Probe]:
     else:
         raise LinkError(
             f"no router answers at {', '.join(where.endpoints)}: is `t2 up` running there? "
-            "Run `t2 doctor`, or choose another router: --set bus.connect="
+            f"Run {hint('doctor', words)}, or choose another router: --set bus.connect="
             f"{'tls' if where.certificate else 'tcp'}/HOST:7447"
         )
     with session:
-        yield Probe(session)
+        yield Probe(session, words)
 
 
 def _matches(*declared: Any, every: bool = False) -> bool:

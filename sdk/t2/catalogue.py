@@ -397,7 +397,7 @@ PHRASES: dict[str, Words] = {
         "该指令已过 {age:.1f} s，最多允许 {limit:g} s：请重试。",
     ),
     "call.no_answer": (
-        "{service} does not answer; run `t2 doctor`.", "{service} 无响应：请运行 `t2 doctor`。",
+        "{service} does not answer; run {doctor}.", "{service} 无响应：请运行 {doctor}。",
     ),
     "call.not_allowed": (
         "{service} does not answer: this certificate may not call it; see `t2 keys list`.",

@@ -51,8 +51,6 @@ def test_command_lines(
         (ConfigError("a setting is wrong"), EXIT_CONFIG, "t2 config: a setting is wrong\n"),
         (LinkError("a port is taken"), EXIT_LINK, "t2 config: a port is taken\n"),
         (T2Error("something is missing"), 1, "t2 config: something is missing\n"),
-        (T2Error("`t2 doctor` or `t2 keys list`"), 1,
-         "t2 config: `t2 doctor --config 'a b.toml' --set x=1` or `t2 keys list`\n"),
         (KeyboardInterrupt(), 130, ""),  # before the command handles it
     ],
 )  # fmt: skip

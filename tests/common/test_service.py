@@ -43,8 +43,7 @@ def specimen(
     ("words", "text"),
     [
         (["--set", "bus.lease=99"],
-         "--set bus.lease=99: bus.lease = 99: Expected `float` <= 10.0; allowed is 0.2..10.0 "
-             "(s until a silent partition is detected)"),
+         "--set bus.lease=99: bus.lease = 99: Expected `float` <= 10.0; allowed is 0.2..10.0 s"),
         (["--config", "none.toml"], "none.toml: cannot be read: No such file or directory"),
     ],
 )  # fmt: skip
