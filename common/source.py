@@ -9,7 +9,7 @@ from common.bus.bus import Arrival, Bus
 from t2 import keys
 from t2.client import Access, request
 from t2.keys import Topic
-from t2.messages import Drive, EstopKeepalive, SafetyState, SourceMessage
+from t2.messages import Drive, Limit, SafetyState, SourceMessage
 
 M = TypeVar("M", bound=SourceMessage)
 
@@ -58,11 +58,11 @@ class DriveSource(Source[Drive]):
         return self._put(drive, echo)
 
 
-class KeepalivePublisher(Source[EstopKeepalive]):
+class KeepalivePublisher(Source[Limit]):
     """A source of signs of life of an emergency stop."""
 
-    topic = keys.ESTOP_KEEPALIVE
+    topic = keys.LIMIT
 
-    def beat(self, echo: int | None = None) -> EstopKeepalive:
+    def beat(self, echo: int | None = None) -> Limit:
         """Send one, with the heartbeat that an operator's screen showed; the newest by default."""
-        return self._put(EstopKeepalive(echo=0), echo)
+        return self._put(Limit(echo=0), echo)

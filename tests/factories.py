@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from t2.messages import Cause, Health, Limits, Link, Odometry, Release, SafetyState
+from t2.messages import Cause, Health, Limits, LimitState, Link, Odometry, Release, SafetyState
 
 
 def safety_state(**fields: Any) -> SafetyState:
@@ -17,6 +17,21 @@ def safety_state(**fields: Any) -> SafetyState:
         "text": "Driving.",
     }
     return SafetyState(**usual | fields)
+
+
+def limit_source(source: str, **fields: Any) -> LimitState:
+    """Return the state of a source without a cap."""
+    usual: dict[str, Any] = {
+        "linear": None,
+        "angular": None,
+        "reason": "",
+        "age": 0.1,
+        "lease": 1.0,
+        "silence": "stop",
+        "silent": False,
+        "effect": "none",
+    }
+    return LimitState(source=source, **usual | fields)
 
 
 def release(**fields: Any) -> Release:

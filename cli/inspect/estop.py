@@ -28,7 +28,7 @@ from common.text import printable
 from t2 import keys
 from t2.client import ESTOP_WAIT_S
 from t2.errors import LinkError, T2Error
-from t2.messages import EstopKeepalive, KeepaliveState, SafetyState
+from t2.messages import Limit, LimitState, SafetyState
 
 RETRY_S = 0.2  # without a router
 KEEPALIVE_S = 0.1
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
         "--keepalive", metavar="NAME",
-        help="do not stop now: keep the emergency stop NAME of safety.estop_keepalive alive",
+        help="do not stop now: keep the emergency stop NAME of safety.limits alive",
     )  # fmt: skip
     add_options(parser)
 
@@ -169,7 +169,7 @@ def is_barred(probe: Probe, robot: str) -> bool:
     """Return whether the router drops the commands of this certificate, as it seems."""
     serves = services(probe, robot, "safety")
     # Each role that may stop may also do one of these, except fleet.
-    topics = (keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE)
+    topics = (keys.DRIVE, keys.LIMIT)
     commands = (topic.on(robot, source="*") for topic in topics)
     return bool(serves) and not probe.has_reader(*commands)
 
@@ -186,17 +186,17 @@ def keep_alive(options: argparse.Namespace) -> int:
         print("Enter: EMERGENCY STOP. Ctrl-C ends this program: the robot then brakes and latches.")
         with until_interrupt():
             follow(client, name, session.user)
-    print(f"Ended: within {ours.timeout:g} s robot {robot} brakes and latches.", end=" ")
+    print(f"Ended: within {ours.lease:g} s robot {robot} brakes and latches.", end=" ")
     print("To go on, start this again, then reset.")
     return 0
 
 
-def kept(state: SafetyState, name: str) -> KeepaliveState:
+def kept(state: SafetyState, name: str) -> LimitState:
     """Return safety's state of this name; raise ``T2Error`` if it does not expect it."""
-    known = {one.source: one for one in state.estop_keepalives}
+    known = {one.source: one for one in state.limit_sources if one.silence == "latch"}
     if name not in known:
         names = f"it expects {', '.join(known)}" if known else "it expects no keepalive"
-        raise T2Error(f"safety does not expect {name!r}: {names}; see safety.estop_keepalive")
+        raise T2Error(f"safety does not expect {name!r}: {names}; see safety.limits")
     return known[name]
 
 
@@ -205,7 +205,7 @@ def follow(client: SafetyClient, name: str, user: str) -> None:
     shown = ""
     watched: list[TextIO] = [sys.stdin] if sys.stdin else []  # closed in some supervisors
     while True:
-        client.put(keys.ESTOP_KEEPALIVE, EstopKeepalive(echo=0))
+        client.put(keys.LIMIT, Limit(echo=0))
         state = None if client.is_silent(SILENT_S) else client.state
         if (line := described(state, name) if state else SILENT) != shown:
             print(line, flush=True)
@@ -220,5 +220,5 @@ def follow(client: SafetyClient, name: str, user: str) -> None:
 
 def described(state: SafetyState, name: str) -> str:
     """Return the state as a line."""
-    alive = any(one.source == name and one.alive for one in state.estop_keepalives)
+    alive = any(one.source == name and not one.silent for one in state.limit_sources)
     return f"{'alive' if alive else 'NOT ALIVE'}  {state.verdict.upper()}  {printable(state.text)}"

@@ -55,8 +55,8 @@ LAPTOP_SERVICES = ("dashboard", "estop", "metrics")
 DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
 
 COMMANDS: Mapping[str, Sequence[keys.Topic[Any]]] = {  # besides the emergency stop
-    "driver": (keys.DRIVE, keys.ESTOP_KEEPALIVE),
-    "device": (keys.LIMIT, keys.ESTOP_KEEPALIVE),
+    "driver": (keys.DRIVE, keys.LIMIT),
+    "device": (keys.LIMIT,),
 }
 PROGRAMS_CALLS = (keys.SET_LED, keys.SET_POSE)  # without an operator's source
 ROS_TWISTS = ("TwistStamped", "Twist")
@@ -161,10 +161,7 @@ def site() -> Rights:
         "recall": RECALLED,
         "ask": (*QUERYABLE, *(call.on(ANY) for call in keys.CALLS)),
         "write": (
-            *(
-                topic.on(ANY, source=ANY)
-                for topic in (keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE)
-            ),
+            *(topic.on(ANY, source=ANY) for topic in (keys.DRIVE, keys.LIMIT)),
             keys.estop_key(ANY),
             *(keys.EVENTS.on(ANY, service=name) for name in DRIVER_SERVICES),
             *app_keys(ANY, ANY),

@@ -117,16 +117,8 @@ LIMIT = Topic(
     m.Limit,
     10,
     COMMAND,
-    "a lidar, a fleet manager, ...",
-    "a speed limit or a protective stop",
-)
-ESTOP_KEEPALIVE = Topic(
-    "@cmd/estop_keepalive/{source}",
-    m.EstopKeepalive,
-    10,
-    COMMAND,
-    "a pendant, a dashboard, ...",
-    "a sign of life of an emergency stop",
+    "a lidar, a fleet manager, a pendant, ...",
+    "a speed limit, a protective stop, or a sign of life of an emergency stop",
 )
 MOTION = Topic("@cmd/motion", m.Motion, 50, COMMAND, "safety", "the motion that safety allows")
 
@@ -146,7 +138,7 @@ SET_POSE = Call("srv/odom/reset", m.PoseRequest, m.Done, "odom", "start odometry
 
 TOPICS: tuple[Topic[m.Message], ...] = (
     VELOCITY, MILEAGE, ULTRASONIC, BUMPER, DRIVER, SWITCHES, LINK,
-    ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, ESTOP_KEEPALIVE, MOTION,
+    ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
     SET_SWITCHES, SET_LED, RESET, SET_POSE,

@@ -25,7 +25,9 @@ Level = Literal["info", "warning", "error"]
 Action = Literal["slow", "stop", "brake"]
 Direction = Literal["forward", "backward"]
 ReleaseRequest = Literal["none", "forward", "backward"]  # off a pressed bumper
-LimitEffect = Literal["none", "slow", "stop"]
+LimitEffect = Literal["none", "slow", "stop", "brake"]
+# Of a source of speed limits: without effect, STOP, or BRAKE and a latch, as of a pendant.
+Silence = Literal["ignore", "stop", "latch"]
 
 # NaN and infinity are out of this range, too: a message with such a number is undecodable.
 MAX_NUMBER = 1e9
@@ -242,18 +244,11 @@ class LimitState(Struct, frozen=True, kw_only=True):
     linear: Number | None  # m/s; None: no cap
     angular: Number | None  # rad/s, likewise
     reason: Text  # in the source's words
-    age: Number | None  # s since its last limit; None: none was received
-    silent: bool  # whether its lease is over, or it was never received
+    age: Number | None  # s since its last limit, see ``silence``; None: none was received
+    lease: Number  # s that a limit holds
+    silence: Silence  # what the end of the lease does; of ``latch`` the age is that of the echo
+    silent: bool  # whether its lease is over, it was never received, or two programs latch
     effect: LimitEffect  # on the vehicle now
-
-
-class KeepaliveState(Struct, frozen=True, kw_only=True):
-    """State of an emergency stop that must be kept alive, see ``EstopKeepalive``."""
-
-    source: Name
-    age: Number | None  # s since safety sent the heartbeat that it echoed; None: not received
-    alive: bool
-    timeout: Number  # s; older, and safety brakes and latches
 
 
 class SafetyState(Message, frozen=True, kw_only=True):
@@ -271,7 +266,6 @@ class SafetyState(Message, frozen=True, kw_only=True):
     release_refusal: Text = ""  # why the release that ``source`` requests does not move the vehicle
     refusal_phrases: Phrases = ()  # the same, for other languages
     limit_sources: Annotated[tuple[LimitState, ...], Few] = ()  # those in the settings
-    estop_keepalives: Annotated[tuple[KeepaliveState, ...], Few] = ()  # likewise
     doubted_sonars: Annotated[tuple[Name, ...], Few] = ()  # names of those that are not trusted
 
 
@@ -293,15 +287,14 @@ class Drive(SourceMessage, frozen=True, kw_only=True):
 
 
 class Limit(SourceMessage, frozen=True, kw_only=True):
-    """A speed limit by a third party; valid for its source's lease. Zero is a protective stop."""
+    """A speed limit by a third party; valid for its source's lease. Zero is a protective stop.
+
+    Without a cap it is a sign of life: of an emergency stop, if the source's silence latches.
+    """
 
     linear: Cap | None = None  # m/s, either way; None: no cap
     angular: Cap | None = None  # rad/s, likewise
     reason: Reason = ""  # for the operator, such as "person at 2 m"
-
-
-class EstopKeepalive(SourceMessage, frozen=True, kw_only=True):
-    """A sign of life of an emergency stop; without it safety brakes and latches."""
 
 
 class Motion(Message, frozen=True, kw_only=True):

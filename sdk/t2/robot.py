@@ -186,12 +186,12 @@ class Robot:
         """Keep the emergency stop of this name alive, as a pendant, for some seconds from now.
 
         A thread repeats the sign of life; call this, or the keepalive's ``renew``, in a loop. The
-        end of the program, of the link or of the loop lets safety brake and latch, after
-        ``safety.estop_keepalive_timeout``. Returns once safety's state shows it as alive;
-        ``safety.estop_keepalive`` must list the name. Raises as ``limit``.
+        end of the program, of the link or of the loop lets safety brake and latch, after the
+        lease of the source. Returns once safety's state shows it as alive; ``safety.limits`` must
+        list the name with ``silence = "latch"``. Raises as ``limit``.
         """
         if source not in self._keepalives or self._keepalives[source].has_ended:
-            key = self._source_key(keys.ESTOP_KEEPALIVE, source)
+            key = self._source_key(keys.LIMIT, source)
             self._keepalives[source] = Keepalive(self._session, key, source, self.safety)
         self._keepalives[source].renew(seconds=seconds)
         return self._keepalives[source]

@@ -3,25 +3,16 @@
 import math
 import threading
 import time
-from collections.abc import Callable
-from typing import ClassVar, TypeVar
+from collections.abc import Callable, Sequence
+from typing import ClassVar
 
 import zenoh
 
 from t2.errors import NotAllowed, T2Error
-from t2.messages import (
-    EstopKeepalive,
-    KeepaliveState,
-    Limit,
-    LimitState,
-    SafetyState,
-    SourceMessage,
-)
+from t2.messages import Limit, LimitState, SafetyState
 from t2.motion import not_negative
 from t2.publisher import SourcePublisher
 from t2.stream import Stream, now_s
-
-S = TypeVar("S", LimitState, KeepaliveState)
 
 PERIOD_S = 0.1
 SHOWN_S, POLL_S = 1.0, 0.01  # until safety's state shows a message; its period is 0.05 s
@@ -30,16 +21,15 @@ SHOWN_S, POLL_S = 1.0, 0.01  # until safety's state shows a message; its period 
 class Repetition:
     """The messages of one source; a thread repeats the last one, 10 times a second."""
 
-    kind: ClassVar[type[SourceMessage]]
     what: ClassVar[str]  # for texts
 
     def __init__(
         self, session: zenoh.Session, key: str, source: str, safety: Stream[SafetyState]
     ) -> None:
-        self._publisher = SourcePublisher(session, key, self.kind, safety)
+        self._publisher = SourcePublisher(session, key, Limit, safety)
         self._source = source
         self._safety = safety
-        self._message: Limit | EstopKeepalive = EstopKeepalive(echo=0)
+        self._message = Limit(echo=0)
         self._end_s = math.inf  # monotonic time
         self._error: Exception | None = None  # of the thread
         self._lock = threading.Lock()
@@ -62,9 +52,7 @@ class Repetition:
             self._thread.join()
         self._publisher.close()
 
-    def _repeat(
-        self, message: Limit | EstopKeepalive, seconds: float, is_shown: Callable[[float], bool]
-    ) -> None:
+    def _repeat(self, message: Limit, seconds: float, is_shown: Callable[[float], bool]) -> None:
         """Send a message at once and for some seconds; return when safety's state shows it.
 
         ``is_shown`` receives the time in s since the message was sent first.
@@ -111,7 +99,6 @@ class SpeedLimit(Repetition):
     >>> limit.end()
     """
 
-    kind: ClassVar[type[SourceMessage]] = Limit
     what: ClassVar[str] = "limit"
 
     def set(
@@ -138,7 +125,7 @@ class SpeedLimit(Repetition):
         self._repeat(limit, seconds, is_shown)
 
     def _shown(self) -> LimitState:
-        return shown(self._source, self._safety.latest().limit_sources, "safety.limits")
+        return shown(self._source, self._safety.latest().limit_sources)
 
 
 class Keepalive(Repetition):
@@ -148,7 +135,6 @@ class Keepalive(Repetition):
     >>> pendant.renew(seconds=0.5)  # doctest: +SKIP
     """
 
-    kind: ClassVar[type[SourceMessage]] = EstopKeepalive
     what: ClassVar[str] = "keepalive"
 
     def renew(self, *, seconds: float) -> None:
@@ -156,20 +142,21 @@ class Keepalive(Repetition):
 
         def is_shown(passed_s: float) -> bool:
             # Alive by another program's messages is not enough.
-            return self._shown().alive and passed_s > 0 and self._publisher.matches
+            return not self._shown().silent and passed_s > 0 and self._publisher.matches
 
-        self._repeat(EstopKeepalive(echo=0), seconds, is_shown)
+        self._repeat(Limit(echo=0), seconds, is_shown)
 
-    def _shown(self) -> KeepaliveState:
-        states = self._safety.latest().estop_keepalives
-        return shown(self._source, states, "safety.estop_keepalive")
+    def _shown(self) -> LimitState:
+        states = self._safety.latest().limit_sources
+        latching = [each for each in states if each.silence == "latch"]
+        return shown(self._source, latching, ' with silence = "latch"')
 
 
-def shown(source: str, states: tuple[S, ...], setting: str) -> S:
+def shown(source: str, states: Sequence[LimitState], which: str = "") -> LimitState:
     """Return what safety's state shows of a source; raise ``NotAllowed`` for an unknown one."""
     known = {each.source: each for each in states}
     if source not in known:
         raise NotAllowed(
-            f"{setting} does not list {source!r}; it lists {', '.join(known) or 'none'}"
+            f"safety.limits does not list {source!r}{which}; it lists {', '.join(known) or 'none'}"
         )
     return known[source]

@@ -26,7 +26,7 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     certificate: str = ""  # PEM files for https; both or none
     private_key: str = ""
     source: SourceName = "web"  # the name to drive under; safety knows its priority
-    # A name in safety.estop_keepalive that an open and visible page keeps alive; empty: none.
+    # A name in safety.limits whose silence latches: an open, visible page keeps it alive.
     estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
     # The URL of an MJPEG stream; ``{robot}`` in the path is the robot's id. Empty: none.
     camera: Url = ""

@@ -105,7 +105,7 @@ class DriverLock:
 class PageKeepalive:
     """The page that keeps one robot's emergency stop alive on this dashboard."""
 
-    name: str  # in safety.estop_keepalive; empty: none
+    name: str  # in safety.limits, with a silence that latches; empty: none
     holder: str | None = None  # a viewer
     _shown_ns: int = 0  # when the state was received that the holder answered last
 
@@ -113,11 +113,11 @@ class PageKeepalive:
         self, viewer: str, shown: Shown, newest: SafetyState | None, now_ns: int
     ) -> int | None:
         """Return the heartbeat to echo for a page's answer; None when it does not count."""
-        known = newest.estop_keepalives if newest else ()
+        known = newest.limit_sources if newest else ()
         ours = next((one for one in known if one.source == self.name), None)
-        if ours is None or shown is None:
+        if ours is None or ours.silence != "latch" or shown is None:
             return None
-        is_held = ours.alive or now_ns - self._shown_ns <= ours.timeout * NS_PER_S
+        is_held = not ours.silent or now_ns - self._shown_ns <= ours.lease * NS_PER_S
         if viewer != self.holder and is_held:
             return None
         self.holder, self._shown_ns = viewer, shown.received_ns

@@ -33,7 +33,7 @@ WORDS = {"state": get_args(LinkState), "verdict": get_args(Verdict)}  # 0 or 1 f
 OMITTED = {
     *Message.__struct_fields__, "text", "waiting", "release_refusal", "heartbeat", "latched_by",
     "estop", "ports", "frame_id", "child_frame_id", "pose_covariance", "twist_covariance",
-    "service", "limit_sources", "estop_keepalives",
+    "service", "limit_sources",
 }  # fmt: skip
 # Metrics that are no fields of messages.
 METRICS = {

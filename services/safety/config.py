@@ -1,7 +1,7 @@
 """Settings of the safety service."""
 
 from functools import cache
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta, Struct
@@ -9,6 +9,7 @@ from msgspec.structs import replace
 
 from common import settings
 from common.settings import Safe, SourceName, allowed
+from t2.messages import Silence
 
 Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``messages.Text``
 
@@ -26,14 +27,20 @@ class Source(settings.Section, frozen=True, kw_only=True):
     operator: Annotated[bool, allowed(safe=(False, False))] = False
 
 
-Silence = Literal["ignore", "stop"]
-
-
 class LimitSource(settings.Section, frozen=True, kw_only=True):
     """A source of speed limits; every field is required, because no default fits all."""
 
     lease: Annotated[float, allowed("s", gt=0.0, le=10.0, safe=(0.0, 1.0))]  # of a limit
     silence: Silence  # what the end of the lease does, and a start without any limit
+
+    @property
+    def latches(self) -> bool:
+        """Whether it keeps an emergency stop alive, as a pendant does."""
+        return self.silence == "latch"
+
+    def protections(self) -> dict[str, Safe]:
+        """Return the safe values; a sign of life proves more than a limit, and may come later."""
+        return {"lease": Safe(0.0, 2.0, "s")} if self.latches else super().protections()
 
 
 def _sources() -> dict[str, Source]:
@@ -67,11 +74,8 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     # sources on @cmd/drive/NAME, lease in s; operator: a person holds it, and may creep past a
     # faulty sonar
     sources: Annotated[dict[SourceName, Source], Sources] = msgspec.field(default_factory=_sources)
-    # names that must be received on @cmd/estop_keepalive/NAME, or the robot brakes and latches
-    estop_keepalive: Annotated[tuple[SourceName, ...], Sources] = ()
-    # without one of them
-    estop_keepalive_timeout: Annotated[float, allowed("s", gt=0.0, le=10.0, safe=(0.0, 2.0))] = 1.0
-    # sources of speed limits on @cmd/limit/NAME, as lidar = { lease = 0.5, silence = "stop" }
+    # sources of speed limits on @cmd/limit/NAME, as lidar = { lease = 0.5, silence = "stop" }; an
+    # emergency stop that must be kept alive is pendant = { lease = 1.0, silence = "latch" }
     limits: Annotated[dict[SourceName, LimitSource], Sources] = msgspec.field(default_factory=dict)
 
     linear_acceleration: Annotated[float, allowed("m/s^2", gt=0.0, le=10.0, safe=(0.0, 1.5))] = 0.5
@@ -99,8 +103,12 @@ class Safety(settings.Section, frozen=True, kw_only=True):
         return frozenset(name for name, source in self.sources.items() if source.operator)
 
     def __post_init__(self) -> None:
-        if len(set(self.estop_keepalive)) < len(self.estop_keepalive):
-            raise ValueError(f"estop_keepalive names a source twice: {self.estop_keepalive}")
+        for name in self.limits.keys() & self.sources.keys():
+            if not self.limits[name].latches:  # a driver may only keep an emergency stop alive
+                raise ValueError(
+                    f"limits.{name} has the name of a source: who drives as {name} could lift the "
+                    "limit; choose another name"
+                )
         names: dict[int, str] = {}  # by priority
         for name, source in self.sources.items():
             if (other := names.setdefault(source.priority, name)) != name:

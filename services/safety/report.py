@@ -68,7 +68,6 @@ def state_message(policy: Policy, state: State, now_ns: int) -> SafetyState:
         release=_release(policy, state, now_ns) if "contact" in state.latches else None,
         release_refusal=render(state.release.refusal),
         refusal_phrases=state.release.refusal,
-        estop_keepalives=state.keepalives.states(now_ns),
         limit_sources=state.speed_limits.states(state.verdict.limited_by, now_ns),
         doubted_sonars=tuple(
             name

@@ -23,7 +23,6 @@ from services.safety.core.conditions import LOST_SAMPLES
 from services.safety.core.inputs import (
     DriveRequest,
     Inputs,
-    KeepaliveRequest,
     LimitRequest,
     SourceRequest,
 )
@@ -83,7 +82,6 @@ class SafetyService:
         settings = self._node.config.safety
         self._subscribe_source(keys.DRIVE, DriveRequest, settings.sources)
         self._subscribe_source(keys.LIMIT, LimitRequest, settings.limits)
-        self._subscribe_source(keys.ESTOP_KEEPALIVE, KeepaliveRequest, settings.estop_keepalive)
         self._node.bus.serve(keys.RESET, self._on_reset)
         estop_key = keys.estop_key(self._node.config.robot.id)
         self._estop_bus.on_any(estop_key, lambda _: self._on_estop())

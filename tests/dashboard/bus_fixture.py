@@ -8,7 +8,7 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from t2 import keys
-from t2.messages import Cause, Drive, EstopKeepalive, KeepaliveState, Release
+from t2.messages import Cause, Drive, Limit, LimitState, Release
 from tests.dashboard.viewer import Client
 from tests.factories import safety_state
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -27,8 +27,8 @@ class Peer:
         self.causes: tuple[Cause, ...] = ()
         self.release: Release | None = None
         self.release_refusal = ""
-        self.keepalives: tuple[KeepaliveState, ...] = ()
-        self.kept_alive: list[EstopKeepalive] = []
+        self.keepalives: tuple[LimitState, ...] = ()
+        self.kept_alive: list[Limit] = []
         self.boot = 0  # of safety
         self._loop = loop
 
@@ -38,9 +38,7 @@ class Peer:
         bus.subscribe(
             keys.DRIVE, lambda it: self.requests.append(it.message), source="web", depth=64
         )
-        bus.subscribe(
-            keys.ESTOP_KEEPALIVE, lambda it: self.kept_alive.append(it.message), source="web"
-        )
+        bus.subscribe(keys.LIMIT, lambda it: self.kept_alive.append(it.message), source="web")
         bus.on_any(keys.estop_key("001"), self.estops.append)
         bus.live(keys.live_key("two words", "bridge", "x"))
         bus.live(keys.live_key("002", "bridge", "x"))
@@ -55,7 +53,7 @@ class Peer:
                         causes=self.causes,
                         release=self.release,
                         release_refusal=self.release_refusal,
-                        estop_keepalives=self.keepalives,
+                        limit_sources=self.keepalives,
                     )
                 )
 

@@ -8,10 +8,10 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from common.loop import Loop
-from t2.messages import KeepaliveState
 from tests.dashboard.bus_fixture import Peer
 from tests.dashboard.page import BROWSER_MARKS, center_of, take_control, text, wait_for_text
 from tests.dashboard.servers import FREE, NEWER, CallServers
+from tests.factories import limit_source
 from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site
 from verification.harness.dashboard import Server, dashboard
@@ -86,7 +86,7 @@ def test_an_emergency_stop_goes_out_without_the_socket(
 def test_a_page_in_the_background_does_not_keep_the_stop_alive(
     page: Page, endpoint: str, peer: Peer, tmp_path: Path
 ) -> None:
-    peer.keepalives = (KeepaliveState(source="web", age=None, alive=False, timeout=1.0),)
+    peer.keepalives = (limit_source("web", age=None, silent=True, silence="latch"),)
     with dashboard(endpoint, tmp_path, "dashboard.estop_keepalive=web") as server:
         page.goto(server.url)
         wait_until(lambda: peer.kept_alive, "messages")

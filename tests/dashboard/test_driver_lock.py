@@ -11,8 +11,8 @@ from services.dashboard.driver_lock import (
     Push,
     Shown,
 )
-from t2.messages import KeepaliveState, SafetyState
-from tests.factories import safety_state
+from t2.messages import SafetyState, Silence
+from tests.factories import limit_source, safety_state
 
 AHEAD = Push(1.0, 0.0)
 HOLD_NS = round(HOLD_S * NS_PER_S)
@@ -109,9 +109,11 @@ def test_a_push_is_clamped(lock: DriverLock) -> None:
 TIMEOUT_NS = NS_PER_S
 
 
-def kept(alive: bool, heartbeat: int = 7, name: str = "web") -> SafetyState:
-    one = KeepaliveState(source=name, age=0.1 if alive else None, alive=alive, timeout=1.0)
-    return safety_state(heartbeat=heartbeat, estop_keepalives=(one,))
+def kept(
+    alive: bool, heartbeat: int = 7, name: str = "web", silence: Silence = "latch"
+) -> SafetyState:
+    one = limit_source(name, age=0.1 if alive else None, silent=not alive, silence=silence)
+    return safety_state(heartbeat=heartbeat, limit_sources=(one,))
 
 
 def test_the_first_page_keeps_the_stop_alive_and_echoes_what_it_showed() -> None:
@@ -128,6 +130,7 @@ def test_the_first_page_keeps_the_stop_alive_and_echoes_what_it_showed() -> None
         (shown(), None),
         (shown(), kept(False, name="pendant")),
         (shown(), kept(True)),  # another program keeps it alive
+        (shown(), kept(False, silence="stop")),  # a limit, and no emergency stop
     ],
 )
 def test_an_answer_that_proves_nothing_is_not_sent(

@@ -51,14 +51,17 @@ def test_the_screens_are_held_by_an_operator_without_an_override() -> None:
     assert "sources.nav.operator" in read().protections()
 
 
-def test_an_emergency_stop_is_kept_alive_by_a_source_once() -> None:
-    with pytest.raises(ConfigError, match="estop_keepalive names a source twice"):
-        read('safety.estop_keepalive=["pendant", "pendant"]')
+def test_an_emergency_stop_may_be_kept_alive_more_slowly_than_a_limit() -> None:
+    for silence, longest in (("stop", 1.0), ("ignore", 1.0), ("latch", 2.0)):
+        given = 'safety.limits.it={{lease = {}, silence = "{}"}}'
+        read(given.format(longest, silence))
+        with pytest.raises(ConfigError, match=r"safety\.limits\.it\.lease = .* takes a protection"):
+            read(given.format(longest + 0.1, silence))
 
 
 @pytest.mark.parametrize(
     "path",
-    ["safety.creep_speed", "safety.estop_keepalive_timeout", "safety.sources.teleop.lease",
+    ["safety.creep_speed", "safety.sources.teleop.lease",
      "vehicle.max_linear", "vehicle.deceleration"],
 )  # fmt: skip
 def test_zero_never_means_off(path: str) -> None:
@@ -82,12 +85,17 @@ def test_it_must_see_as_far_as_it_takes_to_stop() -> None:
 
 def test_a_limit_source_has_both_settings_and_a_short_lease() -> None:
     given = 'safety.limits.lidar={lease = 0.5, silence = "stop"}'
+    read('safety.limits.web={lease = 1.0, silence = "latch"}')
     assert read(given).limits == {"lidar": LimitSource(lease=0.5, silence="stop")}
     for wrong, message in (
         ("safety.limits.lidar={lease = 0.5}", "silence"),
         ('safety.limits.lidar={silence = "stop"}', "lease"),
         ('safety.limits.lidar={lease = 0.5, silence = "drive"}', "silence"),
         ('safety.limits.lidar={lease = 1.1, silence = "stop"}', "limits.lidar.lease"),
+        (
+            'safety.limits.nav={lease = 0.5, silence = "stop"}',
+            "limits.nav has the name of a source",
+        ),
         ('safety.limits."a/b"={lease = 0.5, silence = "stop"}', "limits"),
     ):
         with pytest.raises(ConfigError, match=message):

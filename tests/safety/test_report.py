@@ -176,7 +176,6 @@ def test_the_longest_state_decodes() -> None:
     largest = Safety(
         sources={name: Source(priority=n, lease=0.5) for n, name in enumerate(names)},
         limits={f"l{name[1:]}": LimitSource(lease=0.5, silence="stop") for name in names},
-        estop_keepalive=tuple(f"k{name[1:]}" for name in names),
     )
     fixture = PolicyFixture(SafetyConfig(safety=largest))
     fixture.left_bits = fixture.right_bits = 2**32 - 1
@@ -194,11 +193,11 @@ def test_the_longest_state_decodes() -> None:
     for name in names:
         assert f"limit l{name[1:]}" in texts["two_publishers"]
         assert f"l{name[1:]}: \\u" in texts["limit_stop"]
-        assert f"k{name[1:]}" in texts["starting"]
     assert decode(encode(state), SafetyState) == state
     everything = " ".join(texts[name] for name in state.latched)
     assert len(f"Reset, but still latched: {everything}") < max(map(len, texts.values())) < MAX_TEXT
     longer = {**largest.sources, "one_more": Source(priority=99, lease=0.5)}
-    for wrong in ({"sources": longer}, {"estop_keepalive": ["x" * 33]}):
+    named = {"x" * 33: LimitSource(lease=0.5, silence="latch")}
+    for wrong in ({"sources": longer}, {"limits": named}):
         with pytest.raises(ValidationError, match=r"length <= 16|matching regex"):
             convert(wrong, Safety)

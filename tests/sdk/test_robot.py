@@ -534,19 +534,22 @@ def test_the_wait_for_the_end_of_a_stop_has_an_end(
         limit.end()
 
 
+PENDANT = 'safety.limits.pendant={lease = 1.0, silence = "latch"}'
+
+
 def test_a_keepalive_is_confirmed_and_its_end_latches(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with (
-        running_stack(tmp_path, sets=['safety.estop_keepalive=["pendant"]']) as stack,
+        running_stack(tmp_path, sets=[PENDANT]) as stack,
         t2.connect("001", endpoint=stack.endpoint) as robot,
     ):
         robot.safety.latest(timeout=20.0)
         with pytest.raises(t2.NotAllowed, match="it lists pendant"):
             robot.keepalive("other", seconds=1)
         pendant = robot.keepalive("pendant", seconds=60)
-        (shown,) = robot.safety.latest().estop_keepalives
-        assert shown.alive
+        (shown,) = robot.safety.latest().limit_sources
+        assert not shown.silent
         assert robot.keepalive("pendant", seconds=60) is pendant
         wait_until(lambda: not blocked(robot), "a vehicle that may drive")
         monkeypatch.setattr(t2.third_party, "SHOWN_S", 0.0)

@@ -39,8 +39,8 @@ from tests.search.scripted_stack import FAULT_MM
 from tests.search.scripted_stack import ScriptedStack as Stack
 from verification.search import bus
 from verification.search.bus import ROBOT, Disturbance, DriveEnd, Envelope, Process
-from verification.search.condition_books import IGNORED, LEASE_S, NEEDED
-from verification.search.stack import CONFIGS, PENDANT, Sockets
+from verification.search.condition_books import IGNORED, LEASE_S, NEEDED, PENDANT
+from verification.search.stack import CONFIGS, Sockets
 
 Script = tuple[Callable[[Stack], object], ...]
 Patch = tuple[Any, str, object]  # owner, attribute (or key of a dict) and its replacement
@@ -201,7 +201,7 @@ def pendant_is_held(stack: Stack) -> None:
     pendant = stack.sources[PENDANT]
     echo = pendant.echo
     stack.silence(PENDANT, 850)
-    pendant.put(m.EstopKeepalive(echo=echo))
+    pendant.put(m.Limit(echo=echo))
 
 
 def reset_is_granted(stack: Stack) -> None:
@@ -269,13 +269,15 @@ def newest_echo() -> Callable[[Any], Any]:
     def change(message: Any) -> Any:
         if isinstance(message, m.SafetyState):
             beats[0] = message.heartbeat
-        return replace(message, echo=beats[0]) if isinstance(message, m.EstopKeepalive) else message
+        return replace(message, echo=beats[0]) if isinstance(message, m.Limit) else message
 
     return change
 
 
 FIRST_SAFETY = Stack().processes["safety"].boot
 SILENT = LimitSource(lease=LEASE_S, silence="ignore")
+SAFETY: Any = CONFIGS["safety"]
+LIMITS: dict[str, LimitSource] = SAFETY.safety.limits
 ON_MOTION, EXPIRE = leases.on_motion, leases.expire
 AFTER, STORE = Release.after, SafetyService._store
 
@@ -473,7 +475,7 @@ MUTATIONS: dict[str, Mutation] = {
         (Arbiter, "barred", unchanged), PROTECTIVE_STOP, "was not neutral",
     ),
     "a silent limit source drives on": (
-        configured("safety", limits=dict.fromkeys((NEEDED, IGNORED), SILENT)),
+        configured("safety", limits={**LIMITS, NEEDED: SILENT}),
         (lambda s: s.silence(NEEDED),), "no limit of lidar",
     ),
     "two publishers of a limit": (
@@ -481,7 +483,7 @@ MUTATIONS: dict[str, Mutation] = {
         "two publishers of one limit",
     ),
     "a pendant that fell silent does not latch": (
-        configured("safety", estop_keepalive_timeout=10.0),
+        configured("safety", limits={**LIMITS, PENDANT: LimitSource(lease=10.0, silence="latch")}),
         (lambda s: s.silence(PENDANT),), "safety knows of estop_keepalive",
     ),
     "a held sign of life counts from its reception": (

@@ -28,9 +28,8 @@ from t2 import messages as m
 from t2.messages import Command
 from tests.search.scripted_stack import ALL_SONARS, FAULT_MM, NO_ECHO_MM, ScriptedStack
 from verification.search.bus import CLEAR, ECHO_MS, HOLD_MS, Disturbance
-from verification.search.condition_books import IGNORED, NEEDED
+from verification.search.condition_books import IGNORED, NEEDED, PENDANT
 from verification.search.ros import PATTERNS
-from verification.search.stack import PENDANT
 
 PATIENCE = 3  # rules
 SEEDS, FEW_EXAMPLES = 8, 5  # for each seed
@@ -38,7 +37,7 @@ EXAMPLES = int(os.environ.get("T2_EXAMPLES", FEW_EXAMPLES))
 
 # --- values: few, dense around thresholds ---------------------------------------------------------
 
-ROUTES = st.sampled_from(["drive", "limit", "estop_keepalive", "motion", "state", "streams"])
+ROUTES = st.sampled_from(["drive", "limit", "limit/pendant", "motion", "state", "streams"])
 DISTURBANCES = st.sampled_from(
     [CLEAR, Disturbance(late_ms=30), Disturbance(late_ms=120), Disturbance(lose=2),
      Disturbance(lose=3), Disturbance(double=2), Disturbance(hold=3),
@@ -186,7 +185,7 @@ class StackMachine(RuleBasedStateMachine):
     def hostile_keepalive(self, late: int, boot: int) -> None:
         """Send a sign of life with an old echo, or of another program."""
         pendant = self.stack.sources[PENDANT]
-        pendant.put(m.EstopKeepalive(echo=pendant.echo - late, boot=boot))
+        pendant.put(m.Limit(echo=pendant.echo - late, boot=boot))
         self.stack.run(5)
 
     @rule(seq=st.integers(1, 2**62), boot=st.sampled_from([None, 1]))

@@ -36,7 +36,7 @@ from verification.faults.injectors import (
     request,
     steps,
 )
-from verification.faults.stack_fixture import LIMIT_LEASE_S, Requirement
+from verification.faults.stack_fixture import LIMIT_LEASE_S, PENDANT_LEASE_S, Requirement
 
 
 def bridge(config: Everything) -> TimeLimits:
@@ -57,7 +57,7 @@ BUMPER_AGE = by_limit(lambda config: safety_config(config).times.bumper_age)
 VELOCITY_AGE = by_limit(lambda config: safety_config(config).times.velocity_age)
 ULTRASONIC_AGE = by_limit(lambda config: safety_config(config).times.ultrasonic_age)
 REQUEST_LEASE = by_limit(lambda config: safety_config(config).leased["teleop"].lease)
-KEEPALIVE = by_limit(lambda config: config.safety.estop_keepalive_timeout)
+KEEPALIVE = by_limit(lambda _: PENDANT_LEASE_S)
 LIMIT_LEASE = within(LIMIT_LEASE_S + NOTICE_S)
 
 

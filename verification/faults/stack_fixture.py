@@ -41,7 +41,7 @@ QUICK_MOTORS = str(Path(__file__).with_name("quick_motors.toml"))
 ROOM_M = 900.0  # from here the vehicle is put back to the origin
 READY_S = 60.0  # on a shared host
 SPEED_MPS = 0.8  # of every fault
-LIMIT_LEASE_S = 0.5
+LIMIT_LEASE_S, PENDANT_LEASE_S = 0.5, 1.0
 CLOCKS = ("robot", "driver")
 NORMAL = (
     Wire(), Mute(), Firmware(), Bumper(pressed=False), Driver(side="left", bits=0),
@@ -51,7 +51,7 @@ MODULE = [sys.executable, "-m"]
 SOURCE = "verification.faults.independent_client"
 THIRD_PARTIES = {
     "limiter": "@cmd/limit/lidar",  # no restriction
-    "pendant": "@cmd/estop_keepalive/pendant",
+    "pendant": "@cmd/limit/pendant",
 }
 REMOTE_HOST = "verification.faults.remote_host"
 INDEPENDENT_BOARD = "verification.faults.independent_board"
@@ -187,7 +187,7 @@ def _settings(need: Requirement) -> list[str]:
         "remote driver": ["bus.insecure=true"],  # another host, without certificates
         "third parties": [
             f'safety.limits.lidar={{lease = {LIMIT_LEASE_S}, silence = "stop"}}',
-            'safety.estop_keepalive=["pendant"]',
+            f'safety.limits.pendant={{lease = {PENDANT_LEASE_S}, silence = "latch"}}',
         ],
         "relay": [
             f"board.address={RELAY_TO_PC}", f"board.listen_address={PC}",

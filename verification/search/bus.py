@@ -24,7 +24,7 @@ MS = NS_PER_S // 1000
 ECHO_MS, HOLD_MS = 30, 45  # later than the first copy; later than its neighbours
 ROBOT = "001"
 SESSION_LEASE_MS = 1000
-ROUTES = ("drive", "limit", "estop_keepalive", "motion", "state")
+ROUTES = ("drive", "limit/pendant", "limit", "motion", "state")
 M = TypeVar("M", bound=Message)
 
 

@@ -17,7 +17,7 @@ STEP_S = 0.1  # a decision after a longer pause slows as if it came after this o
 ROUNDING = 2e-3
 NO_CAP = (math.inf, math.inf)
 
-TIMEOUT_S = 1.0  # of a pendant
+PENDANT, TIMEOUT_S = "pendant", 1.0  # its silence latches
 
 BRAKING_MPS2, BRAKING_RADPS2, GRACE_S = 0.6, 1.0, 0.5
 FASTEST_MPS, FASTEST_RADPS = 1.0, 1.0

@@ -14,6 +14,7 @@ from t2 import messages as m
 from verification.search.condition_books import (
     BRAKING_MPS2,
     BRAKING_RADPS2,
+    PENDANT,
     Channel,
     KeepaliveBook,
     LimitBook,
@@ -84,7 +85,7 @@ class SafetyBook:
             self._on_drive(name, message, sent_ns, now_ns)
         elif isinstance(message, m.Limit) and name in self.limits.sources:
             self.limits.sources[name].take(message, sent_ns, now_ns)
-        pendant = isinstance(message, m.EstopKeepalive)
+        pendant = isinstance(message, m.Limit) and name == PENDANT
         return pendant and self.keepalive.on_message(message, sent_ns, now_ns)
 
     def _on_drive(self, source: str, drive: m.Drive, sent_ns: int | None, now_ns: int) -> None:

@@ -27,7 +27,14 @@ from sim.world import Plan
 from t2 import keys
 from t2 import messages as m
 from verification.search.bus import MS, ROBOT, Caller, Net, Process, Source
-from verification.search.condition_books import BRAKING_RADPS2, IGNORED, LEASE_S, NEEDED
+from verification.search.condition_books import (
+    BRAKING_RADPS2,
+    IGNORED,
+    LEASE_S,
+    NEEDED,
+    PENDANT,
+    TIMEOUT_S,
+)
 from verification.search.oracle import STEP_NS, Oracle
 from verification.search.ros import RosSource
 from verification.search.safety_book import FRONT
@@ -37,7 +44,6 @@ ASK_NS = 50 * MS
 BREAK_NS = 50 * MS
 IDEAL = Model()
 PLANE = Plan(title="an empty plane")
-PENDANT = "pendant"
 CONFIGS = {
     "bridge": BridgeConfig(),
     "safety": SafetyConfig(
@@ -45,8 +51,8 @@ CONFIGS = {
             limits={
                 NEEDED: LimitSource(lease=LEASE_S, silence="stop"),
                 IGNORED: LimitSource(lease=LEASE_S, silence="ignore"),
+                PENDANT: LimitSource(lease=TIMEOUT_S, silence="latch"),
             },
-            estop_keepalive=(PENDANT,),
         )
     ),
     "odom": OdomConfig(),
@@ -154,9 +160,7 @@ class Stack:
             SOURCE: RosSource(self.process(SOURCE), self.oracle.violations),
             NEEDED: Source(NEEDED, keys.LIMIT, self.process(NEEDED), m.Limit(echo=0)),
             IGNORED: Source(IGNORED, keys.LIMIT, self.process(IGNORED)),
-            PENDANT: Source(
-                PENDANT, keys.ESTOP_KEEPALIVE, self.process(PENDANT), m.EstopKeepalive(echo=0)
-            ),
+            PENDANT: Source(PENDANT, keys.LIMIT, self.process(PENDANT), m.Limit(echo=0)),
         }
         self.hand = self.process("hand")  # sees what operators see, and sends what has no source
         self.seen: m.SafetyState | None = None

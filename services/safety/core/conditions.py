@@ -30,13 +30,11 @@ def observe_inputs(
     judged = state.verdict.judged if state.verdict.judged != (0, 0) else None
     yield _contact(inputs)
     yield Observation("estop", _estop_received(inputs, state))
-    if state.keepalives.names:
-        yield state.keepalives.observation(now_ns)
     yield _estop_reader(inputs, state, now_ns)
     yield _driver("driver_left", "left", inputs.left)
     yield _driver("driver_right", "right", inputs.right)
     yield Observation("leaving", inputs.leaving)
-    yield _starting(inputs, settings, state.keepalives.missing)
+    yield _starting(inputs, settings, state.speed_limits.missing)
     yield from _link(inputs)
     yield _switches(inputs, settings)
     yield _bumper(inputs, settings, judged, now_ns)

@@ -10,7 +10,6 @@ from t2.messages import (
     Bumper,
     Drive,
     Driver,
-    EstopKeepalive,
     Limit,
     Link,
     Mileage,
@@ -38,14 +37,10 @@ class DriveRequest(Request[Drive], frozen=True):
 
 
 class LimitRequest(Request[Limit], frozen=True):
-    """A speed limit."""
+    """A speed limit, or a sign of life of an emergency stop."""
 
 
-class KeepaliveRequest(Request[EstopKeepalive], frozen=True):
-    """A sign of life of an emergency stop."""
-
-
-SourceRequest = DriveRequest | LimitRequest | KeepaliveRequest
+SourceRequest = DriveRequest | LimitRequest
 
 
 class Inputs(Struct, frozen=True):

@@ -40,7 +40,7 @@ from services.safety.core.motion_watch import Supervisor
 from services.safety.core.operator_requests import answered, carry_out
 from services.safety.core.planning import Plan, Planner, observations
 from services.safety.core.sonars import SonarFilter
-from services.safety.core.sources import Admission, Arbiter, Keepalives, SpeedLimits
+from services.safety.core.sources import Admission, Arbiter, SpeedLimits
 from services.safety.core.state import State, Verdict
 from t2.messages import CauseName, Command, Motion
 from t2.messages import Verdict as VerdictName
@@ -73,7 +73,6 @@ class Policy:
         return State(
             Arbiter(settings.leased),
             SpeedLimits(settings.safety.limits),
-            Keepalives(settings.safety.estop_keepalive, settings.safety.estop_keepalive_timeout),
         )
 
     def accept(self, state: State, request: SourceRequest, now_ns: int) -> tuple[State, str]:
@@ -86,17 +85,17 @@ class Policy:
                 arbiter, refused = arbiter.accept(request, checked)
                 return replace(state, arbiter=arbiter.overruled(now_ns)), refused
             case LimitRequest():
-                checked = self._admission(state, settings.times.max_echo_age, now_ns)
+                source = settings.safety.limits.get(request.source)
+                # A sign of life is as old as its echo, and holds for the lease.
+                is_life = source is not None and source.latches
+                age_s = source.lease if source and is_life else settings.times.max_echo_age
+                checked = self._admission(state, age_s, now_ns)
                 limits, refused = state.speed_limits.accept(request, checked)
                 arbiter = state.arbiter
                 if not refused and limits.channels[request.source].stops:
                     arbiter = arbiter.barred(now_ns)  # also if it ends before the next decision
                 state = replace(state, speed_limits=limits, arbiter=arbiter)
                 return state, refused and f"limit_{refused}"
-            case _:
-                checked = self._admission(state, settings.safety.estop_keepalive_timeout, now_ns)
-                keepalives, refused = state.keepalives.accept(request, checked)
-                return replace(state, keepalives=keepalives), refused and f"keepalive_{refused}"
 
     def _admission(self, state: State, age_s: float, now_ns: int) -> Admission:
         return Admission(state.heartbeat, round(age_s * NS_PER_S), now_ns)

@@ -1,4 +1,4 @@
-"""Sources: which messages of other programs count; drive requests, limits and keepalives.
+"""Sources: which messages of other programs count; drive requests and limits.
 
 **Channel.** Each message carries ``boot`` and ``seq`` of its publisher, and echoes a heartbeat of
 safety. A refused message changes nothing except where noted. It is counted by its reason:
@@ -31,12 +31,13 @@ start of safety until the first limit, and after each lease; ``ignore`` has no e
 publishers on one source stop the vehicle (``two_publishers``), for the lease of the source and
 0.5 s at least: nobody knows which of both is right, and the other one may be slow.
 
-**Keepalives** of emergency stops, as a pendant with a radio link. Before the first message of a
-name the cause ``starting`` inhibits. From then on its silence latches ``estop_keepalive`` and
-brakes. Its time counts from when safety sent the heartbeat that a message echoes, not from the
-reception: a message that a proxy held for 3 s proves nothing about now. A name belongs to one
-running program. A message of another one, or one after a gap, shows that the first program ended or
-that two operators rely on one name: it latches too.
+**Keepalives** of emergency stops, as a pendant with a radio link, are sources whose silence is
+``latch``; a limit without a cap is a sign of life. Before the first one the cause ``starting``
+inhibits. From then on silence latches ``estop_keepalive`` and brakes. Its time counts from when
+safety sent the heartbeat that a message echoes, not from the reception: a message that a proxy held
+for 3 s proves nothing about now. A name belongs to one running program. A message of another one,
+or one after a gap, shows that the first program ended or that two operators rely on one name: it
+latches too.
 """
 
 import math
@@ -52,11 +53,10 @@ from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
 from common.text import printable
 from services.safety.config import LimitSource, Source
 from services.safety.core.causes import Observation
-from services.safety.core.inputs import DriveRequest, KeepaliveRequest, LimitRequest
+from services.safety.core.inputs import DriveRequest, LimitRequest
 from t2.messages import (
     MAX_REASON,
     Drive,
-    KeepaliveState,
     LimitState,
     Phrase,
     ReleaseRequest,
@@ -272,8 +272,9 @@ class SpeedLimits(Struct, frozen=True):
         refused = admission.refusal(name, self.sources, limit)
         if refused or limit is None:
             return self, refused
-        before, lease_s = self.channels.get(name, LimitChannel()), self.sources[name].lease
-        channel, refused = before.accept(limit, request.received_ns, lease_s, admission.max_age_ns)
+        before, source = self.channels.get(name, LimitChannel()), self.sources[name]
+        now_ns, lease_s = request.received_ns, source.lease
+        channel, refused = before.accept(limit, now_ns, lease_s, admission.max_age_ns)
         if not refused:
             channel = replace(
                 channel,
@@ -281,6 +282,10 @@ class SpeedLimits(Struct, frozen=True):
                 angular=_cap(limit.angular),
                 reason=printable(limit.reason)[:MAX_REASON],
             )
+            if source.latches:
+                if before.boot is not None and not before.is_fresh(now_ns, lease_s):
+                    channel = replace(channel, conflict_ns=now_ns)
+                channel = replace(channel, received_ns=admission.sent_ns(limit))
         return replace(self, channels={**self.channels, name: channel}), refused
 
     def limited(self, twist: Twist, now_ns: int) -> tuple[Twist, str | None]:
@@ -302,6 +307,14 @@ class SpeedLimits(Struct, frozen=True):
         silent = tuple(self._silent(now_ns))
         of = (Phrase("limit_silent.of", {"sources": silent}),)
         yield Observation("limit_silent", bool(silent), phrases=of)
+        lost = tuple(self._lost(now_ns))
+        kept = (Phrase("estop_keepalive.lost", {"names": lost}),)
+        yield Observation("estop_keepalive", bool(lost), phrases=kept)
+
+    @property
+    def missing(self) -> list[str]:
+        """The names of emergency stops that were not kept alive since the start."""
+        return [n for n, one in self.sources.items() if one.latches and n not in self.channels]
 
     def conflicts(self, now_ns: int) -> list[str]:
         """Return the names of sources with two publishers."""
@@ -312,7 +325,9 @@ class SpeedLimits(Struct, frozen=True):
         if not self.sources:
             return ()
         valid = dict(self._valid(now_ns))
-        stopping = {name for name, one in valid.items() if one.stops}.union(self._silent(now_ns))
+        stopping = {name for name, one in valid.items() if one.stops}
+        stopping.update(self._silent(now_ns), self.missing)
+        lost = self._lost(now_ns)
         return tuple(
             LimitState(
                 source=name,
@@ -320,10 +335,20 @@ class SpeedLimits(Struct, frozen=True):
                 angular=_published(valid[name].angular) if name in valid else None,
                 reason=valid[name].reason if name in valid else "",
                 age=self.channels.get(name, LimitChannel()).age_s(now_ns),
-                silent=name not in valid,
-                effect="stop" if name in stopping else "slow" if name == slowing else "none",
+                lease=source.lease,
+                silence=source.silence,
+                silent=name not in valid or name in lost,
+                effect=(
+                    "brake"
+                    if name in lost
+                    else "stop"
+                    if name in stopping
+                    else "slow"
+                    if name == slowing
+                    else "none"
+                ),
             )
-            for name in self.sources
+            for name, source in self.sources.items()
         )
 
     def _valid(self, now_ns: int) -> Iterator[tuple[str, LimitChannel]]:
@@ -337,7 +362,16 @@ class SpeedLimits(Struct, frozen=True):
         return [
             name
             for name, one in self.channels.items()
-            if one.in_conflict(now_ns, self.sources[name].lease)
+            if one.in_conflict(now_ns, self.sources[name].lease) and not self.sources[name].latches
+        ]
+
+    def _lost(self, now_ns: int) -> list[str]:
+        """Return the emergency stops that were kept alive and are not, or by two programs."""
+        return [
+            name
+            for name, one in self.channels.items()
+            if self.sources[name].latches
+            and (not one.is_fresh(now_ns, self.sources[name].lease) or one.in_conflict(now_ns))
         ]
 
     def _silent(self, now_ns: int) -> list[str]:
@@ -356,52 +390,3 @@ def _cap(value: float | None) -> float:
 
 def _published(cap: float) -> float | None:
     return None if cap == math.inf else cap
-
-
-class Keepalives(Struct, frozen=True):
-    """State of all names in the settings."""
-
-    names: tuple[str, ...]
-    timeout_s: float
-    channels: Mapping[str, Channel] = {}
-
-    def accept(self, request: KeepaliveRequest, admission: Admission) -> tuple["Keepalives", str]:
-        """Check a message; return the reason of its refusal, empty when accepted."""
-        name, message, now_ns = request.source, request.message, request.received_ns
-        refused = admission.refusal(name, self.names, message)
-        if refused or message is None:
-            return self, refused
-        before = self.channels.get(name, Channel())
-        channel, refused = before.accept(message, now_ns, self.timeout_s, admission.max_age_ns)
-        if not refused:
-            if before.boot is not None and not before.is_fresh(now_ns, self.timeout_s):
-                channel = replace(channel, conflict_ns=now_ns)
-            channel = replace(channel, received_ns=admission.sent_ns(message))
-        return replace(self, channels={**self.channels, name: channel}), refused
-
-    @property
-    def missing(self) -> list[str]:
-        """The names that were not received since the start."""
-        return [name for name in self.names if name not in self.channels]
-
-    def observation(self, now_ns: int) -> Observation:
-        """Return the cause of the names that were received and are lost, present or not."""
-        lost = tuple(name for name in self.channels if not self._is_alive(name, now_ns))
-        by = (Phrase("estop_keepalive.lost", {"names": lost}),)
-        return Observation("estop_keepalive", bool(lost), phrases=by)
-
-    def states(self, now_ns: int) -> tuple[KeepaliveState, ...]:
-        """Return the published states."""
-        return tuple(
-            KeepaliveState(
-                source=name,
-                age=self.channels.get(name, Channel()).age_s(now_ns),
-                alive=self._is_alive(name, now_ns),
-                timeout=self.timeout_s,
-            )
-            for name in self.names
-        )
-
-    def _is_alive(self, name: str, now_ns: int) -> bool:
-        channel = self.channels.get(name, Channel())
-        return channel.is_fresh(now_ns, self.timeout_s) and not channel.in_conflict(now_ns)

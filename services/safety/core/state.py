@@ -8,7 +8,7 @@ from services.safety.core.causes import FaultBudget, Latches, Token
 from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.release import Leg, Release
 from services.safety.core.sonars import SonarArray, SonarOverrides
-from services.safety.core.sources import Arbiter, Keepalives, SpeedLimits
+from services.safety.core.sources import Arbiter, SpeedLimits
 from t2.messages import Command, Phrases
 from t2.messages import Verdict as VerdictName
 
@@ -41,7 +41,6 @@ class State(Struct, frozen=True):
 
     arbiter: Arbiter
     speed_limits: SpeedLimits
-    keepalives: Keepalives
     heartbeat: Heartbeat = Heartbeat()
     latches: Latches = {}
     sonar_array: SonarArray = SonarArray()

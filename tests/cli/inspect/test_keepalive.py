@@ -9,24 +9,25 @@ import pytest
 from cli.inspect.estop import described
 from common.bus.bus import Arrival, Bus
 from t2 import keys
-from t2.messages import EstopKeepalive, KeepaliveState
+from t2.messages import Limit
 from tests.cli.inspect.tool import FakeSafety, Tool
 from tests.common.bus_fixture import BusFixture
-from tests.factories import safety_state
+from tests.factories import limit_source, safety_state
 from verification.harness.waiting import PATIENCE_S, wait_until
 
-KNOWN = KeepaliveState(source="pendant", age=0.1, alive=True, timeout=1.0)
+KNOWN = limit_source("pendant", lease=1.0, silence="latch")
+LIDAR = limit_source("lidar", lease=0.5, silence="stop")
 
 
 class Safety(FakeSafety):
     """A safety service that expects a pendant."""
 
     def __init__(self, buses: BusFixture) -> None:
-        self.received: list[Arrival[EstopKeepalive]] = []
-        super().__init__(buses, self.subscribe, estop_keepalives=(KNOWN,))
+        self.received: list[Arrival[Limit]] = []
+        super().__init__(buses, self.subscribe, limit_sources=(KNOWN, LIDAR))
 
     def subscribe(self, bus: Bus) -> None:
-        bus.subscribe(keys.ESTOP_KEEPALIVE, self.received.append, source="*")
+        bus.subscribe(keys.LIMIT, self.received.append, source="*")
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def test_signs_of_life_enter_and_the_end(buses: BusFixture, safety: Safety) -> N
         try:
             more()
             newest = safety.received[-1]
-            assert newest.key.endswith("/@cmd/estop_keepalive/pendant")
+            assert newest.key.endswith("/@cmd/limit/pendant")
             assert newest.message.echo > 100
             assert not safety.stops
             assert process.stdin is not None
@@ -71,9 +72,10 @@ def test_signs_of_life_enter_and_the_end(buses: BusFixture, safety: Safety) -> N
 
 
 def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
-    result = tool("estop", "--keepalive", "phone")
-    assert result.code == 1
-    assert "safety does not expect 'phone': it expects pendant" in result.err
+    for name in ("phone", "lidar"):
+        result = tool("estop", "--keepalive", name)
+        assert result.code == 1
+        assert f"safety does not expect '{name}': it expects pendant" in result.err
 
 
 def test_a_described_state_is_printable() -> None:

@@ -28,7 +28,7 @@ def member(role: Role, name: str = "anna", robots: tuple[str, ...] = ()) -> Memb
     )
 
 
-DRIVE, LIMIT, KEEPALIVE = keys.DRIVE, keys.LIMIT, keys.ESTOP_KEEPALIVE
+DRIVE, LIMIT = keys.DRIVE, keys.LIMIT
 MEMBERS = ("viewer", "driver of 001", "device lidar of 001", "fleet")
 
 
@@ -50,7 +50,7 @@ def test_a_driver_is_limited_to_its_sources(sources: tuple[str, ...], resets: bo
     for call in keys.CALLS:
         assert may(given, "ask", call.on(MINE)) is (resets or call in (keys.SET_LED, keys.SET_POSE))
     for source in ("nav", "ros2", "teleop", "web", "pendant", "*"):
-        for topic in (DRIVE, KEEPALIVE):
+        for topic in (DRIVE, LIMIT):
             assert may(given, "write", topic.on(MINE, source=source)) is (source in sources)
             assert not may(given, "write", topic.on(OTHER, source=source))
     assert may(given, "write", keys.estop_key(MINE))
@@ -68,7 +68,7 @@ def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> Non
     ):
         assert not may(given, "write", key), key
     assert not any(may(given, "ask", call.on(MINE)) for call in keys.CALLS)
-    assert not may(ROLES["driver of 001"], "write", LIMIT.on(MINE, source="teleop"))
+    assert not may(ROLES["driver of 001"], "write", LIMIT.on(MINE, source="lidar"))
     assert may(ROLES["site's router"], "write", LIMIT.on(OTHER, source="person"))
 
 

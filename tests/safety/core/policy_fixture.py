@@ -12,7 +12,6 @@ from services.safety.core.causes import latched
 from services.safety.core.inputs import (
     DriveRequest,
     Inputs,
-    KeepaliveRequest,
     LimitRequest,
     SourceRequest,
 )
@@ -26,7 +25,6 @@ from t2.messages import (
     Direction,
     Drive,
     Driver,
-    EstopKeepalive,
     Limit,
     Message,
     Mileage,
@@ -183,12 +181,12 @@ class PolicyFixture:
     def keepalive(self, source: str = "pendant", echo: int | None = None) -> Verdict:
         """Put one keepalive."""
         self.keepalive_seq += 1
-        message = EstopKeepalive(
+        message = Limit(
             echo=self.echo if echo is None else echo,
             seq=self.keepalive_seq,
             boot=66,
         )
-        return self.accept(KeepaliveRequest(source, message, self.now_ns))
+        return self.accept(LimitRequest(source, message, self.now_ns))
 
     def drive(
         self,

@@ -18,7 +18,6 @@ from services.safety.core.policy import Policy
 from services.safety.core.sources import (
     Arbiter,
     DriveChannel,
-    Keepalives,
     LimitChannel,
     SpeedLimits,
 )
@@ -181,13 +180,14 @@ def stands(**fields: Any) -> dict[str, Any]:
 LATE = {"phase": Phase.STOPPING, "due_ns": NOW_NS - 1}
 TWICE: dict[str, Any] = {"boot": 1, "seq": 1, "received_ns": NOW_NS, "conflict_ns": NOW_NS}
 STALLED = "Safety was stalled: an emergency stop may have been missed."
+PENDANT = LimitSource(lease=1.0, silence="latch")
 # States that differ from the first one, likewise.
 BY_STATE: list[tuple[dict[str, Any], str, str | None]] = [
     (decided(1.0), "estop_reader", None),
     (decided(1.001), "estop_reader", STALLED),
     ({"estop_connection": 2}, "estop_reader", ""),
     ({"estop_connection": 1}, "estop_reader", None),
-    ({"keepalives": Keepalives(("pendant",), 1.0)}, "starting",
+    ({"speed_limits": SpeedLimits({"pendant": PENDANT})}, "starting",
      "Waiting for the emergency stop keepalive of pendant."),
     ({"verdict": Verdict(judged=(8, SEQ))}, "bumper", "The bridge has restarted."),
     ({"verdict": Verdict(judged=(BOOT, SEQ - 3))}, "bumper", None),

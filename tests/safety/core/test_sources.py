@@ -14,17 +14,17 @@ from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
 from services.safety.config import LimitSource, Safety
-from services.safety.core.inputs import DriveRequest, KeepaliveRequest, LimitRequest
+from services.safety.core.causes import Observation
+from services.safety.core.inputs import DriveRequest, LimitRequest
 from services.safety.core.sources import (
     CONFLICT_NS,
     Admission,
     Arbiter,
     DriveChannel,
-    Keepalives,
     LimitChannel,
     SpeedLimits,
 )
-from t2.messages import Drive, EstopKeepalive, KeepaliveState, Limit, LimitState
+from t2.messages import Drive, Limit, LimitState
 from t2.words import render
 
 MS = NS_PER_S // 1000
@@ -39,7 +39,8 @@ LIMITERS = {
     "fleet": LimitSource(lease=LEASE_S, silence="ignore"),
 }
 DRIVES, LIMITS = Arbiter(SOURCES), SpeedLimits(LIMITERS)
-KEPT = Keepalives(("pendant", "web"), TIMEOUT_S)
+LATCHING = LimitSource(lease=TIMEOUT_S, silence="latch")
+KEPT = SpeedLimits({"pendant": LATCHING, "web": LATCHING})
 
 
 def admission(now_ns: int) -> Admission:
@@ -77,7 +78,7 @@ def limit(
 
 
 def keep(
-    keepalives: Keepalives,
+    keepalives: SpeedLimits,
     now_ns: int = 0,
     *,
     source: str = "pendant",
@@ -85,10 +86,11 @@ def keep(
     seq: int = 1,
     boot: int = 1,
     late_ns: int = 0,
-) -> tuple[Keepalives, str]:
-    message = EstopKeepalive(echo=echo, seq=seq, boot=boot)
+    **caps: Any,
+) -> tuple[SpeedLimits, str]:
+    message = Limit(echo=echo, seq=seq, boot=boot, **caps)
     checked = Admission(BEAT, TIMEOUT_NS, now_ns + late_ns)
-    return keepalives.accept(KeepaliveRequest(source, message, now_ns), checked)
+    return keepalives.accept(LimitRequest(source, message, now_ns), checked)
 
 
 # --- admission ------------------------------------------------------------------------------
@@ -107,9 +109,8 @@ def accept_limit(source: str, valid: bool, echo: int, checked: Admission) -> str
 
 
 def accept_keepalive(source: str, valid: bool, echo: int, checked: Admission) -> str:
-    message = EstopKeepalive(echo=echo) if valid else None
-    name = {"known": "web"}.get(source, source)
-    return KEPT.accept(KeepaliveRequest(name, message), checked)[1]
+    message = Limit(echo=echo) if valid else None
+    return KEPT.accept(LimitRequest({"known": "web"}.get(source, source), message), checked)[1]
 
 
 @pytest.mark.parametrize("accept", [accept_drive, accept_limit, accept_keepalive])
@@ -299,7 +300,7 @@ def test_zero_is_a_protective_stop(
     linear: float | None, angular: float | None, stops: bool
 ) -> None:
     limits, _ = limit(LIMITS, linear, angular=angular, reason="PERSON.")
-    stop, silent = limits.observations(0)
+    stop, silent, _ = limits.observations(0)
     assert (stop.name, stop.present) == ("limit_stop", stops)
     assert not silent.present
     if stops:
@@ -312,7 +313,7 @@ def test_zero_is_a_protective_stop(
 
 def test_all_silent_sources_are_named() -> None:
     needed = LimitSource(lease=LEASE_S, silence="stop")
-    _, silent = SpeedLimits({"lidar": needed, "person": needed}).observations(0)
+    _, silent, _ = SpeedLimits({"lidar": needed, "person": needed}).observations(0)
     assert (silent.name, render(silent.phrases)) == (
         "limit_silent", "No speed limit arrives of lidar, person.",
     )  # fmt: skip
@@ -320,15 +321,16 @@ def test_all_silent_sources_are_named() -> None:
 
 def test_states_of_limits() -> None:
     never = LimitState(
-        source="lidar", linear=None, angular=None, reason="", age=None, silent=True, effect="stop"
-    )
+        source="lidar", linear=None, angular=None, reason="", age=None, silent=True, effect="stop",
+        lease=LEASE_S, silence="stop",
+    )  # fmt: skip
     assert LIMITS.states(None, 0)[0] == never
     assert [one.effect for one in LIMITS.states(None, 0)] == ["stop", "none"]
     limits, _ = limit(limit(LIMITS, 0.5, reason="person")[0], angular=0.3, source="fleet")
     lidar, fleet = limits.states("lidar", LEASE_NS)
     assert lidar == LimitState(
         source="lidar", linear=0.5, angular=None, reason="person", age=LEASE_S, silent=False,
-        effect="slow",
+        effect="slow", lease=LEASE_S, silence="stop",
     )  # fmt: skip
     assert (fleet.linear, fleet.angular, fleet.effect, fleet.silent) == (None, 0.3, "none", False)
     lidar, fleet = limits.states("lidar", LEASE_NS + 1)
@@ -372,8 +374,13 @@ def test_no_limit_raises_any_speed_or_bends_the_curve(
 # --- keepalives -----------------------------------------------------------------------------
 
 
-def alive(keepalives: Keepalives, now_ns: int) -> bool:
-    return keepalives.states(now_ns)[0].alive
+def alive(keepalives: SpeedLimits, now_ns: int) -> bool:
+    return not keepalives.states(None, now_ns)[0].silent
+
+
+def lost(keepalives: SpeedLimits, now_ns: int) -> Observation:
+    """Return the cause of emergency stops that are no longer kept alive, present or not."""
+    return [*keepalives.observations(now_ns)][-1]
 
 
 def test_a_keepalive_counts_from_the_echoed_heartbeat() -> None:
@@ -388,29 +395,40 @@ def test_a_keepalive_counts_from_the_echoed_heartbeat() -> None:
 def test_another_program_under_the_name_is_a_loss_at_any_time(now_ns: int) -> None:
     other, refused = keep(keep(KEPT)[0], now_ns, boot=2, echo=42)
     assert refused == ("second_publisher" if now_ns <= TIMEOUT_NS else "")
-    seen = other.observation(now_ns)
+    seen = lost(other, now_ns)
     assert (seen.name, seen.present) == ("estop_keepalive", True)
     assert render(seen.phrases) == "The emergency stop is no longer kept alive by pendant."
     assert other.channels["pendant"].in_conflict(now_ns + CONFLICT_NS - 1)
+    assert other.conflicts(now_ns) == []  # the cause that latches says it
+    assert other.states(None, now_ns)[0].effect == "brake"
 
 
-@pytest.mark.parametrize(("now_ns", "lost"), [(TIMEOUT_NS, False), (TIMEOUT_NS + 1, True)])
-def test_a_gap_is_a_loss_although_the_program_is_the_same(now_ns: int, lost: bool) -> None:
+@pytest.mark.parametrize(("now_ns", "is_lost"), [(TIMEOUT_NS, False), (TIMEOUT_NS + 1, True)])
+def test_a_gap_is_a_loss_although_the_program_is_the_same(now_ns: int, is_lost: bool) -> None:
     later, refused = keep(keep(KEPT)[0], now_ns, echo=42, seq=2)
     assert refused == ""
-    assert later.observation(now_ns).present is lost
-    assert alive(later, now_ns) is not lost
+    assert lost(later, now_ns).present is is_lost
+    assert alive(later, now_ns) is not is_lost
 
 
 def test_a_name_that_was_never_received_is_missing_and_not_lost() -> None:
     assert KEPT.missing == ["pendant", "web"]
-    assert not KEPT.observation(0).present
+    assert not lost(KEPT, 0).present
     keepalives, _ = keep(KEPT)
     assert keepalives.missing == ["web"]
-    assert not keepalives.observation(0).present
-    assert keepalives.states(500 * MS) == (
-        KeepaliveState(source="pendant", age=0.5, alive=True, timeout=TIMEOUT_S),
-        KeepaliveState(source="web", age=None, alive=False, timeout=TIMEOUT_S),
-    )
-    lost = keep(keepalives, source="web")[0].observation(2 * TIMEOUT_NS)
-    assert render(lost.phrases) == "The emergency stop is no longer kept alive by pendant, web."
+    assert not lost(keepalives, 0).present
+    pendant, web = keepalives.states(None, 500 * MS)
+    assert (pendant.age, pendant.silent, pendant.effect) == (0.5, False, "none")
+    assert (web.age, web.silent, web.effect) == (None, True, "stop")
+    assert (web.lease, web.silence) == (TIMEOUT_S, "latch")
+    cause = lost(keep(keepalives, source="web")[0], 2 * TIMEOUT_NS)
+    assert render(cause.phrases) == "The emergency stop is no longer kept alive by pendant, web."
+    others = [one.present for one in [*keepalives.observations(2 * TIMEOUT_NS)][:-1]]
+    assert others == [False, False]  # neither a protective stop nor a silent limit
+
+
+def test_a_sign_of_life_may_have_a_cap_that_holds_as_long() -> None:
+    keepalives, _ = keep(KEPT, linear=0.2)
+    assert keepalives.limited(Twist(1.0), TIMEOUT_NS) == (Twist(0.2), "pendant")
+    assert keepalives.limited(Twist(1.0), TIMEOUT_NS + 1) == (Twist(1.0), None)
+    assert lost(keepalives, TIMEOUT_NS + 1).present

@@ -24,7 +24,7 @@ def configured(**settings: Any) -> SafetyConfig:
 
 IGNORED = configured(limits={"lidar": LimitSource(lease=LEASE_S, silence="ignore")})
 NEEDED = configured(limits=SOURCES)
-KEPT = configured(estop_keepalive=("pendant",))
+KEPT = configured(limits={"pendant": LimitSource(lease=1.0, silence="latch")})
 
 
 def test_a_cap_that_falls_is_reached_at_the_normal_deceleration() -> None:
@@ -188,4 +188,4 @@ def test_messages_that_a_proxy_holds_do_not_keep_it_alive() -> None:
         fixture.drive(0.5, seconds=0.1)
     assert fixture.verdict.command == "brake"
     fixture.keepalive(echo=echo)
-    assert fixture.refused == "keepalive_late"
+    assert fixture.refused == "limit_late"
