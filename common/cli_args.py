@@ -4,7 +4,7 @@ import argparse
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,10 @@ from common.text import printable
 from t2.errors import LinkError, T2Error
 from t2.messages import VERSION as VERSION
 from t2.text_file import expanded
+from t2.words import LANGUAGES, Language
 
+LANGUAGE_ENV = "T2_LANG"
+LOCALE_ENV = ("LC_ALL", "LC_MESSAGES", "LANG")  # the first that is set counts, as for all programs
 FILES_ENV = "T2_CONFIG"  # settings files, separated as in PATH; programs pass it to their children
 
 EXIT_CONFIG = 78  # EX_CONFIG: a restart does not help
@@ -71,6 +74,21 @@ def source_words(options: argparse.Namespace) -> list[str]:
 def hint(command: str, words: Sequence[str]) -> str:
     """Return a command of ``t2`` to paste, with the options that name sources of settings."""
     return f"`{shlex.join(['t2', command, *words])}`"
+
+
+def reader_language(environ: Mapping[str, str] = os.environ) -> Language:
+    """Return the language of screens: that of ``T2_LANG``, otherwise of the locale.
+
+    Raise ``ConfigError`` if ``T2_LANG`` is another one.
+    """
+    if chosen := environ.get(LANGUAGE_ENV):
+        for language in LANGUAGES:
+            if chosen == language:
+                return language
+        names = " or ".join(LANGUAGES)
+        raise ConfigError(f"environment {LANGUAGE_ENV}: {chosen!r} is unknown; use {names}")
+    locale = next(filter(None, map(environ.get, LOCALE_ENV)), "")
+    return "zh" if locale.startswith("zh") else "en"
 
 
 def add_setting(parser: argparse.ArgumentParser, option: str, path: str, text: str) -> None:

@@ -19,18 +19,10 @@ from typing import Literal
 
 from msgspec import Struct
 
-from t2.messages import CauseName, Link, Phrase, SafetyState
-from t2.words import render
+from t2.messages import CauseName, Link, SafetyState
 
 Part = Literal["", "router", "safety", "bridge", "relay", "board"]
 
-# Without one of these no command reaches the wheels, and a board may keep its last one.
-TEXTS: dict[Part, str] = {
-    "bridge": render((Phrase("root.bridge"),)),
-    "relay": render((Phrase("root.relay"),)),
-    "board": render((Phrase("root.board"),)),
-}
-MAY_MOVE = render((Phrase("root.may_move"),))
 # Causes of safety that it has without a bridge, and others that follow from a missing bridge, relay
 # or board. One that latches, or that brakes a moving vehicle, is not among them.
 WITHOUT_BRIDGE: tuple[CauseName, ...] = ("starting", "bumper", "silent", "link")

@@ -513,6 +513,28 @@ PHRASES: dict[str, Words] = {
         "sideways through this interface.",
         "指令要求 linear.x 和 angular.z 之外的运动：此接口不支持横向行驶。",
     ),
+    # the terminal of ``t2 drive``
+    "terminal.unknown": ("Terminal delay unknown: no answer yet.", "终端延迟未知：尚无应答。"),
+    "terminal.slow": (
+        "Terminal too slow: {delay:.2f} s, limit {limit:g} s.",
+        "终端过慢：{delay:.2f} s，上限 {limit:g} s。",
+    ),
+    "terminal.ignored": ("Keystrokes ignored.", "按键已忽略。"),
+    "terminal.advice": (
+        "Use `t2 drive` on a machine near the robot, or the dashboard.",
+        "请在靠近机器人的计算机上运行 `t2 drive`，或使用仪表板。",
+    ),
+    "gamepad.status": ("Gamepad:", "手柄："),
+    "gamepad.off": ("off", "已关闭"),
+    "gamepad.searching": ("searching", "正在查找"),
+    "gamepad.none": ("none", "无"),
+    "gamepad.device": ("{device}", "{device}"),
+    "gamepad.several": ("{count} found: hold a deadman", "找到 {count} 个：请按住使能键"),
+    "gamepad.unusable": (
+        "none: {device} has no such axes or deadman", "无：{device} 没有所设的轴或使能键",
+    ),
+    "gamepad.no_library": ("none: pygame-ce is not installed", "无：未安装 pygame-ce"),
+    "gamepad.failed": ("none: {reason}", "无：{reason}"),
     # operators
     "operator.by": ("Certificate: {by}.", "证书：{by}。"),
     "driver.taken": (
@@ -733,7 +755,7 @@ EVENTS: tuple[EventRow, ...] = (
         ("Counters and velocities agree again.", "编码器计数与速度已恢复一致。"), NOTHING,
     ),
     EventRow(
-        "teleop", "gamepad", "info", ("Gamepad: {device}.", "手柄：{device}。"),
+        "teleop", "gamepad", "info", ("Another gamepad, or none.", "手柄已更换或已断开。"),
         (
             "nothing to do; a disconnected one counts as let go",
             "无需处理；断开的手柄视为已松开",
@@ -771,8 +793,8 @@ EVENTS: tuple[EventRow, ...] = (
             "{other} 取得控制权：操纵装置视为已松开。",
         ),
         (
-            "let go of all keys and the gamepad, then drive again",
-            "请松开所有按键和手柄，然后重新驾驶",
+            "let go of the keyboard and the gamepad, then drive again",
+            "请松开键盘和手柄，然后重新驾驶",
         ),
     ),
     EventRow(
@@ -926,9 +948,10 @@ WORDS: dict[str, Words] = {
 TEXTS: dict[str, Words] = {
     **PHRASES,
     **{name: entry.text for name, entry in CAUSES.items()},
-    # An event of safety has its own phrases: a name that others publish, too, has their text.
+    # An event of a cause that latches has the phrases of the cause.
     **{
         f"event.{row.name}": row.text
-        for row in sorted(EVENTS, key=lambda row: row.services != "safety")
+        for row in EVENTS
+        if row.services != "safety" or row.name not in LATCHED
     },
 }

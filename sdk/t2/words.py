@@ -7,7 +7,7 @@ Python's, as in ``{age:.1f}``. ``{name:word}`` is a word of the catalogue, or se
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
 from t2.catalogue import TEXTS, WORDS, Words
@@ -21,13 +21,18 @@ GAP = {"en": " ", "zh": ""}  # between two sentences
 COMMA = {"en": ", ", "zh": "、"}  # between two words of a list
 
 
-def render(phrases: Iterable[Phrase], language: Language = "en", otherwise: str = "") -> str:
+def render(
+    phrases: Iterable[Phrase],
+    language: Language = "en",
+    otherwise: str = "",
+    texts: Mapping[str, Words] = TEXTS,
+) -> str:
     """Return the phrases as one text.
 
     ``otherwise`` is the text of the message that has them: it is returned without any phrase, and
-    for one that this version does not know.
+    for one that this version does not know. ``texts`` has the templates by name.
     """
-    rendered = [_rendered(phrase, language) for phrase in phrases]
+    rendered = [_rendered(phrase, language, texts) for phrase in phrases]
     if not rendered or None in rendered:
         return otherwise
     return GAP[language].join(filter(None, rendered))
@@ -43,8 +48,8 @@ def in_language(words: Words, language: Language) -> str:
     return words[LANGUAGES.index(language)]
 
 
-def _rendered(phrase: Phrase, language: Language) -> str | None:
-    words = TEXTS.get(phrase.name)
+def _rendered(phrase: Phrase, language: Language, texts: Mapping[str, Words]) -> str | None:
+    words = texts.get(phrase.name)
     if words is None:
         return None
 

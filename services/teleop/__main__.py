@@ -19,6 +19,7 @@ from common.cli_args import (
     add_setting,
     add_sources,
     needs_extra,
+    reader_language,
     run_program,
     source_words,
     sources,
@@ -27,8 +28,9 @@ from common.config import Loaded, load
 from common.service import Node
 from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
+from services.teleop.event_log import EventLog
 from services.teleop.gamepad import find
-from services.teleop.view import EventLog
+from services.teleop.labels import Labels
 from t2.errors import T2Error
 
 EXIT_HANGUP = 128 + signal.SIGHUP
@@ -43,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_setting(parser, "--robot", "robot.id", "robot to drive, such as 001")
     parser.add_argument(
         "--no-gamepad", action="append_const", dest="sets", const="teleop.gamepad=false",
-        help="use keys only",
+        help="use the keyboard only",
     )  # fmt: skip
     add_sources(parser)
 
@@ -53,16 +55,17 @@ def run(options: argparse.Namespace) -> int:
     loaded = load(TeleopConfig, sources(options))
     if not terminal_is_there():
         raise T2Error("driving needs a terminal on standard input and output")
-    return TeleopProcess(loaded, source_words(options)).run()
+    labels = Labels(reader_language())
+    return TeleopProcess(loaded, labels, source_words(options)).run()
 
 
 class TeleopProcess:
     """Teleop's process: the node's loop, the controller and the screen."""
 
-    def __init__(self, loaded: Loaded[TeleopConfig], words: Sequence[str]) -> None:
+    def __init__(self, loaded: Loaded[TeleopConfig], labels: Labels, words: Sequence[str]) -> None:
         with needs_extra("teleop", "the screen"):
             from services.teleop.app import TeleopApp
-        self._screen = TeleopApp
+        self._screen, self._labels = TeleopApp, labels
         event_log = EventLog()
         event_log.capture_logs(loaded.config.log)
         self._settings = loaded.config
@@ -84,16 +87,17 @@ class TeleopProcess:
         self._thread.start()
         try:
             self._screen(
-                self._controller, post, lambda: not self._thread.is_alive(), self._settings.teleop
-            ).run()
+                self._controller, post, lambda: not self._thread.is_alive(),
+                self._settings.teleop, self._labels,
+            ).run()  # fmt: skip
         finally:
             self._leave()
             self._thread.join(END_TIMEOUT_S)
             log.configure(self._settings.log, "teleop")
         if self._error:
             raise self._error
-        if text := self._controller.unconfirmed:
-            raise T2Error(text)
+        if phrases := self._controller.unconfirmed:
+            raise T2Error(self._labels.render(phrases))
         return 0
 
     def _serve(self) -> None:

@@ -1,4 +1,4 @@
-"""The screen: panels that are redrawn five times a second; keys go to the controller.
+"""The screen: panels that are redrawn five times a second; presses go to the controller.
 
 The screen decides nothing. It exits when the controller has sent its final zeros.
 """
@@ -25,21 +25,22 @@ from services.teleop import panels
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
 from services.teleop.core.hold import Press
-from services.teleop.core.keystroke import key_of, without_alternates
-from services.teleop.core.round_trip import PROBE_S, place
+from services.teleop.core.keystroke import keystroke_of, without_alternates
+from services.teleop.core.round_trip import QUERY_S, place
+from services.teleop.labels import Labels
 
 QUERY = "\x1b7\x1b[{row};{column}H\x1b[6n\x1b8"  # move the cursor, query its position, restore it
-ALTERNATES = "\x1b[=4;2u"  # the kitty protocol's report of a key's place; others ignore it
+ALTERNATES = "\x1b[=4;2u"  # the kitty protocol's report of a keystroke's place; others ignore it
 QUIT = "q"
 MAX_UNANSWERED = 10  # queries; after that only every tenth is sent
 TALL = 30  # rows of a terminal with room for more causes
 REST = 20  # rows of the other panels, and borders
 EVENTS = 3  # of them those of the events, which yield to an alarm
-REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay the keys
+REFRESH_S = 0.2  # Textual needs tens of milliseconds for a redraw, which delay keystrokes
 
 
 class PlaceParser(XTermParser):
-    """Textual's parser, with the places of keys, and for sequences that it cannot read."""
+    """Textual's parser, with the places of keystrokes, and for sequences that it cannot read."""
 
     def _sequence_to_key_events(self, sequence: str, alt: bool = False) -> Iterable[events.Key]:
         try:
@@ -66,7 +67,7 @@ class Panel(Static):
 
 
 class TeleopApp(App[None]):
-    """The operator's screen: posts keys to the controller and draws its view."""
+    """The operator's screen: posts presses to the controller and draws its view."""
 
     CSS_PATH = Path(__file__).with_name("app.tcss")
     ENABLE_COMMAND_PALETTE = False
@@ -80,6 +81,8 @@ class TeleopApp(App[None]):
         post: Post,
         ended: Callable[[], bool],
         hold: Teleop,
+        labels: Labels,
+        *,
         clock: Callable[[], int] = clock.now_ns,
     ) -> None:
         super().__init__()
@@ -92,9 +95,11 @@ class TeleopApp(App[None]):
         self._view = controller.view  # the last one drawn
         self._queries = 0  # to the terminal
         self._unanswered = 0  # in a row
+        self._labels = labels
         self._header, self._hints = Panel(id="header"), Panel(id="hints")
-        self._safety, self._around = titled("safety"), titled("around")
-        self._motion, self._events = titled("motion"), titled("events")
+        self._safety, self._around, self._motion, self._events = (
+            titled(name, labels) for name in ("safety", "around", "motion", "events")
+        )
 
     def compose(self) -> ComposeResult:
         """Lay out the panels."""
@@ -107,34 +112,34 @@ class TeleopApp(App[None]):
         yield self._hints
 
     def on_mount(self) -> None:
-        """Start the timers, and ask for the places of keys."""
+        """Start the timers, and ask for the places of keystrokes."""
         self.query_terminal(ALTERNATES)
         self.set_interval(REFRESH_S, self.draw)
-        self.set_interval(PROBE_S, self.probe)
+        self.set_interval(QUERY_S, self.query_cursor)
 
     def draw(self) -> None:
         """Redraw all panels; exit once the controller's loop has ended."""
         if self._ended():
             self.exit()
             return
-        now_ns = self._clock()
+        now_ns, say = self._clock(), self._labels
         self._post(lambda: self._controller.screen_drawn(now_ns))
         self._view = view = self._controller.view
-        self._header.show(panels.header(view))
+        self._header.show(panels.header(view, say))
         least = 5 if self.size.height >= TALL else 2
-        text = panels.safety(view, least, self._safety.content_size.width)
+        text = panels.safety(view, say, least, self._safety.content_size.width)
         self.set_class(bool(view.alarm), "alarm")
         free = self.size.height - REST + (EVENTS if view.alarm else 0)
         rows = min(text.plain.count("\n") + 1, free)
         self._safety.styles.height = max(least, rows) + 2  # with its borders
         self._safety.show(text)
-        self._around.show(panels.around(view))
-        self._motion.show(panels.motion(view))
+        self._around.show(panels.around(view, say))
+        self._motion.show(panels.motion(view, say))
         size = self._events.content_size
-        self._events.show(panels.events(view, size.height, size.width))
-        self._hints.show(panels.hints(view, self._hold.hold_first))
+        self._events.show(panels.events(view, say, size.height, size.width))
+        self._hints.show(panels.hints(view, say, self._hold.hold_first))
 
-    def probe(self) -> None:
+    def query_cursor(self) -> None:
         """Query the cursor position, at a place that identifies the query."""
         if self._leaving:
             return  # the shell would read the answer as input
@@ -158,12 +163,12 @@ class TeleopApp(App[None]):
         self._post(lambda: self._controller.terminal.answered(where, at_ns))
 
     def on_key(self, event: events.Key) -> None:
-        """Post a key to the controller; CapsLock and shift make no difference."""
-        key = key_of(event.key, event.character)
-        if key == QUIT:  # of a full-width keyboard
+        """Post a press to the controller; CapsLock and shift make no difference."""
+        keystroke = keystroke_of(event.key, event.character)
+        if keystroke == QUIT:  # of a full-width keyboard
             self.action_leave()
             return
-        press = Press(key, self._received_ns(event), self._view.safety)
+        press = Press(keystroke, self._received_ns(event), self._view.safety)
         self._post(lambda: self._controller.press(press, self._clock()))
 
     def _received_ns(self, event: events.Event) -> int:
@@ -171,9 +176,9 @@ class TeleopApp(App[None]):
         return self._clock() - round((time.monotonic() - event.time) * NS_PER_S)
 
     def on_app_blur(self) -> None:
-        """Release the controls when the terminal loses the focus, and with it the key repeats."""
+        """Let go of the controls when the terminal loses the focus, and with it the repeats."""
         now_ns = self._clock()
-        self._post(lambda: self._controller.release_controls(now_ns))
+        self._post(lambda: self._controller.let_go(now_ns))
 
     def action_leave(self) -> None:
         """Request the final zeros; ``draw`` exits after them. A second call exits at once."""
@@ -183,8 +188,8 @@ class TeleopApp(App[None]):
         self._post(self._controller.leave)
 
 
-def titled(name: str) -> Panel:
+def titled(name: str, say: Labels) -> Panel:
     """Return a panel with its name as the border title."""
     panel = Panel(id=name)
-    panel.border_title = name
+    panel.border_title = say(f"title.{name}")
     return panel

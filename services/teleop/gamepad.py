@@ -13,6 +13,7 @@ from typing import Any
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Stick
 from services.teleop.core.pads import Pads, Reading, is_usable
+from t2.messages import Phrase
 
 ENVIRON = {
     "PYGAME_HIDE_SUPPORT_PROMPT": "1",  # its banner would overwrite the screen
@@ -26,7 +27,7 @@ LIST_READS = 100  # from one list of the devices to the next: 5 s
 class Gamepad:
     """A gamepad; this one is disabled or unavailable."""
 
-    def __init__(self, status: str) -> None:
+    def __init__(self, status: Phrase) -> None:
         self.status = status  # its name, or why it is missing
         self.ignored: dict[int, float] = {}  # axes that do not count, with their position
 
@@ -39,7 +40,7 @@ class SdlGamepad(Gamepad):
     """All gamepads that SDL finds; the one whose deadman is held drives."""
 
     def __init__(self, pygame: ModuleType, settings: Teleop) -> None:
-        super().__init__("none")
+        super().__init__(Phrase("gamepad.none"))
         self._pygame: Any = pygame
         self._settings = settings
         self._pads = Pads(settings)
@@ -65,25 +66,29 @@ class SdlGamepad(Gamepad):
         stick = self._pads.update(readings)
         self.ignored = self._pads.ignored
         if self._pads.driving is not None:
-            self.status = str(self._devices[self._pads.driving].get_name())
+            self.status = _named(self._devices[self._pads.driving])
         return stick
 
     def _list(self) -> None:
         """Open all devices, and name the one that can drive, or why none can."""
         before, settings = set(self._devices), self._settings
-        self._devices, unusable = {}, ""
+        self._devices, missing = {}, Phrase("gamepad.none")
         for index in range(self._pygame.joystick.get_count()):
             with contextlib.suppress(self._pygame.error):  # unplugged in the meantime
                 device = self._pygame.joystick.Joystick(index)
                 if is_usable(settings, device.get_numaxes(), device.get_numbuttons()):
                     self._devices[device.get_instance_id()] = device
                 else:
-                    unusable = f": {device.get_name()} has no such axes or deadman"
+                    missing = Phrase("gamepad.unusable", {"device": str(device.get_name())})
         if set(self._devices) == before and before:
             return
-        names = [str(device.get_name()) for device in self._devices.values()]
-        self.status = f"{len(names)} found: hold a deadman" if len(names) > 1 else "".join(names)
-        self.status = self.status or f"none{unusable}"
+        found = [_named(device) for device in self._devices.values()] or [missing]
+        several = Phrase("gamepad.several", {"count": len(found)})
+        self.status = found[0] if len(found) == 1 else several
+
+
+def _named(device: Any) -> Phrase:
+    return Phrase("gamepad.device", {"device": str(device.get_name())})
 
 
 def _reading(device: Any) -> Reading:
@@ -99,14 +104,14 @@ def _reading(device: Any) -> Reading:
 def find(settings: Teleop) -> Gamepad:
     """Return the gamepad of the settings, or one without input that names the reason."""
     if not settings.gamepad:
-        return Gamepad("off")
+        return Gamepad(Phrase("gamepad.off"))
     for name, value in ENVIRON.items():
         os.environ.setdefault(name, value)
     try:
         import pygame
     except ImportError:
-        return Gamepad("none: pygame-ce is not installed")
+        return Gamepad(Phrase("gamepad.no_library"))
     try:
         return SdlGamepad(pygame, settings)
     except pygame.error as error:
-        return Gamepad(f"none: {error}")
+        return Gamepad(Phrase("gamepad.failed", {"reason": str(error)}))

@@ -16,7 +16,8 @@ def operator() -> Iterator[Operator]:
 
 
 @pytest.fixture
-def screen() -> Iterator[Screen]:
-    screen = Screen()
+def screen(request: pytest.FixtureRequest) -> Iterator[Screen]:
+    """Return a screen; its parameter is the language."""
+    screen = Screen(getattr(request, "param", "en"))
     yield screen
     screen.node.loop.close()

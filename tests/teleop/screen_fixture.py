@@ -14,7 +14,9 @@ from common.loop import Post
 from services.teleop.app import Panel, TeleopApp
 from services.teleop.config import Teleop
 from services.teleop.controller import Controller
+from services.teleop.labels import Labels
 from t2 import keys
+from t2.words import Language
 from tests.factories import contact_state
 from tests.teleop.inputs import answer
 from tests.teleop.support import TeleopNode
@@ -34,16 +36,21 @@ class LocalTerminalApp(TeleopApp):
 class Screen:
     """A node with its controller and screen."""
 
-    def __init__(self) -> None:
+    def __init__(self, language: Language = "en") -> None:
         self.node = TeleopNode()
         self.controller = Controller(self.node, self.node.event_log)
         self.ended = False
         self.now_ns = 100 * NS_PER_S
         post: Post = lambda call: call()  # noqa: E731 - the screen's thread is the controller's here
         self.app = LocalTerminalApp(
-            self.controller, post, lambda: self.ended, Teleop(), lambda: self.now_ns
+            self.controller,
+            post,
+            lambda: self.ended,
+            Teleop(),
+            Labels(language),
+            clock=lambda: self.now_ns,
         )
-        # Independent of the time that this host takes to deliver a key.
+        # Independent of the time that this host takes to deliver a keystroke.
         self.app._received_ns = lambda event: self.now_ns  # type: ignore[method-assign]
 
     def speeds(self, count: int) -> list[float]:
@@ -60,7 +67,7 @@ class Screen:
         return sent
 
     def answer(self) -> None:
-        """Simulate a fast terminal, so that keys that the host delayed count."""
+        """Simulate a fast terminal, so that keystrokes that the host delayed count."""
         for ago in range(10, 0, -1):
             answer(self.controller.terminal, self.now_ns - ago * NS_PER_S // 20)
 

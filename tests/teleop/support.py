@@ -8,13 +8,17 @@ from services.teleop.config import TeleopConfig
 from services.teleop.controller import Controller
 from services.teleop.core.controls import Stick
 from services.teleop.core.hold import Press
+from services.teleop.event_log import EventLog
 from services.teleop.gamepad import Gamepad
-from services.teleop.view import EventLog, View
+from services.teleop.labels import Labels
+from services.teleop.view import View
 from t2 import keys
-from t2.messages import Drive, SafetyState
+from t2.messages import Drive, Phrase, SafetyState
 from tests.factories import contact_state, safety_state
 from tests.fake_bus import FakeNode
 from tests.teleop.inputs import PERIOD_NS, answer
+
+english = Labels().render
 
 
 class TeleopNode(FakeNode[TeleopConfig]):
@@ -34,6 +38,7 @@ def view(**fields: Any) -> View:
         "connected": True,
         "gear": 1,
         "top": Twist(0.2, 0.3),
+        "gamepad": Phrase("gamepad.none"),
     }
     return View(**usual | fields)
 
@@ -42,7 +47,7 @@ class FakeGamepad(Gamepad):
     """A gamepad with a configured state."""
 
     def __init__(self) -> None:
-        super().__init__("Fake Pad")
+        super().__init__(Phrase("gamepad.device", {"device": "Fake Pad"}))
         self.stick: Stick | None = None
 
     def read(self) -> Stick | None:
@@ -60,9 +65,9 @@ class Operator:
         self.shown: SafetyState | None = None
         answer(self.controller.terminal, self.now_ns)
 
-    def press(self, key: str, waited_s: float = 0.0) -> None:
+    def press(self, keystroke: str, waited_s: float = 0.0) -> None:
         at_ns = self.now_ns - round(waited_s * NS_PER_S)
-        self.controller.press(Press(key, at_ns, self.shown), self.now_ns)
+        self.controller.press(Press(keystroke, at_ns, self.shown), self.now_ns)
 
     def wait(self, seconds: float) -> None:
         """Advance the clock without ticks; then the terminal answers at once."""
@@ -95,4 +100,12 @@ class Operator:
 
     @property
     def lines(self) -> list[str]:
-        return [line.text for line in self.node.event_log.lines()]
+        return [english(line.phrases, line.text) for line in self.node.event_log.lines()]
+
+    @property
+    def alarm(self) -> str:
+        return english(self.controller.view.alarm)
+
+    @property
+    def unconfirmed(self) -> str:
+        return english(self.controller.unconfirmed)

@@ -5,14 +5,13 @@ from msgspec import structs
 
 from common.bus.bus import no_answer, not_allowed
 from common.bus.publisher import Publisher
-from common.root_cause import MAY_MOVE
 from t2 import keys
 from t2.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
-from t2.messages import Driver, Event, ResetDone, ResetRequest
+from t2.messages import Driver, Event, Phrase, Refusal, ResetDone, ResetRequest
 from tests.factories import link, safety_state
 from tests.fake_bus import FakeBus
 from tests.teleop.inputs import answer, stick
-from tests.teleop.support import FakeGamepad, Operator
+from tests.teleop.support import FakeGamepad, Operator, english
 
 DONE = ResetDone(text="Reset.", boot=5, heartbeat=8, cleared=(42,))
 
@@ -51,7 +50,7 @@ def test_quitting_waits_for_an_emergency_stop(operator: Operator, order: str) ->
     assert operator.node.fake.estops == 11
     operator.tell_safety(latched=("estop",))
     operator.ticks(2)
-    assert (operator.node.fake.estops, operator.controller.unconfirmed) == (11, "")
+    assert (operator.node.fake.estops, operator.unconfirmed) == (11, "")
     operator.node.loop.run()  # returns, for it has been stopped
 
 
@@ -98,16 +97,16 @@ def test_an_estop_that_is_not_latched_is_reported(
             operator.ticks(1)
     assert operator.node.fake.estops == ESTOP_TICKS + 3  # and so on
     why = ", probably not allowed" if denied else ""
-    alarm = f"EMERGENCY STOP NOT CONFIRMED{why}: use the vehicle's own switch"
+    alarm = f"EMERGENCY STOP NOT CONFIRMED{why}: use the vehicle's own switch."
     assert operator.lines[-1] == alarm
-    assert operator.controller.view.alarm == f"{alarm}; it is repeated for 27 s"
+    assert operator.alarm == f"{alarm} It is repeated for 27 s."
     operator.tell_safety(latched=("estop",))
     operator.ticks(1)
-    assert not operator.controller.view.alarm.startswith(alarm)
+    assert not operator.alarm.startswith(alarm)
 
 
 NOT_SENT = "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch. "
-LAPSED = "YOUR E-STOP WAS NOT SENT: press E again; use the vehicle's own switch"
+LAPSED = "YOUR E-STOP WAS NOT SENT: press E again; use the vehicle's own switch."
 
 
 def test_an_estop_without_a_router_is_sent_once_it_is_back(
@@ -115,10 +114,10 @@ def test_an_estop_without_a_router_is_sent_once_it_is_back(
 ) -> None:
     operator.press("e")
     operator.ticks(1)
-    alarm = f"{NOT_SENT}It is sent if the router is back within 30 s"
-    assert operator.controller.view.alarm == alarm
+    alarm = f"{NOT_SENT}It is sent if the router is back within 30 s."
+    assert operator.alarm == alarm
     operator.ticks(580)
-    assert operator.controller.view.alarm == alarm.replace("30", "1")
+    assert operator.alarm == alarm.replace("30", "1")
     monkeypatch.setattr(FakeBus, "connected", True)
     before = operator.node.fake.estops
     operator.tell_safety()
@@ -126,7 +125,7 @@ def test_an_estop_without_a_router_is_sent_once_it_is_back(
     assert operator.node.fake.estops == before + 1
     operator.tell_safety(latched=("estop",))
     operator.ticks(1)
-    assert operator.controller.unconfirmed == ""
+    assert operator.unconfirmed == ""
 
 
 @pytest.mark.parametrize("suspended", [True, False])
@@ -144,13 +143,13 @@ def test_an_estop_that_was_not_sent_is_shown_until_it_is_acknowledged(
         operator.tell_safety(latched=latched)
         operator.press("space")
         operator.ticks(2)
-        assert operator.controller.view.alarm == f"{LAPSED}. Enter: understood"
-    assert operator.controller.unconfirmed == LAPSED
+        assert operator.alarm == f"{LAPSED} Enter: understood"
+    assert operator.unconfirmed == LAPSED
     assert operator.node.fake.estops == 0
     operator.press("enter")
     operator.node.fake.deliver(keys.LINK, link(), operator.now_ns)
     operator.ticks(1)
-    assert operator.controller.view.alarm == ""
+    assert operator.alarm == ""
 
 
 def test_an_estop_that_nobody_confirms_is_shown_until_the_next_one(
@@ -160,23 +159,23 @@ def test_an_estop_that_nobody_confirms_is_shown_until_the_next_one(
     operator.press("e")
     operator.ticks(602)
     lapsed = LAPSED.replace("WAS NOT SENT", "IS NOT CONFIRMED")
-    assert operator.controller.view.alarm == f"{lapsed}. Enter: understood"
+    assert operator.alarm == f"{lapsed} Enter: understood"
     operator.press("e")
     operator.tell_safety(latched=("estop",))
     operator.node.fake.deliver(keys.LINK, link(), operator.now_ns)
     operator.ticks(1)
-    assert operator.controller.view.alarm == ""
+    assert operator.alarm == ""
 
 
 def test_without_board_the_vehicle_may_still_move(
     operator: Operator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(FakeBus, "connected", True)
-    for state, alarm in (("lost", MAY_MOVE), ("up", "")):
+    for state, alarm in (("lost", "The vehicle may still move: use its own switch."), ("up", "")):
         operator.tell_safety()
         operator.node.fake.deliver(keys.LINK, link(state=state), operator.now_ns)
         operator.ticks(1)
-        assert operator.controller.view.alarm == alarm
+        assert operator.alarm == alarm
 
 
 # --- rules ----------------------------------------------------------------------------------
@@ -192,7 +191,7 @@ def test_a_lost_bus_releases_and_a_held_key_does_not_drive_again(
         speeds += operator.speeds(1)
     assert speeds[1] == 0.2
     assert speeds[-5:] == [None] * 5
-    assert "no state of safety" in operator.lines[0]
+    assert operator.lines[0].startswith("No state of safety for 1 s")
     operator.tell_safety()
     for _ in range(20):
         operator.press("w")
@@ -262,11 +261,11 @@ def test_the_screen_and_the_events_name_what_a_gamepad_lacks(operator: Operator)
             operator.controller.screen_drawn(operator.now_ns)
             pad.stick = stick(deadman=events > 0, events=events)
             operator.ticks(1)
-            found.append(operator.controller.view.gamepad_notice)
+            found.append(english(operator.controller.view.gamepad_notice))
         return found
 
     notices(1, 0)
-    due, frozen = "no change: MOVE THE STICK", "FROZEN: release the deadman"
+    due, frozen = "no change: MOVE THE STICK", "FROZEN: let go of the deadman"
     assert notices(60, 1) == [""] * 21 + [due] * 20 + [frozen] * 19
     assert notices(1, 0) == [""]
     for _ in range(2):
@@ -274,7 +273,7 @@ def test_the_screen_and_the_events_name_what_a_gamepad_lacks(operator: Operator)
         assert notices(3, 2) == ["OFF CENTRE, ignored: axis 3"] * 3
         pad.ignored = {}
         notices(1, 0)
-    off_centre = "gamepad: axis 3 is at -1.00 as the deadman goes down: ignored; "
+    off_centre = "Gamepad: axis 3 is at -1.00 as the deadman goes down: ignored. "
     assert [line.startswith(off_centre) for line in operator.lines] == [False, True]
 
 
@@ -289,15 +288,15 @@ def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -
 
     operator.tell_safety(source="web")
     operator.ticks(1)
-    assert operator.controller.view.alarm == ""
+    assert operator.alarm == ""
     assert hold(2 * OVERRULED_TICKS, "web")[-1] is None
-    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
+    assert operator.alarm == "OVERRULED by web: let go of the controls."
     assert set(hold(20, None)) == {None}
-    assert operator.controller.view.alarm == "OVERRULED by web: release the controls"
+    assert operator.alarm == "OVERRULED by web: let go of the controls."
     for _ in range(20):
         operator.tell_safety()
         operator.ticks(1)
-    assert operator.controller.view.alarm == ""
+    assert operator.alarm == ""
     assert operator.node.events == ["take_over", "overruled"]
     assert hold(3, "teleop")[-1] == 0.2
 
@@ -310,24 +309,24 @@ def test_a_press_that_waited_for_long_does_nothing(operator: Operator, key: str)
     assert operator.speeds(3) == [None] * 3
     assert operator.node.fake.asked == []
     assert operator.controller.view.gear == 1
-    assert operator.lines == [f"key {key.upper()} ignored: it is older than 0.5 s"]
+    assert operator.lines == [f"{key.upper()} ignored: it is older than 0.5 s."]
 
 
 def test_a_key_without_a_function_is_named_until_the_next_one(operator: Operator) -> None:
-    notice = "key ц has no function: SWITCH THE KEYBOARD TO LATIN (ENGLISH)"
+    notice = "ц has no function here. SWITCH THE KEYBOARD TO LATIN (ENGLISH)."
     for key, shown in (
         ("ц", notice),
         ("ц", notice),
         ("left_shift", ""),
-        ("t", "key T has no function"),
+        ("t", "T has no function here."),
     ):
         operator.press(key)
         assert operator.speeds(1) == [None]
-        assert operator.controller.view.key_notice == shown
+        assert english(operator.controller.view.keystroke_notice) == shown
     operator.press("w")
     operator.ticks(1)
-    assert operator.controller.view.key_notice == ""
-    assert operator.lines == [notice, "key T has no function"]
+    assert operator.controller.view.keystroke_notice == ()
+    assert operator.lines == [notice, "T has no function here."]
 
 
 def slow(operator: Operator) -> None:
@@ -345,10 +344,12 @@ def test_on_a_slow_terminal_keys_move_and_reset_nothing(operator: Operator, key:
         assert operator.speeds(1) == [None]
     assert operator.node.fake.asked == []
     assert operator.lines == [
-        "keys ignored: terminal too slow: 0.42 s, allowed 0.15 s; "
-        "use `t2 drive` on a machine near the robot, or the dashboard"
+        "Keystrokes ignored. Terminal too slow: 0.42 s, limit 0.15 s. "
+        "Use `t2 drive` on a machine near the robot, or the dashboard."
     ]
-    assert operator.controller.view.keys_refused == "terminal too slow: 0.42 s, allowed 0.15 s"
+    assert english(operator.controller.view.keyboard_refused) == (
+        "Terminal too slow: 0.42 s, limit 0.15 s."
+    )
     operator.press("e")
     assert operator.node.fake.estops == 1
 
@@ -371,7 +372,7 @@ def test_a_terminal_that_becomes_slow_releases_its_keys(operator: Operator) -> N
         operator.press("w")
         speeds += operator.speeds(1)
     assert speeds[-5:] == [None] * 5
-    assert len([line for line in operator.lines if "keys ignored" in line]) == 2
+    assert len([line for line in operator.lines if "Keystrokes ignored" in line]) == 2
 
 
 # --- reset ----------------------------------------------------------------------------------
@@ -404,7 +405,8 @@ def test_a_reset_without_effect_is_not_confirmed(
         else:
             operator.tell_safety(boot=5, heartbeat=8)
         operator.ticks(1)
-    (line,) = (line for line in operator.node.event_log.lines() if "NOT CONFIRMED" in line.text)
+    reason = (Phrase("event.reset_unconfirmed"),)
+    (line,) = (line for line in operator.node.event_log.lines() if line.phrases == reason)
     assert line.level == "error"
 
 
@@ -413,9 +415,9 @@ def test_a_refused_reset_is_reported_and_the_next_one_is_sent(operator: Operator
     operator.press("r")
     operator.press("r")  # the key repeats
     assert len(operator.node.fake.asked) == 1
-    operator.node.fake.answers[0][1]("The call is 5.0 s old, allowed is 0.4 s: repeat it.")
+    operator.node.fake.answers[0][1](Refusal(text="Too old: repeat it."))
     operator.ticks(5)
-    assert operator.lines[1:] == ["The call is 5.0 s old, allowed is 0.4 s: repeat it."]
+    assert operator.lines[1:] == ["Too old: repeat it."]
     operator.tell_contact()
     operator.press("r")
     assert len(operator.node.fake.asked) == 2
@@ -431,7 +433,8 @@ def test_an_unanswered_reset_without_the_right_is_not_allowed(
         operator.ticks(1)
     operator.press("r")
     operator.node.fake.answers[0][1](no_answer("safety"))
-    assert operator.lines[-1] == (not_allowed("safety") if denied else no_answer("safety"))
+    expected = not_allowed("safety") if denied else no_answer("safety")
+    assert operator.lines[-1] == expected.text
 
 
 @pytest.mark.parametrize("shown", [True, False])
@@ -443,7 +446,7 @@ def test_a_reset_is_not_sent_without_a_fresh_state(operator: Operator, shown: bo
         operator.wait(0.6)
     operator.press("r")
     assert operator.node.fake.asked == []
-    assert operator.lines == ["reset not sent: no fresh state of safety"]
+    assert operator.lines == ["Reset not sent: no fresh state of safety."]
 
 
 # --- view -----------------------------------------------------------------------------------

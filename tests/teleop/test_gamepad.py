@@ -14,6 +14,7 @@ from common.settings import Vehicle
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
 from services.teleop.gamepad import LIST_READS, SdlGamepad, find
+from tests.teleop.support import english
 
 MAPS = Path("/proc/self/maps")
 DEADMAN = 4
@@ -44,7 +45,7 @@ def test_a_missing_gamepad_names_the_reason(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pygame", pygame)
     pad = find(Teleop(gamepad=enabled))
-    assert (pad.status, pad.read()) == (status, None)
+    assert (english((pad.status,)), pad.read()) == (status, None)
 
 
 # --- SDL ------------------------------------------------------------------------------------
@@ -95,9 +96,9 @@ def virtual(pad: SdlGamepad) -> Iterator[VirtualGamepad]:
 def test_sticks_and_buttons_are_read_and_each_change_counts(
     pad: SdlGamepad, virtual: VirtualGamepad
 ) -> None:
-    assert pad.status == "none"
+    assert pad.status.name == "gamepad.none"
     assert pad.read() == Stick(Deflection(0.0, 0.0), deadman=False, events=0)
-    assert pad.status != "none"
+    assert pad.status.name == "gamepad.device"
     virtual.press(DEADMAN)
     virtual.push(1, HALF)
     virtual.push(3, HALF // 2)
@@ -109,7 +110,7 @@ def test_sticks_and_buttons_are_read_and_each_change_counts(
 def test_a_lost_gamepad_reads_as_none_and_the_next_one_drives(pad: SdlGamepad) -> None:
     first, second = VirtualGamepad(), VirtualGamepad()
     assert pad.read() == Stick(Deflection(0.0, 0.0), deadman=False, events=0)
-    assert pad.status == "2 found: hold a deadman"
+    assert english((pad.status,)) == "2 found: hold a deadman"
     first.unplug()
     second.index -= 1
     assert pad.read() == Stick(Deflection(0.0, 0.0), deadman=False, events=0)
@@ -120,7 +121,7 @@ def test_a_lost_gamepad_reads_as_none_and_the_next_one_drives(pad: SdlGamepad) -
     assert stick.push == Deflection(0.5, 0.0)
     second.unplug()
     assert pad.read() is None
-    assert pad.status == "none"
+    assert pad.status.name == "gamepad.none"
 
 
 def test_the_deadman_chooses_the_device_and_media_keys_are_none(pad: SdlGamepad) -> None:
@@ -137,7 +138,7 @@ def test_the_deadman_chooses_the_device_and_media_keys_are_none(pad: SdlGamepad)
     for one in (held, idle):
         one.unplug()
     assert pad.read() is None
-    assert pad.status.endswith("has no such axes or deadman")
+    assert english((pad.status,)).endswith("has no such axes or deadman")
     keys.unplug()
 
 

@@ -146,7 +146,7 @@ def test_a_far_terminal_does_not_drive_and_its_estop_counts(
     with terminal(shared_router, *STRICT, delay_s=FAR_S) as it:
         ready(it, listener)
         hold(it, 1.5)
-        wait_until(lambda: it.shows(b"KEYS OFF: terminal too slow: 0.4"), "the reason")
+        wait_until(lambda: it.shows(b"KEYBOARD OFF: Terminal too slow: 0.4"), "the reason")
         assert listener.speeds == {0.0}
         it.type("e")
         wait_until(lambda: "estop" in listener.events, "the emergency stop")

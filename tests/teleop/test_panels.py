@@ -3,8 +3,12 @@
 from typing import Any
 
 import pytest
+from rich.cells import cell_len
 
 from services.teleop import panels
+from services.teleop.core.keystroke import no_function
+from services.teleop.labels import LABELS, Labels
+from t2 import catalogue
 from t2.client import request
 from t2.messages import (
     Bumper,
@@ -12,10 +16,15 @@ from t2.messages import (
     Drive,
     Driver,
     Limits,
+    Phrase,
     Velocity,
 )
+from t2.words import PLACEHOLDER
 from tests.factories import contact_state, link, odometry, release, safety_state
 from tests.teleop.support import view
+
+SAY = Labels()
+MAY_MOVE = (Phrase("root.may_move"),)
 
 CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
 SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too old.")
@@ -40,9 +49,9 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
             [" NO ROUTER  no answer at tcp/a:1", NEXT],
         ),
         (
-            {"alarm": "NOT CONFIRMED", "safety": safety_state(text="Stands.")},
+            {"alarm": MAY_MOVE, "safety": safety_state(text="Stands.")},
             3,
-            ["NOT CONFIRMED", " RUN  Stands."],
+            ["The vehicle may still move: use its own switch.", " RUN  Stands."],
         ),
         (
             {
@@ -83,15 +92,15 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
     ],
 )
 def test_alarm_verdict_and_causes(fields: dict[str, Any], rows: int, expected: list[str]) -> None:
-    assert panels.safety(view(**fields), rows).plain.split("\n") == expected
+    assert panels.safety(view(**fields), SAY, rows).plain.split("\n") == expected
 
 
 def test_alarm_and_verdict_are_wrapped() -> None:
     state = contact_state(text="It is still pressed: move off first, then reset.", release=None)
-    shown = panels.safety(view(alarm="NOT CONFIRMED: use the switch", safety=state), 2, 28)
+    shown = panels.safety(view(alarm=MAY_MOVE, safety=state), SAY, 2, 28)
     assert shown.plain.split("\n") == [
-        "NOT CONFIRMED: use the",
-        "switch",
+        "The vehicle may still move:",
+        "use its own switch.",
         " BRAKE  It is still pressed:",
         "move off first, then reset.",
         "LATCHED The bumper was hit. 12 s",
@@ -99,10 +108,13 @@ def test_alarm_and_verdict_are_wrapped() -> None:
 
 
 def test_the_operator_in_control_is_you() -> None:
-    state = safety_state(text="teleop is in control.")
-    assert panels.safety(view(safety=state), 2).plain == " RUN  teleop is in control."  # another
+    why = (Phrase("control.of", {"source": "teleop"}),)
+    state = safety_state(text="teleop is in control.", phrases=why)
+    assert (
+        panels.safety(view(safety=state), SAY, 2).plain == " RUN  teleop is in control."
+    )  # another
     ours = view(safety=state, requested=Drive(linear=0.0, angular=0.0, echo=0))
-    assert panels.safety(ours, 2).plain == " RUN  You are in control."
+    assert panels.safety(ours, SAY, 2).plain == " RUN  You are in control."
 
 
 @pytest.mark.parametrize(
@@ -115,12 +127,12 @@ def test_the_operator_in_control_is_you() -> None:
     ],
 )
 def test_no_release_is_offered_that_safety_refuses(fields: dict[str, Any]) -> None:
-    assert panels.release(view(**fields)) == []
-    assert panels.release(view(safety=contact_state(), link=link()))
+    assert panels.release(view(**fields), SAY) == []
+    assert panels.release(view(safety=contact_state(), link=link()), SAY)
 
 
 def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
-    shown = panels.safety(view(safety=contact_state(), requested=request()), 4).plain
+    shown = panels.safety(view(safety=contact_state(), requested=request()), SAY, 4).plain
     assert shown.split("\n") == [
         " BRAKE  The bumper is pressed.",
         "RELEASE  believed free: BACKWARD (moved forward, 12 s ago; net +0.43 m)",
@@ -133,20 +145,23 @@ def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
     ("fields", "keys"),
     [
         ({}, ["WASD drive ␣ stop 1-5 gear E ESTOP R reset FB release ZC arcs Q quit", "No key-up"]),
-        ({"keys_refused": "slow"}, ["␣ stop E ESTOP Q quit  KEYS OFF: slow", "Use"]),
         (
-            {"key_notice": "key ц has no function: SWITCH"},
-            ["WASD drive", "Key ц has no function: SWITCH"],
+            {"keyboard_refused": (Phrase("terminal.unknown"),)},
+            ["␣ stop E ESTOP Q quit  KEYBOARD OFF: Terminal delay unknown: ", "Use"],
         ),
-        ({"keys_muted": True}, ["WASD drive", "KEYS OFF: release all keys for 0.6 s"]),
-        ({"may_drive": False, "keys_refused": "slow"}, ["E ESTOP Q quit"]),
+        (
+            {"keystroke_notice": no_function("ц")},
+            ["WASD drive", "ц has no function here. SWITCH THE KEYBOARD"],
+        ),
+        ({"keyboard_muted": True}, ["WASD drive", "KEYBOARD OFF: let go of it for 0.6 s"]),
+        ({"may_drive": False, "keyboard_refused": MAY_MOVE}, ["E ESTOP Q quit"]),
         ({"may_drive": False, "may_stop": False}, ["Q quit"]),
     ],
 )
 def test_the_footer_has_the_keys_that_have_an_effect(
     fields: dict[str, Any], keys: list[str]
 ) -> None:
-    shown = panels.hints(view(**fields), 0.6).plain.split("\n")
+    shown = panels.hints(view(**fields), SAY, 0.6).plain.split("\n")
     assert [line[: len(key)] for line, key in zip(shown, keys, strict=True)] == keys
 
 
@@ -164,10 +179,10 @@ def test_the_footer_has_the_keys_that_have_an_effect(
                 "left": Driver(faults=(), bits=0),
                 "right": Driver(faults=("encoder", "bit_9"), bits=516),
             },
-            {"motor L": "ok", "motor R": "encoder bit_9"},
+            {"motor L": "ok", "motor R": "encoder, bit 9"},
         ),
         ({"requested": request(release="forward")}, {"driver": "you, release forward"}),
-        ({"gamepad": "Pad", "gamepad_notice": "MOVE THE STICK"}, {"gamepad": "MOVE THE STICK"}),
+        ({"gamepad_notice": (Phrase("gamepad.due"),)}, {"gamepad": "no change: MOVE THE STICK"}),
         (
             {
                 "requested": request(-0.35, 0.1),
@@ -182,8 +197,28 @@ def test_the_footer_has_the_keys_that_have_an_effect(
     ],
 )
 def test_rows_of_the_motion_panel(fields: dict[str, Any], expected: dict[str, str]) -> None:
-    lines = panels.motion(view(**fields)).plain.split("\n")
+    lines = panels.motion(view(**fields), SAY).plain.split("\n")
     assert len(lines) == 10
     assert max(map(len, lines)) <= 40
     shown = {line[:8].strip(): line[8:].strip() for line in lines}
     assert {name: shown[name] for name in expected} == expected
+
+
+# --- labels ---------------------------------------------------------------------------------
+
+
+def test_each_label_has_one_home_and_the_same_fields_in_both_languages() -> None:
+    assert LABELS.keys().isdisjoint(catalogue.TEXTS)
+    for english, chinese in LABELS.values():
+        assert sorted(PLACEHOLDER.findall(english)) == sorted(PLACEHOLDER.findall(chinese)), english
+    with pytest.raises(KeyError):
+        SAY("no label")
+
+
+def test_there_are_labels_for_all_causes_and_for_all_that_the_bridge_waits_for() -> None:
+    assert {f"cause.{name}" for name in catalogue.CAUSES} <= LABELS.keys()
+    long = {name for name in catalogue.PHRASES if name.startswith(("waiting.", "relay."))}
+    assert {f"short.{name}" for name in long - {"waiting.no_confirmation"}} <= LABELS.keys()
+    for name, texts in LABELS.items():
+        if name.startswith("short."):
+            assert max(map(cell_len, texts)) <= panels.VALUE

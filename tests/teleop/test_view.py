@@ -8,7 +8,7 @@ from common import clock
 from common.freshness import NS_PER_S
 from common.log import Logger
 from common.settings import Log
-from services.teleop.view import LINES, EventLog
+from services.teleop.event_log import LINES, EventLog
 from t2.messages import Event
 
 
@@ -33,14 +33,14 @@ def test_log_lines_go_to_the_event_log_and_not_to_the_terminal(
 
 def test_a_line_is_printable_and_has_a_greatest_length() -> None:
     event_log = EventLog()
-    event_log.add("\x1b[2J", "info", "\x1b" * 4000)
+    event_log.add("\x1b[2J", "info", (), "\x1b" * 4000)
     (line,) = event_log.lines()
     assert (line.service, len(line.text)) == ("\\u001b[2J", 1000)
     assert line.text.isprintable()
 
 
 def told(log: EventLog, text: str, **header: Any) -> None:
-    log.add("safety", "info", text, Event(name="stop", level="info", text=text, **header))
+    log.add("safety", "info", (), text, Event(name="stop", level="info", text=text, **header))
 
 
 def test_arrival_orders_lines_whatever_their_wall_clocks_are() -> None:
@@ -58,7 +58,7 @@ def test_the_history_of_one_host_is_ordered_by_its_monotonic_clock() -> None:
         told(log, f"{host} {mono_ns}", host=host, mono_ns=mono_ns, t_ns=t_ns)
     for host, mono_ns in ((1, 40), (1, 15), (0, 1)):
         told(log, f"{host} {mono_ns}", host=host, mono_ns=mono_ns)
-    log.add("teleop", "info", "own")
+    log.add("teleop", "info", (), "own")
     assert [line.text for line in log.lines()] == [
         "1 30", "1 50", "2 10", "1 10", "1 15", "1 20", "1 40", "0 1", "own",
     ]  # fmt: skip

@@ -1,1 +1,1 @@
-"""What teleop decides: which keys and sticks count, and what they request. Pure."""
+"""What teleop decides: which keystrokes and sticks count, and what they request. Pure."""

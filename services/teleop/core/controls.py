@@ -1,23 +1,24 @@
-"""The operator's controls: keys and gamepad to requests, 20 times a second.
+"""The operator's controls: keystrokes and gamepad to requests, 20 times a second.
 
-A key counts by its age, and by the round trip of the terminal:
+A keystroke counts by its age, and by the round trip of the terminal:
 
 ========== ============================== ==================== =============
-key        older than ``MAX_PRESS_AGE_S`` ``round_trip`` slow  otherwise
+keystroke  older than ``MAX_PRESS_AGE_S`` ``round_trip`` slow  otherwise
 ========== ============================== ==================== =============
 E, space   accepted                       accepted             accepted
 R          LATE                           SLOW, rule           RESET
 motion     LATE                           SLOW, rule           accepted
 others     LATE                           accepted             accepted
-no key     UNKNOWN                        UNKNOWN              UNKNOWN
+unknown    UNKNOWN                        UNKNOWN              UNKNOWN
 ========== ============================== ==================== =============
 
-``hold`` has the rules that release controls. Keys have priority over the gamepad. ``f`` or ``b``,
-held, requests a release off a pressed bumper and excludes driving; the last one pressed counts.
+``hold`` has the rules by which controls count as let go. Keystrokes have priority over the gamepad.
+``f`` or ``b``, held, requests a release off a pressed bumper and excludes driving; the last one
+pressed counts.
 
-A key gives a direction, a stick a deflection: -1..1 on each of the two axes. The gear sets the
-speed of full deflection, in ``base_link``: m/s and rad/s, counter-clockwise. Backward left means
-that the rear goes left, as in a car.
+A keystroke gives a direction, a stick a deflection: -1..1 on each of the two axes. The gear sets
+the speed of full deflection, in ``base_link``: m/s and rad/s, counter-clockwise. Backward left
+means that the rear goes left, as in a car.
 """
 
 import math
@@ -28,7 +29,7 @@ from enum import Enum
 from common.motion import Twist, clamp
 from common.settings import Vehicle
 from services.teleop.config import Teleop
-from services.teleop.core.hold import RULES, Deadman, Keys, Press
+from services.teleop.core.hold import RULES, Deadman, HeldKeystrokes, Press
 from services.teleop.core.round_trip import RoundTrip
 from t2.client import DriveRequests, Phase, request
 from t2.messages import Direction, Drive
@@ -58,7 +59,7 @@ class Stick:
 
 
 # The keypad without NumLock sends home, pageup, end and pagedown from its corners. A terminal
-# repeats one key only, so each arc has its own key.
+# repeats one keystroke only, so each arc has its own.
 DIRECTIONS = {
     "w": Deflection(1, 0), "up": Deflection(1, 0),
     "s": Deflection(-1, 0), "down": Deflection(-1, 0),
@@ -70,29 +71,29 @@ DIRECTIONS = {
 }  # fmt: skip
 
 
-KEYS = {ESTOP, RESET, STOP, ACKNOWLEDGE, *DIRECTIONS, *RELEASE, *GEARS}
+KEYSTROKES = {ESTOP, RESET, STOP, ACKNOWLEDGE, *DIRECTIONS, *RELEASE, *GEARS}
 
 
 class Action(Enum):
-    """What a key press asks of the shell."""
+    """What a keystroke asks of the shell."""
 
     NONE = "none"
     ESTOP = "stop the vehicle"
     RESET = "reset the causes on the screen"
     LATE = "report a press that is too old"
     SLOW = "report a slow terminal"
-    UNKNOWN = "report a key without a function"
+    UNKNOWN = "report a keystroke without a function"
 
 
 class Controls:
-    """Held keys and gamepad; ``tick`` runs at the request rate."""
+    """Held keystrokes and gamepad; ``tick`` runs at the request rate."""
 
     def __init__(self, settings: Teleop, vehicle: Vehicle) -> None:
         self.gear = 1
         self.terminal = RoundTrip(settings.round_trip)
         self.is_gamepad_silent = False  # deflected without a change; until its deadman is up
         self._settings, self._vehicle = settings, vehicle
-        self._keys = Keys(settings.hold_first)
+        self._keystrokes = HeldKeystrokes(settings.hold_first)
         self._deadman = Deadman()
         self._by_gamepad = False  # whether a stick moves the vehicle
         self._requests = DriveRequests()
@@ -103,47 +104,47 @@ class Controls:
         return self._requests.phase is Phase.SILENT
 
     def press(self, press: Press, now_ns: int) -> Action:
-        """Process a key press or its repeat."""
-        key = press.key
-        if key in (ESTOP, STOP):
+        """Process a press or its repeat."""
+        keystroke = press.keystroke
+        if keystroke in (ESTOP, STOP):
             # 1 equivalent mutant: only a pause needs the time.
             self.stop(now_ns)
-            return Action.ESTOP if key == ESTOP else Action.NONE
-        if key not in KEYS:
+            return Action.ESTOP if keystroke == ESTOP else Action.NONE
+        if keystroke not in KEYSTROKES:
             return Action.UNKNOWN
         if press.age_s(now_ns) > MAX_PRESS_AGE_S:
             return Action.LATE
-        moves = key in DIRECTIONS or key in RELEASE
-        if (moves or key == RESET) and self.terminal.refusal(press.at_ns):
+        moves = keystroke in DIRECTIONS or keystroke in RELEASE
+        if (moves or keystroke == RESET) and self.terminal.refusal(press.at_ns):
             self.enforce("terminal_slow", now_ns)
             return Action.SLOW
         if moves:
-            self._keys.keep(DIRECTIONS.keys() if key in DIRECTIONS else {key})
-            self._keys.press(key, press.at_ns)
-        if key in RELEASE:
+            self._keystrokes.keep(DIRECTIONS.keys() if keystroke in DIRECTIONS else {keystroke})
+            self._keystrokes.press(keystroke, press.at_ns)
+        if keystroke in RELEASE:
             self._deadman.drop()
-        self.gear = GEARS.get(key, self.gear)
-        return Action.RESET if key == RESET else Action.NONE
+        self.gear = GEARS.get(keystroke, self.gear)
+        return Action.RESET if keystroke == RESET else Action.NONE
 
     def enforce(self, rule: str, now_ns: int) -> None:
-        """Release what a rule of ``hold`` releases."""
-        self._keys.release(RULES[rule].keys, now_ns)
+        """Let go of what a rule of ``hold`` names."""
+        self._keystrokes.let_go(RULES[rule].keystrokes, now_ns)
         if RULES[rule].deadman:
             self._deadman.drop()
 
     def stop(self, now_ns: int) -> None:
-        """Release everything and send zeros, even if nothing was sent before."""
+        """Let go of everything and send zeros, even if nothing was sent before."""
         # 1 equivalent mutant: only a pause needs the time.
         self.enforce("stop", now_ns)
         self._requests.stop()
 
     def is_muted(self, now_ns: int) -> bool:
-        """Return whether keys are ignored until there was a pause."""
-        return self._keys.is_muted(now_ns)
+        """Return whether keystrokes are ignored until there was a pause."""
+        return self._keystrokes.is_muted(now_ns)
 
-    def holds_keys(self, now_ns: int) -> bool:
-        """Return whether a key that moves the vehicle is held."""
-        return bool(self._keys.held(now_ns))
+    def holds_keystrokes(self, now_ns: int) -> bool:
+        """Return whether a keystroke that moves the vehicle is held."""
+        return bool(self._keystrokes.held(now_ns))
 
     def is_gamepad_due(self, now_ns: int) -> bool:
         """Return whether the operator must move the stick to keep driving."""
@@ -165,11 +166,11 @@ class Controls:
 
     def _held(self, stick: Stick | None, now_ns: int) -> Drive | None:
         self._by_gamepad = False
-        keys = self._keys.held(now_ns)
-        if keys and keys[0] in RELEASE:
-            return request(release=RELEASE[keys[0]])
-        if keys:
-            return self._moving(deflection(keys))
+        held = self._keystrokes.held(now_ns)
+        if held and held[0] in RELEASE:
+            return request(release=RELEASE[held[0]])
+        if held:
+            return self._moving(deflection(held))
         if stick is None or not self._deadman.is_held:
             return None
         push = shaped(stick.push, self._settings.deadzone)
@@ -188,8 +189,8 @@ class Controls:
 
 
 def deflection(held: Iterable[str]) -> Deflection:
-    """Return the deflection of all held keys; opposite keys cancel out."""
-    pushes = [DIRECTIONS[key] for key in held]
+    """Return the deflection of all held keystrokes; opposite ones cancel out."""
+    pushes = [DIRECTIONS[one] for one in held]
     return Deflection(
         clamp(sum(push.linear for push in pushes), 1.0),
         clamp(sum(push.angular for push in pushes), 1.0),

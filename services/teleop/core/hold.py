@@ -1,30 +1,31 @@
-"""Hold to drive: which keys and which gamepad count as held, and what releases them.
+"""Hold to drive: which keystrokes and which gamepad count as held, and what ends that.
 
-A terminal sends a key when it goes down and again while it stays down, but nothing when it comes
-up. A key is therefore held until a deadline: ``hold_first`` seconds after its first press (most
-terminals send the first repeat after half a second) and ``HOLD_S`` after each repeat. A
-gamepad's deadman button reports both edges, but it counts only after it was seen up.
+A terminal sends a keystroke when a button goes down and again while it stays down, but nothing when
+it comes up. A keystroke is therefore held until a deadline: ``hold_first`` seconds after its first
+press (most terminals send the first repeat after half a second) and ``HOLD_S`` seconds after each
+repeat. A gamepad's deadman button reports both edges, but it counts only after it was seen up.
 
-Each of these rules releases controls that are still held down (``RULES``):
+After each of these rules, controls that are still held down count as let go (``RULES``):
 
 ============== ============================================ ================== ==================
-rule           condition                                    keys count again   deadman counts
+rule           condition                                    keystrokes count   deadman counts
 ============== ============================================ ================== ==================
 stop           space, E, quit                               with the next      after it was up
                                                             press
 unfocused      the terminal lost the focus, and with it     with the next      after it was up
                the repeats                                  press
-terminal_slow  ``round_trip`` refuses a key                 after a pause      not released
+terminal_slow  ``round_trip`` refuses a keystroke           after a pause      kept
 unheard        no state of safety for a second, or the      after a pause      after it was up
                program was suspended
 overruled      another source drives for half a second      after a pause      after it was up
-gamepad_silent deflected stick, reading unchanged for       not released       after it was up
+gamepad_silent deflected stick, reading unchanged for       kept               after it was up
                ``GAMEPAD_SILENCE_S``
-gamepad_gone   no gamepad, or a screen or terminal that     not released       after it was up
+gamepad_gone   no gamepad, or a screen or terminal that     kept               after it was up
                hangs
 ============== ============================================ ================== ==================
 
-The pause is ``hold_first`` without any key: a key that repeats is still held, and an old request.
+The pause is ``hold_first`` without any keystroke: one that repeats is still held, and an old
+request.
 
 A gamepad that freezes while its USB receiver stays enumerated keeps its last state. An unchanged
 reading alone is no fault: a stick at rest requests zero. A thumb on a deflected stick is never
@@ -46,17 +47,17 @@ GAMEPAD_SILENCE_S = 2.0  # without a change; the page's gamepad.js has the same
 
 
 class Again(Enum):
-    """When released keys count again."""
+    """When keystrokes that were let go count again."""
 
-    HELD = "not released"
+    KEPT = "kept"
     NEXT_PRESS = "with the next press"
     AFTER_PAUSE = "after a pause"
 
 
 class Rule(NamedTuple):
-    """What a rule releases."""
+    """What a rule lets go of."""
 
-    keys: Again
+    keystrokes: Again
     deadman: bool  # counts again after it was up
 
 
@@ -66,16 +67,16 @@ RULES = {
     "terminal_slow": Rule(Again.AFTER_PAUSE, False),
     "unheard": Rule(Again.AFTER_PAUSE, True),
     "overruled": Rule(Again.AFTER_PAUSE, True),
-    "gamepad_silent": Rule(Again.HELD, True),
-    "gamepad_gone": Rule(Again.HELD, True),
+    "gamepad_silent": Rule(Again.KEPT, True),
+    "gamepad_gone": Rule(Again.KEPT, True),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """A key press or its repeat, as the screen received it from the terminal."""
+    """A press of a keystroke or its repeat, as the screen received it from the terminal."""
 
-    key: str
+    keystroke: str
     at_ns: int  # when it was read
     shown: SafetyState | None = None  # the state that the screen showed at this time
 
@@ -84,8 +85,8 @@ class Press:
         return (now_ns - self.at_ns) / NS_PER_S
 
 
-class Keys:
-    """The held keys, by deadlines."""
+class HeldKeystrokes:
+    """The held keystrokes, by deadlines."""
 
     def __init__(self, first_s: float) -> None:
         self._first_ns = round(first_s * NS_PER_S)
@@ -93,31 +94,31 @@ class Keys:
         self._until_ns: dict[str, int] = {}
         self._muted_until_ns = 0
 
-    def press(self, key: str, now_ns: int) -> None:
-        """Handle a key press or its repeat; a terminal does not distinguish them."""
+    def press(self, keystroke: str, now_ns: int) -> None:
+        """Handle a press or its repeat; a terminal does not distinguish them."""
         if self.is_muted(now_ns):
-            self.release(Again.AFTER_PAUSE, now_ns)
+            self.let_go(Again.AFTER_PAUSE, now_ns)
             return
-        hold_ns = self._repeat_ns if key in self.held(now_ns) else self._first_ns
-        self._until_ns[key] = now_ns + hold_ns
+        hold_ns = self._repeat_ns if keystroke in self.held(now_ns) else self._first_ns
+        self._until_ns[keystroke] = now_ns + hold_ns
 
-    def keep(self, keys: Collection[str]) -> None:
-        """Release all other keys."""
-        self._until_ns = {key: at for key, at in self._until_ns.items() if key in keys}
+    def keep(self, keystrokes: Collection[str]) -> None:
+        """Let go of all others."""
+        self._until_ns = {one: at for one, at in self._until_ns.items() if one in keystrokes}
 
     def held(self, now_ns: int) -> list[str]:
-        """Return the keys that are held."""
-        return [key for key, until_ns in self._until_ns.items() if now_ns < until_ns]
+        """Return the keystrokes that are held."""
+        return [one for one, until_ns in self._until_ns.items() if now_ns < until_ns]
 
-    def release(self, again: Again, now_ns: int) -> None:
-        """Release all keys, until they count again."""
-        if again is not Again.HELD:
+    def let_go(self, again: Again, now_ns: int) -> None:
+        """Let go of all keystrokes, until they count again."""
+        if again is not Again.KEPT:
             self._until_ns.clear()
         if again is Again.AFTER_PAUSE:
             self._muted_until_ns = now_ns + self._first_ns
 
     def is_muted(self, now_ns: int) -> bool:
-        """Return whether key presses are still ignored."""
+        """Return whether presses are still ignored."""
         return now_ns < self._muted_until_ns
 
 
@@ -141,7 +142,7 @@ class Deadman:
             self._events, self._event_ns = events, now_ns
 
     def drop(self) -> None:
-        """Release it: it counts again after it was up."""
+        """Let go of it: it counts again after it was up."""
         self.is_held = self._seen_up = False
 
     def is_due(self, now_ns: int) -> bool:

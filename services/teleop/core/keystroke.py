@@ -1,10 +1,10 @@
-"""Keystrokes: the key that a keystroke means, on keyboards that are not Latin, too.
+"""Keystrokes: the meaning of one, on keyboards that are not Latin, too.
 
 ============================================ ===========================================
-keystroke                                    key
+keystroke                                    counts as
 ============================================ ===========================================
 compatibility form of a letter, as full-width its letter; upper case makes no difference
-letter on the E key of another layout        E, with any modifier: an emergency stop
+letter at the place of E in another layout   E, with any modifier: an emergency stop
                                              that nobody wanted does no harm
 its place, where the terminal reports it     the letter of this place on a Latin keyboard
 other letters                                none: their places differ between layouts
@@ -14,19 +14,21 @@ other letters                                none: their places differ between l
 import re
 import unicodedata
 
-# Letters on the E key: Latin; Russian, Serbian and Bulgarian; Greek; Hebrew; Arabic; Korean; Thai.
+from t2.messages import Phrase, Phrases
+
+# Letters at the place of E. Latin; Russian, Serbian and Bulgarian; Greek; Hebrew; Arabic; Korean;
+# Thai.
 ESTOP_LETTERS = frozenset(unicodedata.normalize("NFKC", letter) for letter in "eуеεקثㄷำ")
 STOPS = frozenset(("space", "ctrl+@", "ctrl+space", "alt+space"))
 SILENT = ("_shift", "_control", "_alt", "_super", "_hyper", "_meta", "_lock")
-SWITCH_LAYOUT = "SWITCH THE KEYBOARD TO LATIN (ENGLISH)"
-# A key of the kitty keyboard protocol with its alternates: the shifted one, and that of its place.
+# A keystroke of the kitty protocol with its alternates: the shifted one, and that of its place.
 PLACED = re.compile(
     r"\x1b\[(?P<code>\d+):\d*(?::(?P<place>\d+))?(?P<modifiers>;\d*)?(?P<text>;\d*)?u"
 )
 
 
-def key_of(name: str, character: str | None) -> str:
-    """Return the key of a keystroke, by the terminal library's name and character."""
+def keystroke_of(name: str, character: str | None) -> str:
+    """Return what a keystroke counts as, by the terminal library's name and character."""
     name = name.removeprefix("shift+")
     letter = unicodedata.normalize("NFKC", character or "").lower()
     if {letter, name.rpartition("+")[2].lower()} & ESTOP_LETTERS:
@@ -37,7 +39,7 @@ def key_of(name: str, character: str | None) -> str:
 
 
 def without_alternates(sequence: str) -> str:
-    """Return a sequence of the kitty protocol with one key: its letter, or that of its place."""
+    """Return a sequence of the kitty protocol with one letter: its own, or that of its place."""
     found = PLACED.fullmatch(sequence)
     if not found:
         return sequence
@@ -47,10 +49,10 @@ def without_alternates(sequence: str) -> str:
     return f"\x1b[{code}{modifiers or ''}{text or ''}u"
 
 
-def no_function(key: str) -> str:
-    """Return the notice of a key without a function; empty for a modifier or lock alone."""
-    if key.endswith(SILENT):
-        return ""
-    if key.isascii():
-        return f"key {key.upper()} has no function"
-    return f"key {key} has no function: {SWITCH_LAYOUT}"
+def no_function(keystroke: str) -> Phrases:
+    """Return the notice of one without a function; empty for a modifier or lock alone."""
+    if keystroke.endswith(SILENT):
+        return ()
+    if keystroke.isascii():
+        return (Phrase("keystroke.no_function", {"keystroke": keystroke.upper()}),)
+    return Phrase("keystroke.no_function", {"keystroke": keystroke}), Phrase("keystroke.layout")

@@ -18,7 +18,7 @@ off centre        off centre      ignored
 no finite number  any             ignored, also in a later reading
 ================= =============== =========================================
 
-**Change.** ``Deadman`` releases a deflected stick whose reading does not change. A live stick
+**Change.** ``Deadman`` lets go of a deflected stick whose reading does not change. A live stick
 changes by more than the noise of a converter.
 """
 

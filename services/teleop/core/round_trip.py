@@ -1,17 +1,17 @@
-"""Round trip of the terminal: an upper bound for the age of a key press.
+"""Round trip of the terminal: an upper bound for the age of a keystroke.
 
-A key press carries no time stamp, and a network or a stalled host may delay it. Teleop therefore
-queries the terminal's cursor position periodically. Answers and keys come in one ordered stream, so
-a key that follows an answer was typed after that query was sent. A key is at most as old as the
-newest query that was answered before it.
+A keystroke carries no time stamp, and a network or a stalled host may delay it. Teleop therefore
+queries the terminal's cursor position periodically. Answers and keystrokes come in one ordered
+stream, so a keystroke that follows an answer was typed after that query was sent. It is at most as
+old as the newest query that was answered before it.
 
 Each query moves the cursor to another place, which identifies its answer. Places repeat after
 minutes (80 x 24: 3 minutes), so a slow answer is not taken for that of a later query.
 
-Keys that move the vehicle or reset a latch are accepted in the last row only:
+Keystrokes that move the vehicle or reset a latch are accepted in the last row only:
 
 ============================= ======================= ==================================
-newest answer before the key  answers of the last 1 s keys
+newest answer before it       answers of the last 1 s keystrokes
 ============================= ======================= ==================================
 none                          none                    refused: the round trip is unknown
 to a query older than         any                     refused: too slow
@@ -31,13 +31,13 @@ from collections import deque
 from dataclasses import dataclass
 
 from common.freshness import NS_PER_S
+from t2.messages import Phrase, Phrases
 
-PROBE_S = 0.1  # period of the queries
-RECOVER_S = 1.0  # that the terminal must be fast before its keys count again
+QUERY_S = 0.1  # period of the queries
+RECOVER_S = 1.0  # that the terminal must be fast before its keystrokes count again
 STOPPED_S = 1.0  # without an answer
 ANSWERS = 64  # stored: 6.4 s
-ADVICE = "use `t2 drive` on a machine near the robot, or the dashboard"
-UNKNOWN = "terminal delay unknown: no answer yet"
+UNKNOWN = (Phrase("terminal.unknown"),)
 
 Place = tuple[int, int]  # of the cursor: column and row, from 0
 
@@ -62,7 +62,7 @@ class Answer:
 
 
 class RoundTrip:
-    """Decides whether a key that was read at a given time is accepted."""
+    """Decides whether a keystroke that was read at a given time is accepted."""
 
     def __init__(self, limit_s: float) -> None:
         self._limit_ns = round(limit_s * NS_PER_S)
@@ -80,8 +80,8 @@ class RoundTrip:
             self._sent_ns = {one: at for one, at in self._sent_ns.items() if at > sent_ns}
             self._answers.append(Answer(sent_ns, now_ns))
 
-    def refusal(self, at_ns: int) -> str:
-        """Return why a key that was read at this time is refused, as text; empty if accepted."""
+    def refusal(self, at_ns: int) -> Phrases:
+        """Return why a keystroke that was read at this time is refused; empty if accepted."""
         before = [answer for answer in self._answers if answer.received_ns <= at_ns]
         if not before:
             return UNKNOWN
@@ -90,9 +90,9 @@ class RoundTrip:
         ]
         round_trip_ns = max([self._least_ns(before[-1], at_ns), *recent])
         if round_trip_ns <= self._limit_ns:
-            return ""
-        round_trip_s, limit_s = round_trip_ns / NS_PER_S, self._limit_ns / NS_PER_S
-        return f"terminal too slow: {round_trip_s:.2f} s, allowed {limit_s:g} s"
+            return ()
+        delay_s, limit_s = round_trip_ns / NS_PER_S, self._limit_ns / NS_PER_S
+        return (Phrase("terminal.slow", {"delay": delay_s, "limit": limit_s}),)
 
     def has_stopped(self, now_ns: int) -> bool:
         """Return whether the terminal answers no more; one that never answered has not."""
@@ -102,4 +102,4 @@ class RoundTrip:
     @staticmethod
     def _least_ns(newest: Answer, at_ns: int) -> int:
         """Return a lower bound of the round trip from the time since the newest answered query."""
-        return round(at_ns - newest.sent_ns - 2 * PROBE_S * NS_PER_S)
+        return round(at_ns - newest.sent_ns - 2 * QUERY_S * NS_PER_S)

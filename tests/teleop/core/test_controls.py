@@ -1,4 +1,4 @@
-"""Key presses and sticks to actions, twists, and drive requests tick by tick."""
+"""Presses and sticks to actions, twists, and drive requests tick by tick."""
 
 import pytest
 
@@ -32,10 +32,10 @@ class Operator:
         self.controls = Controls(SETTINGS, Vehicle())
         self.now_ns = 100 * NS_PER_S
 
-    def press(self, key: str, waited_s: float = 0.0, took_s: float = 0.001) -> Action:
+    def press(self, keystroke: str, waited_s: float = 0.0, took_s: float = 0.001) -> Action:
         at_ns = self.now_ns - round(waited_s * NS_PER_S)
         answer(self.controls.terminal, at_ns, took_s)
-        return self.controls.press(Press(key, at_ns), self.now_ns)
+        return self.controls.press(Press(keystroke, at_ns), self.now_ns)
 
     def ticks(self, count: int, stick: Stick | None = None) -> list[Drive | None]:
         sent = []
@@ -127,9 +127,9 @@ def test_the_last_direction_of_a_release_counts_and_ends_by_itself(operator: Ope
         operator.press(key)
         (_, sent) = operator.ticks(2)
         assert sent == request(release=direction)  # type: ignore[arg-type]
-    assert operator.controls.holds_keys(operator.now_ns)
+    assert operator.controls.holds_keystrokes(operator.now_ns)
     assert operator.ticks(14)[-4:] == [NEUTRAL] * 3 + [None]
-    assert not operator.controls.holds_keys(operator.now_ns)
+    assert not operator.controls.holds_keystrokes(operator.now_ns)
 
 
 # --- gamepad --------------------------------------------------------------------------------

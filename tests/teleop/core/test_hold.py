@@ -1,4 +1,4 @@
-"""Hold to drive: deadlines of keys, the deadman, and the rules as one stateful property."""
+"""Hold to drive: deadlines of keystrokes, the deadman, and the rules as one stateful property."""
 
 import pytest
 from hypothesis import settings
@@ -9,7 +9,14 @@ from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from services.teleop.config import Teleop
 from services.teleop.core.controls import Controls, Deflection, Stick
-from services.teleop.core.hold import GAMEPAD_SILENCE_S, HOLD_S, RULES, Deadman, Keys, Press
+from services.teleop.core.hold import (
+    GAMEPAD_SILENCE_S,
+    HOLD_S,
+    RULES,
+    Deadman,
+    HeldKeystrokes,
+    Press,
+)
 from t2.client import NEUTRAL, ZEROS
 
 
@@ -26,16 +33,16 @@ def at(seconds: float) -> int:
         ([("w", 10.0), ("a", 10.5)], {10.55: "wa", 10.7: "a"}, 11.1),  # own deadlines
     ],
 )
-def test_deadlines_of_keys(
+def test_deadlines_of_keystrokes(
     presses: list[tuple[str, float]], held: dict[float, str], released: float
 ) -> None:
-    keys = Keys(first_s=0.6)
-    assert not keys.is_muted(0)
-    for key, at_s in presses:
-        keys.press(key, at(at_s))
+    held_ones = HeldKeystrokes(first_s=0.6)
+    assert not held_ones.is_muted(0)
+    for keystroke, at_s in presses:
+        held_ones.press(keystroke, at(at_s))
     for at_s, names in held.items():
-        assert keys.held(at(at_s)) == list(names)
-    assert keys.held(at(released)) == []
+        assert held_ones.held(at(at_s)) == list(names)
+    assert held_ones.held(at(released)) == []
 
 
 def test_a_deadman_counts_after_it_was_up() -> None:
@@ -48,24 +55,24 @@ def test_a_deadman_counts_after_it_was_up() -> None:
     assert deadman.is_held is False
 
 
-# When keys count again, and whether the deadman must come up, by rule.
+# When keystrokes count again, and whether the deadman must come up, by rule.
 EXPECTED = {
     "stop": ("with the next press", True),
     "unfocused": ("with the next press", True),
     "terminal_slow": ("after a pause", False),
     "unheard": ("after a pause", True),
     "overruled": ("after a pause", True),
-    "gamepad_silent": ("not released", True),
-    "gamepad_gone": ("not released", True),
+    "gamepad_silent": ("kept", True),
+    "gamepad_gone": ("kept", True),
 }
 
 
 def test_the_table_of_rules() -> None:
-    assert {name: (each.keys.value, each.deadman) for name, each in RULES.items()} == EXPECTED
+    assert {name: (each.keystrokes.value, each.deadman) for name, each in RULES.items()} == EXPECTED
 
 
 class Hold(RuleBasedStateMachine):
-    """Keys, a gamepad and rules in any order, against what the operator's hands did.
+    """Keystrokes, a gamepad and rules in any order, against what the operator's hands did.
 
     Nothing moves without a hand that holds since the last rule; a hand that holds, moves; a drive
     begins with a zero and ends with three.
@@ -76,8 +83,8 @@ class Hold(RuleBasedStateMachine):
         self.settings = Teleop()
         self.controls = Controls(self.settings, Vehicle())
         self.now_ns = at(100)
-        self.until_ns: dict[str, int] = {}  # the last moment at which a key may drive
-        self.counts_ns = 0  # when keys count again
+        self.until_ns: dict[str, int] = {}  # the last moment at which a keystroke may drive
+        self.counts_ns = 0  # when keystrokes count again
         self.stick: Stick | None = None
         self.was_up = False  # the deadman, since the last rule
         self.events = 0  # of the gamepad
@@ -85,25 +92,25 @@ class Hold(RuleBasedStateMachine):
         self.zeros = ZEROS  # sent since the last motion
         self.was_held = False
 
-    @rule(key=st.sampled_from("wasdzc"))
-    def press(self, key: str) -> None:
+    @rule(keystroke=st.sampled_from("wasdzc"))
+    def press(self, keystroke: str) -> None:
         self.controls.terminal.sent((0, 1), self.now_ns)
         self.controls.terminal.answered((0, 1), self.now_ns)
-        self.controls.press(Press(key, self.now_ns), self.now_ns)
+        self.controls.press(Press(keystroke, self.now_ns), self.now_ns)
         if self.now_ns < self.counts_ns:
             self.counts_ns = self.now_ns + at(self.settings.hold_first)
             return
-        repeats = self.now_ns < self.until_ns.get(key, 0)
+        repeats = self.now_ns < self.until_ns.get(keystroke, 0)
         hold_s = HOLD_S if repeats else self.settings.hold_first
-        self.until_ns[key] = self.now_ns + at(hold_s)
+        self.until_ns[keystroke] = self.now_ns + at(hold_s)
 
     @rule(name=st.sampled_from(sorted(EXPECTED)))
     def enforce(self, name: str) -> None:
         self.controls.enforce(name, self.now_ns)
-        keys, deadman = EXPECTED[name]
-        if keys != "not released":
+        again, deadman = EXPECTED[name]
+        if again != "kept":
             self.until_ns = {}
-        if keys == "after a pause":
+        if again == "after a pause":
             self.counts_ns = self.now_ns + at(self.settings.hold_first)
         if deadman:
             self.was_up = False
@@ -128,16 +135,16 @@ class Hold(RuleBasedStateMachine):
     def check(self) -> None:
         assert self.controls.is_muted(self.now_ns) is (self.now_ns < self.counts_ns)
         request = self.controls.tick(self.stick, self.now_ns)
-        by_keys = {key for key, until_ns in self.until_ns.items() if self.now_ns < until_ns}
+        by_keystrokes = {one for one, until_ns in self.until_ns.items() if self.now_ns < until_ns}
         self.was_up = self.stick is not None and (self.was_up or not self.stick.deadman)
         by_stick = self.stick is not None and self.stick.deadman and self.was_up
         push = self.stick.push.linear if self.stick else 0.0
         is_late = self.now_ns - self.moved_ns > at(GAMEPAD_SILENCE_S)
-        if by_stick and not by_keys and abs(push) > self.settings.deadzone and is_late:
+        if by_stick and not by_keystrokes and abs(push) > self.settings.deadzone and is_late:
             by_stick = self.was_up = False
-        is_held = bool(by_keys) or by_stick
+        is_held, alone = bool(by_keystrokes) or by_stick, len(by_keystrokes) == 1
         moves = request not in (None, NEUTRAL)
-        if is_held and self.was_held and (len(by_keys) == 1 or (not by_keys and abs(push) > 0.1)):
+        if is_held and self.was_held and (alone or (not by_keystrokes and abs(push) > 0.1)):
             assert moves
         if not is_held or not self.was_held:
             assert not moves

@@ -1,14 +1,13 @@
-"""Keys of keystrokes on keyboards of other layouts."""
+"""Keystrokes on keyboards of other layouts."""
 
 import pytest
 
-from services.teleop.core.keystroke import key_of, no_function, without_alternates
-
-SWITCH = "SWITCH THE KEYBOARD TO LATIN (ENGLISH)"
+from services.teleop.core.keystroke import keystroke_of, no_function, without_alternates
+from t2.messages import Phrase, Phrases
 
 
 @pytest.mark.parametrize(
-    ("name", "character", "key"),
+    ("name", "character", "keystroke"),
     [
         ("e", "e", "e"),
         *((letter, letter, "e") for letter in "EｅＥуУεΕеЕקثㄷำ𝐞"),
@@ -32,8 +31,8 @@ SWITCH = "SWITCH THE KEYBOARD TO LATIN (ENGLISH)"
         ("question_mark", "?", "?"),
     ],
 )
-def test_a_key_by_its_letter(name: str, character: str | None, key: str) -> None:
-    assert key_of(name, character) == key
+def test_a_keystroke_by_its_letter(name: str, character: str | None, keystroke: str) -> None:
+    assert keystroke_of(name, character) == keystroke
 
 
 @pytest.mark.parametrize(
@@ -56,14 +55,18 @@ def test_the_place_of_a_key_counts_if_its_letter_is_not_latin(sequence: str, rea
     assert without_alternates(sequence) == read
 
 
+def named(keystroke: str) -> Phrase:
+    return Phrase("keystroke.no_function", {"keystroke": keystroke})
+
+
 @pytest.mark.parametrize(
-    ("key", "notice"),
+    ("keystroke", "notice"),
     [
-        ("t", "key T has no function"),
-        ("ц", f"key ц has no function: {SWITCH}"),
-        ("left_shift", ""),
-        ("caps_lock", ""),
+        ("t", (named("T"),)),
+        ("ц", (named("ц"), Phrase("keystroke.layout"))),
+        ("left_shift", ()),
+        ("caps_lock", ()),
     ],
 )
-def test_a_key_without_a_function(key: str, notice: str) -> None:
-    assert no_function(key) == notice
+def test_a_keystroke_without_a_function(keystroke: str, notice: Phrases) -> None:
+    assert no_function(keystroke) == notice

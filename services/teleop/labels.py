@@ -1,0 +1,232 @@
+"""Texts of the terminal in English and Chinese, beside those of the catalogue: labels, alarms.
+
+A name has the form ``PANEL.WHAT``. Texts that go over the bus are in ``t2.catalogue``.
+"""
+
+from collections.abc import Iterable
+
+from t2 import catalogue
+from t2.catalogue import Words
+from t2.messages import Field, Phrase
+from t2.words import Language, render
+
+LABELS: dict[str, Words] = {
+    "title.safety": ("safety", "安全"),
+    "title.around": ("around", "四周"),
+    "title.motion": ("motion", "运动"),
+    "title.events": ("events", "事件"),
+    "no_data": ("no data", "无数据"),
+    # header
+    "bus.up": ("● bus", "● 总线"),
+    "bus.no_router": ("○ no router", "○ 未连接路由器"),
+    "bridge.missing": ("○ bridge missing", "○ 桥接服务未运行"),
+    "bridge.no_data": ("○ no data of the bridge", "○ 桥接服务无数据"),
+    "board.up": ("● board", "● 主控板"),
+    "board.lost": ("○ board lost", "○ 主控板失联"),
+    "board.never": ("○ board never seen", "○ 主控板从未连接"),
+    "bumper.unknown": ("○ bumper", "○ 防撞条"),
+    "bumper.free": ("● bumper", "● 防撞条"),
+    "bumper.pressed": ("● bumper PRESSED", "● 防撞条被压下"),
+    "gear": ("gear {gear}/5", "{gear}/5 挡"),
+    "top": ("{linear:.2f} m/s {angular:.2f} rad/s", "{linear:.2f} m/s {angular:.2f} rad/s"),
+    # safety
+    "verdict.run": ("RUN", "运行"),
+    "verdict.slow": ("SLOW", "减速"),
+    "verdict.stop": ("STOP", "停止"),
+    "verdict.brake": ("BRAKE", "制动"),
+    "verdict.inhibited": ("INHIBITED", "禁止行驶"),
+    "verdict.no_safety": ("NO SAFETY", "安全服务无响应"),
+    "verdict.no_router": ("NO ROUTER", "未连接路由器"),
+    "text.no_safety": (
+        "no state of safety arrives through {router}", "经 {router} 收不到安全服务的状态",
+    ),
+    "text.no_router": ("no answer at {router}", "{router} 无应答"),
+    "text.own_switch": (
+        "To stop, use the vehicle's own switch. Next: {doctor}",
+        "停车请使用车身上的急停开关。下一步：{doctor}",
+    ),
+    "text.next": ("Next: {doctor}", "下一步：{doctor}"),
+    "text.you": ("You are in control.", "您取得控制权。"),
+    "off.believed": ("RELEASE  believed free: ", "脱离碰撞  推断可脱离："),
+    "off.came": (
+        " (moved {came:word}; net {travelled:+.2f} m)", "（最近{came:word}，净 {travelled:+.2f} m）",
+    ),
+    "off.came_ago": (
+        " (moved {came:word}, {age} ago; net {travelled:+.2f} m)",
+        "（{age}前{came:word}，净 {travelled:+.2f} m）",
+    ),
+    "off.unknown": ("RELEASE  free direction ", "脱离碰撞  可脱离方向"),
+    "off.look": ("unknown: look at the vehicle", "未知：请目视确认"),
+    "off.forbidden": ("FORBIDDEN", "禁止"),
+    "off.held": (", held", "，已按住"),
+    "off.left": ("{left:.2f} m left until reset", "复位前剩余 {left:.2f} m"),
+    "off.way": ("{direction:word}", "{direction:word}"),
+    "cause.latched": ("LATCHED", "已锁定"),
+    "action.slow": ("slow", "减速"),
+    "action.stop": ("stop", "停止"),
+    "action.brake": ("brake", "制动"),
+    "age.seconds": ("{seconds:.0f} s", "{seconds:.0f} 秒"),
+    "age.minutes": ("{minutes:.0f} min", "{minutes:.0f} 分钟"),
+    # causes by name, where there is no room for their texts
+    "cause.contact": ("contact", "碰撞"),
+    "cause.estop": ("estop", "急停"),
+    "cause.estop_reader": ("estop_reader", "急停接收中断"),
+    "cause.estop_keepalive": ("estop_keepalive", "急停保活中断"),
+    "cause.predecessor": ("predecessor", "重启前未复位"),
+    "cause.runaway": ("runaway", "未按指令运动"),
+    "cause.uncommanded_motion": ("uncommanded_motion", "无指令移动"),
+    "cause.not_stopping": ("not_stopping", "未能停住"),
+    "cause.driver_left": ("driver_left", "左电机故障"),
+    "cause.driver_right": ("driver_right", "右电机故障"),
+    "cause.flapping": ("flapping", "输入反复失效"),
+    "cause.leaving": ("leaving", "安全服务关闭"),
+    "cause.starting": ("starting", "等待首批数据"),
+    "cause.link": ("link", "主控板断开"),
+    "cause.switches": ("switches", "紧急制动未确认"),
+    "cause.bumper": ("bumper", "防撞条无数据"),
+    "cause.silent": ("silent", "数据过旧"),
+    "cause.unarmed": ("unarmed", "桥接服务未就绪"),
+    "cause.limit_stop": ("limit_stop", "限速源停车"),
+    "cause.limit_silent": ("limit_silent", "限速源无消息"),
+    "cause.two_publishers": ("two_publishers", "发布者重复"),
+    "cause.neutral": ("neutral", "请先松开"),
+    "cause.blocked": ("blocked", "空间不足"),
+    "cause.no_request": ("no_request", "无行驶请求"),
+    "cause.release": ("release", "脱离碰撞"),
+    "cause.bumper_lossy": ("bumper_lossy", "防撞条查询丢失"),
+    "cause.limit": ("limit", "限速"),
+    "cause.obstacle": ("obstacle", "障碍物"),
+    "cause.sonar": ("sonar", "超声波不可信"),
+    # sonars
+    "around.bumper": ("BUMPER", "防撞条"),
+    "sonar.fault": ("fault", "故障"),
+    "sonar.too_near": ("near", "过近"),
+    "sonar.no_echo": ("-", "-"),
+    # motion
+    "motion.request": ("request", "请求"),
+    "motion.allowed": ("allowed", "允许"),
+    "motion.measured": ("measured", "实测"),
+    "motion.pose": ("pose", "位姿"),
+    "motion.odom": ("odom", "里程计"),
+    "motion.board": ("board", "主控板"),
+    "motion.motor_left": ("motor L", "左电机"),
+    "motion.motor_right": ("motor R", "右电机"),
+    "motion.driver": ("driver", "驾驶"),
+    "motion.gamepad": ("gamepad", "手柄"),
+    "odom.residual": ("residual {residual:+.3f} m  ", "残差 {residual:+.3f} m  "),
+    "odom.no_residual": ("residual -  ", "残差 -  "),
+    "odom.slip": ("SLIP", "打滑"),
+    "odom.no_slip": ("no slip", "无打滑"),
+    "to_board.lost": ("lost: {board}", "失联：{board}"),
+    "to_board.never": ("never: {board}", "从未连接：{board}"),
+    "to_board.not_armed": ("not armed", "未就绪"),
+    "motor.ok": ("ok", "正常"),
+    "motor.faults": ("{faults:word}", "{faults:word}"),
+    "driver.release": ("you, release {direction:word}", "您，脱离碰撞（{direction:word}）"),
+    "driver.you": ("{source} (you)", "{source}（您）"),
+    "driver.none": ("none", "无"),
+    "gamepad.due": ("no change: MOVE THE STICK", "读数无变化：请晃动摇杆"),
+    "gamepad.frozen": ("FROZEN: let go of the deadman", "手柄无响应：请松开使能键"),
+    "gamepad.ignored": ("OFF CENTRE, ignored: axis {axes}", "未居中，已忽略：轴 {axes}"),
+    # what the bridge waits for, where there is no room for its text
+    "short.waiting.estop": ("safety must latch the E-STOP", "等待安全服务锁定急停"),
+    "short.waiting.hit": ("safety must latch the contact", "等待安全服务锁定碰撞"),
+    "short.waiting.uncommanded": ("safety must latch the motion", "等待安全服务锁定移动"),
+    "short.waiting.latch_owner": ("safety must take over the latch", "等待安全服务接管锁定"),
+    "short.waiting.ready": ("the board is not ready", "主控板尚未就绪"),
+    "short.waiting.neutral": ("waits for a neutral motion", "等待零速指令"),
+    "short.waiting.board": ("nothing received yet", "尚未收到数据"),
+    "short.waiting.link": ("the link is lost", "连接已断开"),
+    "short.waiting.brakes": ("emergency brakes not confirmed", "紧急制动尚未确认"),
+    "short.relay.never": ("no report of the relay yet", "尚未收到中继器数据"),
+    "short.relay.lost": ("the relay is silent", "收不到中继器数据"),
+    "short.relay.brakes": ("the relay brakes", "中继器正在制动"),
+    # keystrokes
+    "hint.drive": ("drive", "行驶"),
+    "hint.stop": ("stop", "停车"),
+    "hint.gear": ("gear", "挡位"),
+    "hint.estop": ("ESTOP", "急停"),
+    "hint.reset": ("reset", "复位"),
+    "hint.release": ("release", "脱离"),
+    "hint.arcs": ("arcs", "弧线"),
+    "hint.quit": ("quit", "退出"),
+    "keyboard.off": ("KEYBOARD OFF: {why}", "键盘无效：{why}"),
+    "keyboard.muted": (
+        "KEYBOARD OFF: let go of it for {seconds:g} s", "键盘无效：请全部松开 {seconds:g} 秒",
+    ),
+    "keyboard.holds": (
+        "No key-up in terminals: a tap drives {first:g} s, a hold {repeat:g} s past its last repeat",
+        "终端不报告松开：点按行驶 {first:g} 秒，按住则在末次重复后行驶 {repeat:g} 秒",
+    ),
+    "keystroke.no_function": ("{keystroke} has no function here.", "按键 {keystroke} 无效。"),
+    "keystroke.layout": (
+        "SWITCH THE KEYBOARD TO LATIN (ENGLISH).", "请将键盘切换为英文（拉丁字母）输入。",
+    ),
+    "keystroke.late": (
+        "{keystroke} ignored: it is older than {limit:g} s.", "已忽略按键 {keystroke}：超过 {limit:g} s。",
+    ),
+    # alarms
+    "estop.not_sent_yet": (
+        "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch. It is sent if the "
+        "router is back within {seconds:.0f} s.",
+        "急停尚未发送：未连接路由器。请使用车身上的急停开关。若在 {seconds:.0f} 秒内恢复连接，将自动发送。",
+    ),
+    "estop.repeated": (
+        "It is repeated for {seconds:.0f} s.", "将继续发送 {seconds:.0f} 秒。",
+    ),
+    "estop.was_not_sent": (
+        "YOUR E-STOP WAS NOT SENT: press E again; use the vehicle's own switch.",
+        "您的急停未发送：请再按一次 E；请使用车身上的急停开关。",
+    ),
+    "estop.was_not_confirmed": (
+        "YOUR E-STOP IS NOT CONFIRMED: press E again; use the vehicle's own switch.",
+        "您的急停未被确认：请再按一次 E；请使用车身上的急停开关。",
+    ),
+    "estop.acknowledge": ("Enter: understood", "按 Enter 键清除提示"),
+    "view_only.no_stop": (
+        "VIEW ONLY, and no emergency stop: use the vehicle's own switch.",
+        "仅限观看，不能急停：请使用车身上的急停开关。",
+    ),
+    "view_only": (
+        "VIEW ONLY: this certificate may not drive, and perhaps not stop.",
+        "仅限观看：此证书无权驾驶，可能也无权急停。",
+    ),
+    "overruled": ("OVERRULED by {by}: let go of the controls.", "{by} 已取得控制权：请松开操纵装置。"),
+    # lines of this terminal's own events panel
+    "reset.not_sent": (
+        "Reset not sent: no fresh state of safety.", "复位未发送：没有安全服务的最新状态。",
+    ),
+    "gamepad.off_centre": (
+        "Gamepad: axis {axis} is at {position:.2f} as the deadman goes down: ignored. Center it and "
+        "press again, or correct teleop.*_axis or teleop.deadzone.",
+        "手柄：按下使能键时轴 {axis} 位于 {position:.2f}：已忽略。请居中后重新按下，或修改 teleop.*_axis、"
+        "teleop.deadzone。",
+    ),
+}  # fmt: skip
+TEXTS = {**catalogue.TEXTS, **LABELS}
+
+
+class Labels:
+    """The texts in one language."""
+
+    def __init__(self, language: Language = "en") -> None:
+        self._language = language
+
+    def __call__(self, name: str, **fields: Field) -> str:
+        """Return a text by its name; raise ``KeyError`` without it."""
+        if name not in TEXTS:
+            raise KeyError(name)
+        return self.render((Phrase(name, fields),))
+
+    def known(self, name: str, otherwise: str, **fields: Field) -> str:
+        """Return a text by its name, otherwise this one."""
+        return self.render((Phrase(name, fields),), otherwise)
+
+    def render(self, phrases: Iterable[Phrase], otherwise: str = "") -> str:
+        """Return phrases as a text, otherwise the text of their message."""
+        return render(phrases, self._language, otherwise, TEXTS)
+
+    def short(self, phrases: Iterable[Phrase], otherwise: str = "") -> str:
+        """Return a shorter text of the first phrase if there is one."""
+        name = next((f"short.{phrase.name}" for phrase in phrases), "")
+        return self(name) if name in LABELS else self.render(phrases, otherwise)
