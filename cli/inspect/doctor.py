@@ -12,7 +12,7 @@ import ssl
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +20,14 @@ import msgspec
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERYTHING, chunks, decode, expression, topic_of
-from cli.inspect.diagnosis import Finding, Observation, diagnose
+from cli.inspect.diagnosis import Observation, diagnose
 from cli.inspect.estop import is_barred
+from cli.inspect.findings import MARKS, PLACES, PREFIX, Finding, found
+from cli.inspect.output import padded
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
 from common.bus.probe import Probe, probe
 from common.bus.session import common_name
-from common.cli_args import VERSION, source_words
+from common.cli_args import VERSION, reader_language, source_words
 from common.freshness import NS_PER_S
 from common.settings import BusSettings, Shared
 from common.text import printable
@@ -33,8 +35,9 @@ from t2 import keys
 from t2.codec import Sample
 from t2.errors import LinkError, MessageError
 from t2.keys import Topic
-from t2.messages import Health, Link, SafetyState
+from t2.messages import Field, Health, Link, Phrase, SafetyState
 from t2.text_file import pem_problem
+from t2.words import Language, in_language
 
 LISTEN_S = 3.0  # a 1 Hz stream arrives at least twice
 CONNECT_S = 2.0
@@ -45,16 +48,6 @@ SOURCES: dict[Topic[Any], tuple[str, tuple[str, ...]]] = {
     keys.LIMIT: ("safety.limits", ()),
 }
 STREAMS = ("tcp", "tls", "ws")
-MARKS = {"ok": "ok", "note": "note", "wrong": "WRONG", "unknown": "?"}
-KEYS = (
-    "`t2 keys list`, where the robot's certificate authority is, shows the validity of "
-    "certificates; issue or renew it there, and copy its folder here again"
-)
-REFUSED = (
-    "on the robot: is `t2 up` running? By default the router listens on its own host only; "
-    "docs/security.md explains how to open it for laptops"
-)
-NO_ROUTE = "join the robot's Wi-Fi; then --set bus.connect={}/ROBOT:7447 with the robot's address"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,15 +58,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print all findings; return 1 if something is wrong."""
-    wrong, robot = 0, ["--robot", options.robot] if options.robot else []
-    for found in findings(settings(options), options.duration):
-        wrong += found.level == "wrong"
-        output.line(asdict(found)) if options.json else print(as_text(found), flush=True)
+    language = reader_language()
+    robot, wrong = ["--robot", options.robot] if options.robot else [], 0
+    for one in findings(settings(options), options.duration):
+        wrong += one.level == "wrong"
+        if options.json:
+            output.line(as_json(one))
+        else:
+            print(as_text(one, language), flush=True)
     words = [*robot, *source_words(options)]
     if not options.json:
         if wrong and words:
-            print(f"\nFor commands of t2 these options: {shlex.join(words)}")
-        print(f"\n{wrong or 'No'} problem{'s' * (wrong != 1)} found.")
+            options_text = found("", "note", "options", words=shlex.join(words))
+            print(f"\n{options_text.text(language)}")
+        count = {0: "none_found", 1: "one_found"}.get(wrong, "found")
+        print(f"\n{found('', 'ok', count, count=wrong).text(language)}")
     return 1 if wrong else 0
 
 
@@ -84,15 +83,13 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
     for each in attempts:
         yield replace(each, level="note") if is_reached and each.level == "wrong" else each
     if not is_reached:
-        yield Finding("router", "unknown", "router unreachable; later checks are skipped")
+        yield found("router", "unknown", "router.unreachable")
         return
     try:
         with probe(config.bus) as opened:
             seen = observe(opened, config.bus, config.robot.id, seconds)
     except LinkError:
-        text = "the endpoint accepts connections but is not a router"
-        todo = "it hangs, requires TLS, or is not a router: restart it, or correct bus.connect"
-        yield Finding("router", "wrong", text, todo)
+        yield found("router", "wrong", "router.other", "other_router")
         return
     yield from diagnose(seen, config.robot.id)
 
@@ -101,12 +98,13 @@ def connect(endpoint: str, bus: BusSettings) -> Finding:
     """Connect to one endpoint with a plain socket, to find problems below Zenoh."""
     protocol, _, rest = endpoint.partition("/")
     address = rest.partition("?")[0].partition("#")[0]
-    trouble, todo, took_s = "", KEYS, 0.0
+    trouble: Finding | None = None
+    took_s = 0.0
     if protocol == "unixsock-stream":
-        trouble = "" if Path(address).exists() else "the socket file is missing"
-        todo = "the router creates this file: start it, or correct bus.connect"
+        if not Path(address).exists():
+            trouble = problem("no_socket", "socket")
     elif protocol not in STREAMS:
-        return Finding("network", "unknown", f"{endpoint} cannot be tested by itself")
+        return found("network", "unknown", "network.untested", endpoint=endpoint)
     else:
         name, _, port = address.rpartition(":")
         host = name.strip("[]")
@@ -114,49 +112,56 @@ def connect(endpoint: str, bus: BusSettings) -> Finding:
         try:
             with socket.create_connection((host, int(port)), CONNECT_S) as plain:
                 took_s = time.monotonic() - begin_s
-                trouble = handshake(plain, host, bus) if protocol == "tls" else ""
+                trouble = handshake(plain, host, bus) if protocol == "tls" else None
         except OSError as error:
-            trouble, todo = explain(error, host, protocol)
+            trouble = explain(error, host, protocol)
     if trouble:
-        return Finding("network", "wrong", f"{endpoint}: {trouble}", todo)
-    return Finding("network", "ok", f"{endpoint} answers in {took_s * 1000:.1f} ms")
+        where = Phrase(f"{PREFIX}network.at", {"endpoint": endpoint})
+        return replace(trouble, phrases=(where, *trouble.phrases))
+    return found("network", "ok", "network.answers", endpoint=endpoint, ms=took_s * 1000)
 
 
-def explain(error: OSError, host: str, protocol: str) -> tuple[str, str]:
-    """Return problem and remedy of a failed connection."""
+def problem(name: str, remedy: str = "certificate", /, **fields: Field) -> Finding:
+    """Return a problem of an endpoint."""
+    return found("network", "wrong", f"network.{name}", remedy, **fields)
+
+
+def explain(error: OSError, host: str, protocol: str) -> Finding:
+    """Return the problem of a failed connection."""
     match error:
         case socket.gaierror():
-            return f"unknown host name {host}", "use a numeric address, or correct bus.connect"
+            return problem("unknown_host", "host_name", host=host)
         case ConnectionRefusedError():
-            return "connection refused: the host is up, but nothing listens", REFUSED
+            return problem("refused", "refused")
         case TimeoutError():
-            return "no answer", NO_ROUTE.format(protocol)
-    return (error.strerror or str(error)).lower(), NO_ROUTE.format(protocol)
+            return problem("no_answer", "no_route", protocol=protocol)
+    reason = (error.strerror or str(error)).lower()
+    return problem("error", "no_route", protocol=protocol, reason=reason)
 
 
-def handshake(plain: socket.socket, host: str, bus: BusSettings) -> str:
-    """Do a TLS handshake; return the problem, empty if both certificates are valid."""
+def handshake(plain: socket.socket, host: str, bus: BusSettings) -> Finding | None:
+    """Do a TLS handshake; return the problem, None if both certificates are valid."""
     try:
         for name in ("ca", "certificate", "private_key"):
-            if problem := pem_problem(Path(getattr(bus, name)).read_bytes()):
-                return f"bus.{name} {problem}"
+            if wrong := pem_problem(Path(getattr(bus, name)).read_bytes()):
+                return problem("file", name=name, problem=wrong)
         context = ssl.create_default_context(cafile=bus.ca)
         context.load_cert_chain(bus.certificate, bus.private_key)
     except OSError as error:  # the base class of SSLError
         reason = error.strerror or getattr(error, "reason", "") or str(error)
-        return f"bus.ca, bus.certificate or bus.private_key is invalid: {reason}"
+        return problem("files", reason=str(reason))
     try:
         with context.wrap_socket(plain, server_hostname=host) as sock:
             sock.settimeout(ALERT_S)
             sock.recv(1)  # in TLS 1.3 the server checks our certificate after our handshake ends
     except ssl.SSLCertVerificationError as error:
-        return f"the router's certificate is not trusted: {error.verify_message}"
+        return problem("untrusted", reason=error.verify_message)
     except ssl.SSLError as error:
         reason = (error.reason or str(error)).lower().replace("_", " ")
-        return f"the router refuses this certificate: {reason}"
+        return problem("certificate_refused", reason=reason)
     except TimeoutError:
-        return ""  # the router has accepted us and waits for the first message of a session
-    return "the router closes the connection on this certificate"
+        return None  # the router has accepted us and waits for the first message of a session
+    return problem("closed")
 
 
 def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Observation:
@@ -236,7 +241,15 @@ def add_sample(sample: Sample, seen: Observation) -> None:
             seen.state = message
 
 
-def as_text(finding: Finding) -> str:
+def as_json(one: Finding) -> dict[str, str]:
+    """Return a finding in English, with its stable name."""
+    head = {"where": one.where, "level": one.level, "name": one.name}
+    return head | {"text": one.text(), "todo": one.todo()}
+
+
+def as_text(one: Finding, language: Language) -> str:
     """Return a finding as text, with its remedy on a second line."""
-    text = f"{finding.where:9} {MARKS[finding.level]:6} {printable(finding.text)}"
-    return f"{text}\n{'':17}-> {printable(finding.todo)}" if finding.todo else text
+    where, mark = (in_language(it, language) for it in (PLACES[one.where], MARKS[one.level]))
+    text = f"{padded(where, 9)} {padded(mark, 6)} {printable(one.text(language))}"
+    todo = one.todo(language)
+    return f"{text}\n{'':17}-> {printable(todo)}" if todo else text

@@ -4,6 +4,7 @@ Every table, value and JSON line of the inspection commands is printed here.
 """
 
 import sys
+import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -69,6 +70,13 @@ def plain(thing: Any) -> Any:
             return thing
         case _:
             return str(thing)
+
+
+def padded(text: str, columns: int, *, right: bool = False) -> str:
+    """Return a text in so many columns of a terminal; a Chinese character takes two."""
+    wide = sum(unicodedata.east_asian_width(char) in "WF" for char in text)
+    space = " " * (columns - len(text) - wide)
+    return space + text if right else text + space
 
 
 def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:

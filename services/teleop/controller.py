@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from common import clock
 from common.bus.bus import Arrival
 from common.bus.session import is_viewer, operator_name
-from common.cli_args import with_options
+from common.cli_args import hint
 from common.freshness import NS_PER_S
 from common.root_cause import root_cause
 from common.service import Node
@@ -45,7 +45,7 @@ class Controller:
         self, node: Node[TeleopConfig], event_log: EventLog, words: Sequence[str] = ()
     ) -> None:
         """``words`` are the options that name sources of settings, for hints."""
-        self._doctor = with_options("`t2 doctor`", words)
+        self._doctor = hint("doctor", words)
         self._node, self._bus, self._event_log = node, node.bus, event_log
         self._settings = node.config.teleop
         self._operator = operator_name(self._bus.where)

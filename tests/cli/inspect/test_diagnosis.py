@@ -7,11 +7,14 @@ import msgspec
 import pytest
 
 from cli.inspect import diagnosis as d
-from cli.inspect.diagnosis import Finding, Observation, diagnose
+from cli.inspect.diagnosis import Observation, diagnose
+from cli.inspect.findings import REMEDIES, TEXTS, Finding
 from common.root_cause import FROM_LINK
-from services.safety.core.causes import RULES
+from services.safety.core.causes import BY_NAME
 from t2 import keys
 from t2 import messages as m
+from t2.catalogue import CAUSES
+from t2.words import PLACEHOLDER
 from tests import factories
 from tests.factories import health
 
@@ -29,9 +32,16 @@ def relay(state: Any = "up", **given: Any) -> m.Link:
 
 
 def state(*names: Any, latched: tuple[Any, ...] = ()) -> m.SafetyState:
-    texts = {rule.name: (rule.action, rule.text) for rule in RULES}
-    found = [(name, *texts.get(name, ("stop", name))) for name in names]
-    causes = tuple(m.Cause(name=n, action=action, age=1.0, text=text) for n, action, text in found)
+    causes = tuple(
+        m.Cause(
+            name=name,
+            action=BY_NAME[name].action if name in BY_NAME else "stop",
+            age=1.0,
+            text=CAUSES[name].text[0] if name in CAUSES else name,
+            phrases=(m.Phrase(name),),
+        )
+        for name in names
+    )
     return factories.safety_state(verdict="stop", latched=latched, causes=causes)
 
 
@@ -49,7 +59,17 @@ def seen(**given: Any) -> Observation:
 def problems(observed: Observation) -> list[tuple[str, str, str]]:
     """Return level, text and remedy of all findings that are not ok."""
     found = diagnose(observed, "001")
-    return [(each.level, each.text, each.todo) for each in found if each.level != "ok"]
+    return [(each.level, each.text(), each.todo()) for each in found if each.level != "ok"]
+
+
+def remedy(name: str) -> str:
+    """Return a remedy in English."""
+    return REMEDIES[name][0]
+
+
+def of_cause(name: Any) -> str:
+    """Return the remedy of a cause in English."""
+    return CAUSES[name].remedy[0]
 
 
 def test_a_healthy_robot() -> None:
@@ -66,20 +86,20 @@ def test_a_release_that_is_used_up_is_not_advised() -> None:
 def test_a_wrong_robot_gets_the_names_of_the_others() -> None:
     *_, found = diagnose(seen(instances={}, others=["001", "berlin-2"]), "002")
     assert found.level == "wrong"
-    assert found.text == "no service of robot 002 is here; the router knows 001, berlin-2"
-    assert "--robot" in found.todo
+    assert found.text() == "no service of robot 002 is here; the router knows 001, berlin-2"
+    assert "--robot" in found.todo()
 
 
 def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
     given = health("safety"), health("odom", lateness=0.3), health("teleop")
     instances = {"safety": 2, "odom": 1, "mine": 1, "teleop": 2}
     observed = seen(instances=instances, healths={each.service: each for each in given})
-    found = {each.text.split()[0]: each for each in d.services(observed)}
+    found = {each.text().split()[0]: each for each in d.services(observed)}
     assert {name: each.level for name, each in found.items()} == {
         "bridge": "wrong", "safety": "wrong", "odom": "note", "mine": "wrong",
         "teleop": "ok",  # any number of a tool may run
     }  # fmt: skip
-    assert found["bridge"].todo == d.START
+    assert found["bridge"].todo() == remedy("start")
 
 
 @pytest.mark.parametrize(
@@ -108,7 +128,7 @@ def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, s
     found = list(check(seen(**given)))
     assert [each.level for each in found] == [level for level, _ in expected]
     for each, (_, phrase) in zip(found, expected, strict=True):
-        assert phrase in each.text
+        assert phrase in each.text()
 
 
 @pytest.mark.parametrize(
@@ -116,19 +136,19 @@ def test_checks(check: Check, given: dict[str, Any], expected: list[tuple[str, s
     [
         ({"links": [link(armed=False, waiting="link lost")]},
          [("note", "the bridge accepts no motion now: link lost", "")]),
-        ({"links": [relay("lost")]}, [("wrong", "the relay is silent", d.RELAY)]),
+        ({"links": [relay("lost")]}, [("wrong", "the relay is silent", remedy("relay"))]),
         ({"links": [relay("never", version="")]},
-         [("wrong", "no report of the relay received", d.RELAY)]),
+         [("wrong", "no report of the relay received", remedy("relay"))]),
         ({"links": [relay(braking="silent")]},
-         [("wrong", "the relay sends BRAKE: silent", d.RELAY_BRAKES["silent"])]),
+         [("wrong", "the relay sends BRAKE: silent", remedy("relay.silent"))]),
         ({"links": [relay(version="2")]},
-         [("note", "the relay is T2 2, this laptop 0.1.0", d.RELAY_COPY)]),
+         [("note", "the relay is T2 2, this laptop 0.1.0", remedy("relay_copy"))]),
         ({"state": state("contact", "neutral", latched=("contact",))}, [
-            ("wrong", "The bumper was hit. (brake, latched)", d.BUMPER),
-            ("note", "Waiting for a neutral request: release the controls, then drive. (stop)",
-             "")]),
+            ("wrong", "The bumper was hit. (brake, latched)", of_cause("contact")),
+            ("note", "Waiting for a neutral request: let go of the controls, then drive. (stop)",
+             of_cause("neutral"))]),
         ({"state": state("smoke", latched=("smoke",))},
-         [("wrong", "smoke (stop, latched)", d.RESET)]),
+         [("wrong", "smoke (stop, latched)", remedy("reset"))]),
     ],
 )  # fmt: skip
 def test_problems(given: dict[str, Any], expected: list[tuple[str, str, str]]) -> None:
@@ -147,22 +167,24 @@ STOPPED = {"rates": {"tel/bridge/link": 10.0}, "state": state("no_request", *FRO
 @pytest.mark.parametrize(
     ("given", "problem", "remedy"),
     [
-        (without("bridge") | STOPPED | {"links": []}, "bridge is not running", d.START),
+        (without("bridge") | STOPPED | {"links": []}, "bridge is not running", remedy("start")),
         ({"instances": dict.fromkeys(keys.ON_BOARD, 1), "healths": without("bridge")["healths"],
           "links": [], **STOPPED}, "bridge is running and publishes no health: it hangs", None),
-        (STOPPED | {"links": [link("lost")]}, "the board at 10.7.5.224:4002 is", d.BOARD_LOST),
+        (STOPPED | {"links": [link("lost")]}, "the board at 10.7.5.224:4002 is",
+         remedy("board_lost")),
         (STOPPED | {"links": [link("never")]}, "no frame received from the board", None),
         (STOPPED | {"links": [msgspec.structs.replace(relay("lost"), state="lost")]},
-         "the relay is silent", d.RELAY),
+         "the relay is silent", remedy("relay")),
         ({"rates": RATES | {"tel/bridge/bumper": 0.0}, "state": state("bumper", "silent")},
-         "tel/bridge/bumper has 0 of 50 Hz", d.SILENT),
+         "tel/bridge/bumper has 0 of 50 Hz", remedy("silent")),
         (without("odom") | {"rates": RATES | {keys.ODOMETRY.path: 0.0}},
-         "odom is not running", d.START),
-        (without("safety") | {"state": None, "sources": None}, "safety is not running", d.START),
+         "odom is not running", remedy("start")),
+        (without("safety") | {"state": None, "sources": None}, "safety is not running",
+         remedy("start")),
         ({"rates": {}, "healths": {}, "links": [], "state": None},
          "services run, but no message arrives", None),
         ({"stranger": "driver.bob", "instances": {}}, "this router does not know driver.bob",
-         d.STRANGER),
+         remedy("stranger")),
     ],
 )  # fmt: skip
 def test_one_cause_is_one_problem(given: dict[str, Any], problem: str, remedy: str | None) -> None:
@@ -231,11 +253,32 @@ def test_streams_that_are_slow_missing_or_downsampled() -> None:
 )
 def test_only_what_follows_is_folded(given: dict[str, Any], kept: set[str]) -> None:
     found = problems(seen(state=state("bumper", "sonar", "switches"), **given))
-    texts = {rule.text: rule.name for rule in RULES}
+    texts = {entry.text[0]: name for name, entry in CAUSES.items()}
     shown = {text.rpartition(" (")[0] for _, text, _ in found}
     assert {name for text, name in texts.items() if text in shown} == kept
 
 
-def test_remedies_name_existing_causes() -> None:
-    names = {rule.name for rule in RULES}
-    assert names >= d.CAUSES.keys() | {*d.NORMAL, *FROM_LINK}
+def test_normal_causes_exist() -> None:
+    assert CAUSES.keys() >= {*d.NORMAL, *FROM_LINK}
+
+
+def test_a_finding_and_its_remedy_in_chinese() -> None:
+    observed = seen(state=state("contact", latched=("contact",)), links=[link("up")])
+    (pressed,) = (each for each in diagnose(observed, "001") if each.name == "cause.contact")
+    assert pressed.text("zh") == "防撞条已触发。（制动，已锁定）"
+    assert pressed.todo("zh") == CAUSES["contact"].remedy[1]
+    absent = next(iter(d.services(seen(**without("bridge", "odom")))))
+    assert absent.text("zh") == "bridge、odom 未运行"
+    assert absent.todo("zh") == REMEDIES["start"][1]
+
+
+def test_a_cause_of_another_version_has_its_own_text() -> None:
+    name: Any = "smoke"
+    smoke = m.Cause(name=name, action="stop", age=1.0, text="Smoke.", phrases=(m.Phrase("x"),))
+    found = list(d.safety(seen(state=factories.safety_state(causes=(smoke,)))))
+    assert [each.text("zh") for each in found] == ["Smoke.（停止）"]
+
+
+def test_both_languages_have_the_same_fields() -> None:
+    for english, chinese in TEXTS.values():
+        assert sorted(PLACEHOLDER.findall(english)) == sorted(PLACEHOLDER.findall(chinese)), english

@@ -15,8 +15,9 @@ import pytest
 
 from cli.__main__ import main
 from cli.inspect import doctor
-from cli.inspect.diagnosis import START, STRANGER, Finding, diagnose
+from cli.inspect.diagnosis import diagnose
 from cli.inspect.doctor import connect, findings
+from cli.inspect.findings import REMEDIES, Finding
 from common.bus.bus import Bus
 from common.bus.probe import probe
 from common.settings import BusSettings, Shared
@@ -57,14 +58,28 @@ def test_what_it_observes(buses: BusFixture, tool: Tool) -> None:
     assert any(where == "clock" and level == "ok" for where, level, _ in found)
 
 
-def test_no_router(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_router_in_each_language(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     result = Tool(f"tcp/127.0.0.1:{free_port()}", "001", capsys)("doctor", text=True)
     assert (result.code, result.err) == (1, "")
     lines = result.out.splitlines()
     assert "WRONG" in lines[0]
     assert "connection refused" in lines[0]
-    assert lines[1].strip() == f"-> {doctor.REFUSED}"
+    assert lines[1].strip() == f"-> {REMEDIES['refused'][0]}"
     assert lines[-1] == "1 problem found."
+    monkeypatch.setenv("T2_LANG", "zh")
+    lines = Tool(f"tcp/127.0.0.1:{free_port()}", "001", capsys)(
+        "doctor", text=True
+    ).out.splitlines()
+    assert lines[0].startswith("网络      错误   tcp/127.0.0.1:")
+    assert lines[0].endswith("连接被拒绝：主机在线，但没有程序监听")
+    assert lines[1].strip() == f"-> {REMEDIES['refused'][1]}"
+    assert lines[-1] == "发现 1 个问题。"
+    monkeypatch.setenv("T2_LANG", "fr")
+    result = Tool(f"tcp/127.0.0.1:{free_port()}", "001", capsys)("doctor")
+    assert (result.code, result.out) == (78, "")
+    assert "environment T2_LANG: 'fr' is unknown; use en or zh" in result.err
 
 
 def test_one_reachable_endpoint_is_enough_and_services_may_be_missing() -> None:
@@ -72,9 +87,9 @@ def test_one_reachable_endpoint_is_enough_and_services_may_be_missing() -> None:
     with router_process(reached):
         config = Shared(bus=BusSettings(connect=(absent, reached)))
         first, second, *rest = findings(config, 0.1)
-    assert (first.level, first.todo) == ("note", doctor.REFUSED)
+    assert (first.level, first.todo()) == ("note", REMEDIES["refused"][0])
     assert (second.where, second.level) == ("network", "ok")
-    assert [each.todo for each in rest if each.level == "wrong"] == [START]
+    assert [each.todo() for each in rest if each.level == "wrong"] == [REMEDIES["start"][0]]
 
 
 def test_services_that_a_slow_router_does_not_list_are_not_missing() -> None:
@@ -109,7 +124,7 @@ def test_endpoints_of_every_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
         monkeypatch.setattr(socket, "create_connection", fail)
         found = connect("tcp/robot:7447", at())
-        assert (found.level, found.text) == ("wrong", f"tcp/robot:7447: {text}")
+        assert (found.level, found.text()) == ("wrong", f"tcp/robot:7447: {text}")
 
 
 # --- certificates ---------------------------------------------------------------------------------
@@ -148,8 +163,8 @@ def test_an_unknown_certificate_and_hints_with_the_options(
         capsys.readouterr()
         ((text, todo),) = found("bob")
         assert text.startswith("this router does not know driver.bob.")
-        assert todo == STRANGER
-        assert found("anna") == [("safety, bridge, odom are not running", START)]
+        assert todo == REMEDIES["stranger"][0]
+        assert found("anna") == [("safety, bridge, odom are not running", REMEDIES["start"][0])]
 
 
 def test_certificates(driver_at: tuple[BusSettings, str], tmp_path: Path) -> None:
@@ -164,5 +179,6 @@ def test_certificates(driver_at: tuple[BusSettings, str], tmp_path: Path) -> Non
         (missing, "bus.private_key is invalid: No such file or directory"),
     ):
         found = first(member, endpoint)
-        assert (found.where, found.level, found.todo) == ("network", "wrong", doctor.KEYS)
-        assert problem in found.text
+        assert (found.where, found.level) == ("network", "wrong")
+        assert found.todo() == REMEDIES["certificate"][0]
+        assert problem in found.text()
