@@ -13,7 +13,7 @@ from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
 from cli.inspect.session import one_robot, robot_sources
 from cli.settings import Everything
-from common.cli_args import VERSION, add_sources, file_path
+from common.cli_args import VERSION, add_sources, file_path, reader_language
 from common.config import Loaded, load
 from common.errors import ConfigError
 from t2 import keys
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 def checkout(loaded: Loaded[Everything], only: Sequence[str]) -> Report:
     """Run the steps on the running stack."""
-    with checkout_session(loaded.config) as session:
+    with checkout_session(loaded.config, reader_language()) as session:
         facts = [
             ("board", session.of(keys.LINK)[-1].value.board),
             ("T2 of this tool", VERSION),

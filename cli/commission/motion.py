@@ -28,6 +28,7 @@ from cli.commission.report import Row, Verdict, judged, seconds
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
 from t2.messages import Command, Mileage, Motion, SafetyState, Velocity
+from t2.words import Language, render
 
 SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; a margin for unknown vehicles
 WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
@@ -35,7 +36,7 @@ FULL = 0.95  # of the requested speed counts as granted
 NOTHING = 0.15  # of the commanded speed
 RATIO = 0.25  # allowed deviation from 1; that of the other unit is 0.43 or more
 UNIT_MATCH = 0.15  # allowed deviation from the other unit's ratio
-STOP_S = 2.0  # limit for standstill after the release
+STOP_S = 2.0  # limit for standstill after the last request
 UNITS = {"decidegree": math.radians(0.1), "milliradian": 0.001}  # rad/s per unit of the wire
 TOO_FAST = 3.0  # multiple of the requested speed that ends the motion at once
 
@@ -47,11 +48,12 @@ class Run:
     requested: Twist  # one of the two is zero
     unit: str  # ``wire.command_angular_unit`` of the bridge
     feedback: str  # ``wire.feedback_angular_unit`` of the bridge
-    released_ns: int  # when zero was first requested
+    ended_ns: int  # when zero was first requested
     motions: Sequence[Latest[Motion]]
     velocities: Sequence[Latest[Velocity]]
     mileages: Sequence[Latest[Mileage]]
     states: Sequence[Latest[SafetyState]]
+    language: Language = "en"  # of safety's texts
 
     @property
     def turns(self) -> bool:
@@ -132,13 +134,13 @@ def stood_after_s(run: Run) -> float | None:
     """Return the time from the release to lasting standstill; None without standstill."""
     stood_ns: int | None = None
     for velocity in run.velocities:
-        if velocity.received_ns < run.released_ns:
+        if velocity.received_ns < run.ended_ns:
             continue
         if not Twist(velocity.value.linear, velocity.value.angular).is_standing:
             stood_ns = None
         elif stood_ns is None:
             stood_ns = velocity.received_ns
-    return None if stood_ns is None else (stood_ns - run.released_ns) / NS_PER_S
+    return None if stood_ns is None else (stood_ns - run.ended_ns) / NS_PER_S
 
 
 def _problems(run: Run, it: Measured) -> Iterator[str]:
@@ -178,7 +180,8 @@ def _unit_hint(run: Run, ratio: float, direction: str, setting: str) -> str:
 
 
 def _not_granted(run: Run) -> str:
-    texts = list(dict.fromkeys(s.value.text for s in run.states if s.value.verdict != "run"))
+    held = [state.value for state in run.states if state.value.verdict != "run"]
+    texts = list(dict.fromkeys(render(it.phrases, run.language, it.text) for it in held))
     reason = f" Safety reports: {' '.join(texts[-3:])}" if texts else ""
     speeds = [run.part(v.value.linear, v.value.angular) for v in run.velocities]
     peak = max(speeds, key=abs, default=0.0)

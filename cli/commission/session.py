@@ -24,11 +24,12 @@ from t2.codec import Sample
 from t2.errors import LinkError, MessageError, T2Error
 from t2.keys import Topic
 from t2.messages import Message, ResetDone
+from t2.words import Language, render
 
 SOURCE = "checkout"  # as in safety's settings
 STACK_S = 10.0
 READY_S = 8.0  # wait for safety to grant motion; a cause that clears by itself needs 0.5 s
-REST_S = 3.0  # wait for standstill after the release
+REST_S = 3.0  # wait for standstill after the last request
 ZEROS_S = 0.15  # three requests
 TOPICS = (keys.LINK, keys.MOTION, keys.VELOCITY, keys.MILEAGE, keys.ULTRASONIC, keys.BUMPER,
           keys.SWITCHES, keys.DRIVER, keys.HEALTH)  # fmt: skip
@@ -39,9 +40,9 @@ M = TypeVar("M", bound=Message)
 class CheckoutSession(SafetyClient):
     """One checkout on a bus."""
 
-    def __init__(self, opened: Probe, robot: str) -> None:
-        """Listen to the robot."""
-        super().__init__(opened, robot, SOURCE)
+    def __init__(self, opened: Probe, robot: str, language: Language = "en") -> None:
+        """Listen to the robot; ``language`` is that of safety's texts."""
+        super().__init__(opened, robot, SOURCE, language)
         self._marked_ns = 0
         self._log: defaultdict[str, list[Any]] = defaultdict(list)
         for topic in TOPICS:
@@ -97,7 +98,8 @@ class CheckoutSession(SafetyClient):
                 raise T2Error("safety's state does not show it")
         except T2Error as error:
             return Reset(requested_ns, False, str(error), self.latched())
-        text = " ".join(done.text for done in decoded(answers, ResetDone))
+        done = decoded(answers, ResetDone)
+        text = " ".join(render(one.phrases, self.language, one.text) for one in done)
         return Reset(requested_ns, True, text, self.latched())
 
     def drive(self, requested: Twist, seconds: float) -> int | None:
@@ -113,12 +115,12 @@ class CheckoutSession(SafetyClient):
                 return None
             self.requested = request(requested.linear, requested.angular)
             self.until(lambda: self._must_stop(requested), seconds)
-            released_ns = clock.now_ns()
+            ended_ns = clock.now_ns()
             self.requested = request()
-            self.until(lambda: self._stands(released_ns), REST_S)
-            return released_ns
+            self.until(lambda: self._stands(ended_ns), REST_S)
+            return ended_ns
         finally:
-            # On every way out: zeros, the first one at once. The silence after them is a release.
+            # On every way out: zeros, the first one at once. The silence after them is letting go.
             self.requested = None
             self.tick()
             self.listen(ZEROS_S)
@@ -143,10 +145,10 @@ class CheckoutSession(SafetyClient):
 
 
 @contextmanager
-def checkout_session(config: Shared) -> Iterator[CheckoutSession]:
+def checkout_session(config: Shared, language: Language = "en") -> Iterator[CheckoutSession]:
     """Open a session for the context; raise ``LinkError`` without a stack."""
     with probe(config.bus) as opened:
-        session = CheckoutSession(opened, config.robot.id)
+        session = CheckoutSession(opened, config.robot.id, language)
         if not session.until(lambda: session.of(keys.LINK) and session.state, STACK_S):
             raise LinkError(
                 f"no message of bridge and safety on {', '.join(config.bus.endpoints)}; "

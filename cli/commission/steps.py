@@ -26,6 +26,7 @@ from common.text import printable
 from t2 import keys
 from t2.errors import T2Error
 from t2.messages import SONAR_NAMES, Command
+from t2.words import render
 
 LINK_S = 10.0  # some 1000 frames; the ultrasonic ones prove the CRC: zeros have CRC 0 with any CRC
 REST_S = 1.0
@@ -127,7 +128,7 @@ def _wait(session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float) ->
 
 
 def bumper(session: CheckoutSession) -> Verdict:
-    """Check a press and a release of the strip, and the reset."""
+    """Check that the strip reports being pressed and free, and the reset."""
     if problem := _unlatch(session):
         return failed(problem)
     session.mark()
@@ -142,10 +143,10 @@ def bumper(session: CheckoutSession) -> Verdict:
         return failed("No press was received: is the strip connected?")
     at_ns = next(one.received_ns for one in samples if one.value.pressed)
     session.until(lambda: "contact" in session.latched(), LATCH_S)
-    show("Pressed. NOW release it.")
+    show("Pressed. NOW let go of it.")
     is_gone = session.until(lambda: not samples[-1].value.pressed, HAND_S)
     session.listen(CLEAR_S)
-    problem = "" if is_gone else "The bumper stays pressed after its release."
+    problem = "" if is_gone else "The bumper stays pressed after you let go of it."
     return judge_latch(_latch_test(session, "contact", at_ns), problem)
 
 
@@ -189,23 +190,33 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
     settings = session.settings("bridge")
     session.mark()
     show("The wheels turn. Ctrl-C stops them.")
-    released_ns = session.drive(requested, DRIVE_S)
-    if released_ns is None:
-        text = session.state.text if session.state else "no state"
-        links = session.of(keys.LINK)
-        waiting = f" The bridge waits for: {links[-1].value.waiting}." if links else ""
-        return failed(f"Safety does not grant motion to the checkout. It reports: {text}{waiting}")
+    ended_ns = session.drive(requested, DRIVE_S)
+    if ended_ns is None:
+        return failed(
+            f"Safety does not grant motion to the checkout. It reports: {_reported(session)}"
+        )
     run = Run(
         requested=requested,
         unit=str(settings["wire.command_angular_unit"].value),
         feedback=str(settings["wire.feedback_angular_unit"].value),
-        released_ns=released_ns,
+        ended_ns=ended_ns,
         motions=session.of(keys.MOTION),
         velocities=session.of(keys.VELOCITY),
         mileages=session.of(keys.MILEAGE),
         states=session.of(keys.SAFETY),
+        language=session.language,
     )
     return judge_motion(run)
+
+
+def _reported(session: CheckoutSession) -> str:
+    """Return why safety and the bridge grant no motion."""
+    state, links = session.state, session.of(keys.LINK)
+    text = render(state.phrases, session.language, state.text) if state else "no state"
+    if not links or links[-1].value.armed:
+        return text
+    link = links[-1].value
+    return f"{text} The bridge: {render(link.waiting_phrases, session.language, link.waiting)}"
 
 
 class Step(NamedTuple):

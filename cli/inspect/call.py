@@ -11,13 +11,15 @@ import msgspec
 
 from cli.inspect import output
 from cli.inspect.client import SafetyClient
-from cli.inspect.payload import read
+from cli.inspect.payload import localized, read
 from cli.inspect.session import add_options, open_session
+from common.cli_args import reader_language
 from t2 import codec, keys
 from t2.client import reset_request
 from t2.errors import T2Error
 from t2.keys import CALLS, Call
 from t2.messages import SafetyState
+from t2.words import Language, render
 
 Request = dict[str, Any]
 
@@ -48,13 +50,13 @@ def run(options: argparse.Namespace) -> int:
         ]  # fmt: skip
         output.rows(rows, as_json=options.json)
         return 0
-    call = options.key
+    call, language = options.key, reader_language()
     if problem := complaint(call.request, options.request):
         name = call.request.__name__
         output.warn(f"t2 call: not a {name}: {problem}; its fields: docs/bus.md#{name.lower()}")
         return 2
     with open_session(options) as session:
-        make(SafetyClient(session.probe, session.robot), call, options)
+        make(SafetyClient(session.probe, session.robot, language=language), call, options)
     return 0
 
 
@@ -63,11 +65,13 @@ def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace
     request, seen = options.request, None
     if "echo" in call.request.__struct_fields__:
         seen = client.fresh_state()
-        request = filled(call, request, seen)
+        request = filled(call, request, seen, client.language)
     typed = msgspec.convert(request, call.request)
     answers = client.call(call, typed)
     for answer in answers:
-        output.value(read(answer.payload, answer.encoding).value, as_json=options.json)
+        value = read(answer.payload, answer.encoding).value
+        shown = value if options.json else localized(value, client.language)
+        output.value(shown, as_json=options.json)
     if seen and call is keys.RESET and not client.is_reset(seen, answers):
         text = "not confirmed: safety's state does not show this reset"
         raise T2Error(f"{text}; run {client.probe.doctor}")
@@ -99,14 +103,17 @@ def complaint(kind: type[msgspec.Struct], request: Request) -> str:
     return ""
 
 
-def filled(call: Call[Any, Any], request: Request, seen: SafetyState) -> Request:
+def filled(
+    call: Call[Any, Any], request: Request, seen: SafetyState, language: Language
+) -> Request:
     """Return the request with the state's echo; for a reset, print the causes it clears."""
     request = {**request, "echo": seen.heartbeat}
     if call is keys.RESET and "causes" not in request:
         request["causes"] = list(reset_request(seen).causes)
         for cause in seen.causes:
             if cause.id in request["causes"]:
-                output.warn(f"t2 call: asks to clear {cause.name}: {cause.text}")
+                text = render(cause.phrases, language, cause.text)
+                output.warn(f"t2 call: asks to clear {cause.name}: {text}")
     return request
 
 

@@ -27,7 +27,7 @@ from t2.codec import Sample
 from t2.errors import T2Error
 from t2.keys import Call, Topic
 from t2.messages import Drive, Event, Phrase, ResetDone, SafetyState, SourceMessage
-from t2.words import render
+from t2.words import Language, render
 
 TICK_S = 0.05  # as ``t2.client`` expects
 STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
@@ -36,10 +36,16 @@ STATE_S = 1.0  # wait for a state of safety, which has 20 Hz
 class SafetyClient:
     """Client of one robot's safety; a key expression as robot serves ``stop`` only."""
 
-    def __init__(self, probe: Probe, robot: str, source: str = "") -> None:
-        """Listen to safety; ``source`` is the name in drive requests and keepalives."""
+    def __init__(
+        self, probe: Probe, robot: str, source: str = "", language: Language = "en"
+    ) -> None:
+        """Listen to safety; ``source`` is the name in drive requests and keepalives.
+
+        ``language`` is that of refusals.
+        """
         self.probe = probe
         self.robot = robot
+        self.language = language
         self.states: dict[str, SafetyState] = {}  # the newest by robot
         self._received_ns: dict[str, int] = {}
         self.requested: Drive | None = None  # sent on each tick, with its neutral requests
@@ -160,7 +166,8 @@ class SafetyClient:
         if not answers:
             raise T2Error(f"{key}: {self._why_unanswered(call, key)}")
         if refusals := [answer.refusal for answer in answers if answer.refusal]:
-            raise T2Error(f"refused: {' '.join(refusal.text for refusal in refusals)}")
+            texts = (render(it.phrases, self.language, it.text) for it in refusals)
+            raise T2Error(f"refused: {' '.join(texts)}")
         return answers
 
     def is_reset(self, seen: SafetyState, answers: Iterable[Answer]) -> bool:
@@ -184,5 +191,7 @@ class SafetyClient:
         runs = services(self.probe, self.robot, call.server)
         barred = runs and not self.probe.has_server(key)
         if barred:
-            return not_allowed(call.server).text
-        return no_answer(call.server, self.probe.doctor).text
+            why = not_allowed(call.server)
+        else:
+            why = no_answer(call.server, self.probe.doctor)
+        return render(why.phrases, self.language, why.text)

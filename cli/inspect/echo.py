@@ -6,14 +6,15 @@ from typing import Any
 
 from cli.inspect import output
 from cli.inspect.addressing import add_key, chunks, expression, short
-from cli.inspect.payload import Reading, at, read
+from cli.inspect.payload import Reading, at, localized, read
 from cli.inspect.session import add_duration, add_options, open_session, until_interrupt
-from common.cli_args import hint, source_words
+from common.cli_args import hint, reader_language, source_words
 from common.freshness import NS_PER_S
 from common.text import printable
 from t2.codec import Sample
 from t2.errors import T2Error
 from t2.messages import Event
+from t2.words import Language
 
 ONCE_S = 10.0  # for --once without --duration
 HEADER = ("seq", "boot", "t_ns", "mono_ns", "host")
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print messages; raise ``T2Error`` if none arrived."""
-    shown = False
+    shown, language = False, reader_language()
     duration_s = options.duration or (ONCE_S if options.once else None)
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
@@ -43,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
         with until_interrupt():
             for sample in session.probe.samples(duration_s):
                 shown = True
-                show(sample, session.robot, options)
+                show(sample, session.robot, options, language)
                 if options.once:
                     break
     if not shown:
@@ -53,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def show(sample: Sample, robot: str, options: argparse.Namespace) -> None:
+def show(sample: Sample, robot: str, options: argparse.Namespace, language: Language) -> None:
     """Print one sample in the format of the options."""
     reading = read(sample.payload, sample.encoding)
     if options.field:
@@ -61,7 +62,7 @@ def show(sample: Sample, robot: str, options: argparse.Namespace) -> None:
     elif options.json:
         output.line(as_json(sample, reading, robot))
     else:
-        print(printable(as_text(sample, reading, robot), "\n"), flush=True)
+        print(printable(as_text(sample, reading, robot, language), "\n"), flush=True)
 
 
 def as_json(sample: Sample, reading: Reading, robot: str) -> dict[str, Any]:
@@ -72,9 +73,9 @@ def as_json(sample: Sample, reading: Reading, robot: str) -> dict[str, Any]:
     return head | {"message": reading.value}
 
 
-def as_text(sample: Sample, reading: Reading, robot: str) -> str:
+def as_text(sample: Sample, reading: Reading, robot: str, language: Language) -> str:
     """Return a sample as text: a title line, its fields, and ``---`` as in ROS."""
-    value, seq = reading.value, ""
+    value, seq = localized(reading.value, language), ""
     if isinstance(value, dict):
         seq = f"  seq {value['seq']}" if "seq" in value else ""
         value = {name: each for name, each in value.items() if name not in HEADER}

@@ -22,20 +22,21 @@ from cli.inspect import output
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import add_options, open_session, services, until_interrupt
 from common.bus.probe import Probe
-from common.cli_args import hint, source_words
+from common.cli_args import hint, reader_language, source_words
 from common.root_cause import WITHOUT_BRIDGE
 from common.text import printable
 from t2 import keys
 from t2.client import ESTOP_WAIT_S
 from t2.errors import LinkError, T2Error
 from t2.messages import Limit, LimitState, SafetyState
+from t2.words import Language, render
 
 RETRY_S = 0.2  # without a router
 KEEPALIVE_S = 0.1
 SWITCH = "USE THE VEHICLE'S OWN SWITCH"
 SILENT_S = 2.5  # without a state of safety, which over a thin uplink may have 1 Hz
 SILENT = f"NOT KNOWN  no state of safety for {SILENT_S:g} s: {SWITCH} if the robot moves"
-BARRED = "A driver of this robot releases it (R in `t2 drive`): this program may not reset."
+BARRED = "A driver of this robot resets it (R in `t2 drive`): this program may not."
 MOVES = ("bridge", "safety")  # a robot without these services cannot move
 
 
@@ -98,11 +99,13 @@ def stop(client: SafetyClient, user: str, settings: Sequence[str] = (), end_s: f
         states |= client.states
     unreached = {each for each in confirmed if is_unreached(states[each])}
     for each in sorted(confirmed - unreached):
-        release = shlex.join(["t2", "call", "safety/reset", "--robot", each, *settings])
+        reset = shlex.join(["t2", "call", "safety/reset", "--robot", each, *settings])
         may_reset = probe.has_server(keys.RESET.on(each))
-        print(f"Robot {each} is stopped. {f'`{release}` releases it.' if may_reset else BARRED}")
+        print(f"Robot {each} is stopped. {f'`{reset}` resets it.' if may_reset else BARRED}")
     sys.stdout.flush()
-    warn(dict.fromkeys(unreached, "has latched it, but does not hear the vehicle"), settings)
+    warn(
+        dict.fromkeys(unreached, "has latched it, but receives nothing from the vehicle"), settings
+    )
     if not confirmed and not expected:
         output.warn(
             f"t2 estop: sent, but no robot found. If one moves, {SWITCH}. "
@@ -161,7 +164,7 @@ def warn(trouble: Mapping[str, str], settings: Sequence[str]) -> None:
 
 
 def is_unreached(state: SafetyState) -> bool:
-    """Return whether safety does not hear the board: the stop may not arrive there."""
+    """Return whether safety receives nothing from the board: the stop may not arrive there."""
     return any(cause.name in WITHOUT_BRIDGE for cause in state.causes)
 
 
@@ -176,11 +179,12 @@ def is_barred(probe: Probe, robot: str) -> bool:
 
 def keep_alive(options: argparse.Namespace) -> int:
     """Keep an emergency stop alive until Ctrl-C; return 1 when safety does not expect its name."""
+    language = reader_language()
     with open_session(options) as session:
         if "*" in session.robot:
             raise T2Error("--keepalive works on one robot at a time; name it")
         name, robot = options.keepalive, session.robot
-        client = SafetyClient(session.probe, robot, source=name)
+        client = SafetyClient(session.probe, robot, name, language)
         ours = kept(client.fresh_state(), name)
         print(f"Keeping the emergency stop of robot {robot} alive as {name}.")
         print("Enter: EMERGENCY STOP. Ctrl-C ends this program: the robot then brakes and latches.")
@@ -207,18 +211,19 @@ def follow(client: SafetyClient, name: str, user: str) -> None:
     while True:
         client.put(keys.LIMIT, Limit(echo=0))
         state = None if client.is_silent(SILENT_S) else client.state
-        if (line := described(state, name) if state else SILENT) != shown:
+        if (line := described(state, name, client.language) if state else SILENT) != shown:
             print(line, flush=True)
             shown = line
         if select.select(watched, [], [], 0)[0]:
             if sys.stdin.readline():
                 stop(client, user)
             else:
-                watched = []  # the end of a file is no key
+                watched = []  # the end of a file is no keystroke
         client.until(lambda: False, KEEPALIVE_S)
 
 
-def described(state: SafetyState, name: str) -> str:
+def described(state: SafetyState, name: str, language: Language = "en") -> str:
     """Return the state as a line."""
+    text = render(state.phrases, language, state.text)
     alive = any(one.source == name and not one.silent for one in state.limit_sources)
-    return f"{'alive' if alive else 'NOT ALIVE'}  {state.verdict.upper()}  {printable(state.text)}"
+    return f"{'alive' if alive else 'NOT ALIVE'}  {state.verdict.upper()}  {printable(text)}"

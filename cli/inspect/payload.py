@@ -1,5 +1,6 @@
 """Decoding of any payload: by its encoding, without one as MessagePack. Never raises."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,12 +9,18 @@ from msgspec import Struct
 
 from t2 import codec, keys
 from t2.errors import MessageError
+from t2.messages import Phrases
+from t2.words import Language, render
 
 _CALLED: list[type[Struct]] = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
 _PUBLISHED: list[type[Struct]] = [topic.message for topic in keys.TOPICS]
 KINDS = {kind.__name__: kind for kind in (*_PUBLISHED, *_CALLED)}
 # Without an encoding a payload is "zenoh/bytes", and may be anything: MessagePack is tried.
 KNOWN = ("application/json", "application/msgpack", "zenoh/bytes")
+# Texts of messages, and the phrases with the same content.
+TEXTS = {
+    "text": "phrases", "waiting": "waiting_phrases", "release_refusal": "refusal_phrases",
+}  # fmt: skip
 UNREADABLE = (msgspec.MsgspecError, RecursionError, UnicodeDecodeError, ValueError)
 
 
@@ -43,6 +50,21 @@ def read(payload: bytes, encoding: str) -> Reading:
         return Reading("bytes", payload, f"not {form}")
     name = codec.kind_of(encoding)
     return Reading(name or "msgpack", value, _complaint(value, name))
+
+
+def localized(value: Any, language: Language) -> Any:
+    """Return a decoded message with its texts in a language, and without their phrases."""
+    if isinstance(value, list):
+        return [localized(each, language) for each in value]
+    if not isinstance(value, dict):
+        return value
+    shown = {name: localized(each, language) for name, each in value.items()}
+    for text, phrases in TEXTS.items():
+        with suppress(*UNREADABLE, KeyError):
+            known = msgspec.convert(value[phrases], Phrases)
+            shown[text] = render(known, language, value[text])
+            del shown[phrases]
+    return shown
 
 
 def at(value: Any, path: str) -> Any:

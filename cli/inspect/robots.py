@@ -11,9 +11,11 @@ from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import add_options, open_session, services
+from common.cli_args import reader_language
 from t2 import keys
 from t2.errors import T2Error
 from t2.messages import SafetyState
+from t2.words import Language, render
 
 LISTEN_S = 1.5  # at most; over a thin uplink a stream may have 1 Hz
 
@@ -26,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """List the robots; return 1 if one that moves has no safety state."""
     options.robot = options.robot or EVERY_ROBOT
+    language: Language = "en" if options.json else reader_language()
     running: defaultdict[str, set[str]] = defaultdict(set)
     with open_session(options) as session:
         client = SafetyClient(session.probe, session.robot)
@@ -36,12 +39,15 @@ def run(options: argparse.Namespace) -> int:
         client.until(lambda: client.states.keys() >= supervised, LISTEN_S)
     if not found:
         raise T2Error(f"no robot found; try {session.probe.doctor}")
-    rows = [row(name, found[name], client.states.get(name)) for name in sorted(found)]
+    states = client.states
+    rows = [row(name, found[name], states.get(name), language) for name in sorted(found)]
     output.rows(rows, as_json=options.json)
     return 1 if {"silent", "no safety"} & {each["verdict"] for each in rows} else 0
 
 
-def row(name: str, services: set[str], state: SafetyState | None) -> dict[str, Any]:
+def row(
+    name: str, services: set[str], state: SafetyState | None, language: Language
+) -> dict[str, Any]:
     """Return one robot as a JSON object."""
     if state:
         verdict: str = state.verdict
@@ -55,5 +61,5 @@ def row(name: str, services: set[str], state: SafetyState | None) -> dict[str, A
         "verdict": verdict,
         "latched": list(state.latched) if state else [],
         "source": state.source if state else None,
-        "text": state.text if state else "",
+        "text": render(state.phrases, language, state.text) if state else "",
     }

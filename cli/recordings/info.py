@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 from cli.inspect import output
 from cli.inspect.addressing import chunks
 from cli.recordings.timeline import Timeline
-from common.cli_args import file_path, needs_extra
+from common.cli_args import file_path, needs_extra, reader_language
 from common.freshness import NS_PER_S
 from common.text import printable
 from t2.keys import ROOT
+from t2.messages import Cause, Event
+from t2.words import Language, render
 
 if TYPE_CHECKING:
     from services.recorder.reader import Reader
@@ -25,12 +27,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Show each file; return 1 if any is truncated or damaged."""
-    complete = True
+    complete, language = True, reader_language()
     for number, file in enumerate(options.files):
         with open_recording(file) as reader:
             timeline = timeline_of(reader)
         complete = complete and not (reader.cut or reader.damaged)
-        print(*([""] if number else []), printable(as_text(reader, timeline), "\n"), sep="\n")
+        print(
+            *([""] if number else []),
+            printable(as_text(reader, timeline, language), "\n"),
+            sep="\n",
+        )
     return 0 if complete else 1
 
 
@@ -49,7 +55,7 @@ def timeline_of(reader: "Reader") -> Timeline:
     return timeline
 
 
-def as_text(reader: "Reader", timeline: Timeline) -> str:
+def as_text(reader: "Reader", timeline: Timeline, language: Language = "en") -> str:
     """Return the summary, streams, stops and events as text."""
     about = summary(timeline, reader).items()
     lines = [f"{name}: {value}" for name, value in about if value]
@@ -67,18 +73,25 @@ def as_text(reader: "Reader", timeline: Timeline) -> str:
     lines.append(output.table(["key", "type", "messages", "Hz", "lost"], rows))
     stops = [
         f"{moment(timeline, stop.begins_s)}  {stop.verdict:9}  for {stop.lasts_s:.1f} s: "
-        + " ".join(f"{name}: {printable(text)}" for name, text in stop.reasons.items())
+        + " ".join(
+            f"{name}: {printable(said(cause, language))}" for name, cause in stop.reasons.items()
+        )
         for stop in timeline.stops
     ]
     events = [
         f"{moment(timeline, each.at_s)}  {each.event.level:9}  {each.service}: {each.event.name}: "
-        f"{printable(each.event.text)}"
+        f"{printable(said(each.event, language))}"
         for each in timeline.events
     ]
     for title, texts in (("stops", stops), ("events", events)):
         if texts:
             lines += ["", f"{title} (since the start, and UTC):", *texts]
     return "\n".join(lines)
+
+
+def said(message: Cause | Event, language: Language) -> str:
+    """Return the text of a cause or an event."""
+    return render(message.phrases, language, message.text)
 
 
 def summary(timeline: Timeline, reader: "Reader") -> dict[str, str]:

@@ -5,15 +5,17 @@ rates and gaps of each stream. All content from the bus is escaped. It needs the
 """
 
 import argparse
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import chunks
-from cli.recordings.info import clock, open_recording, summary, timeline_of, warnings
+from cli.recordings.info import clock, open_recording, said, summary, timeline_of, warnings
 from cli.recordings.timeline import Timeline
-from common.cli_args import file_path, needs_extra
+from common.cli_args import file_path, needs_extra, reader_language
 from common.text import printable
 from t2.errors import T2Error
+from t2.words import Language
 
 if TYPE_CHECKING:
     from services.recorder.reader import Reader
@@ -37,16 +39,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Write a report for each file and print its path; raise ``T2Error`` on the first error."""
     files: list[Path] = options.files
+    language = reader_language()
     if options.out and len(files) > 1:
         raise T2Error(f"--out is for one recording, and there are {len(files)} recordings")
     for file in files:
         out = options.out or file.with_suffix(".html")
-        write_report(file, out)
+        write_report(file, out, language)
         print(out)
     return 0
 
 
-def write_report(file: Path, out: Path) -> None:
+def write_report(file: Path, out: Path, language: Language = "en") -> None:
     """Write the report of one recording."""
     if out.exists() and file.exists() and out.samefile(file):
         raise T2Error(f"{out}: is the recording itself; choose another file with --out")
@@ -54,14 +57,14 @@ def write_report(file: Path, out: Path) -> None:
         timeline = timeline_of(reader)
         if timeline.began_ns is None:
             raise T2Error(f"{file}: contains no messages of the bus")
-        text = printable(page(timeline, reader), "\n")
+        text = printable(page(timeline, reader, language), "\n")
     try:
         out.write_text(text, encoding="utf-8")
     except OSError as error:
         raise T2Error(f"{out}: cannot be written: {error.strerror}") from None
 
 
-def page(timeline: Timeline, reader: "Reader") -> str:
+def page(timeline: Timeline, reader: "Reader", language: Language = "en") -> str:
     """Return the page of a recording that has been read to its end."""
     with needs_extra("report", "a report"):
         from jinja2 import Environment, StrictUndefined
@@ -72,6 +75,7 @@ def page(timeline: Timeline, reader: "Reader") -> str:
     names = [chunks(stream.key)[1] or stream.key for stream in streams]
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters["clock"] = clock
+    environment.filters["said"] = partial(said, language=language)
     return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
         timeline=timeline,
         title=reader.path.name,

@@ -2,7 +2,7 @@
 
 A stop begins with the first cause that stops the vehicle and ends when none is left. ``no_request``
 and ``neutral`` do not count: the vehicle stands because nothing requests motion, or because the
-controls must be released first.
+controls must be let go first.
 
 Times are seconds since the recording's first message, on the recorder's wall clock. A series holds
 NaN in a gap, so that no line is drawn through it.
@@ -61,7 +61,7 @@ class Stop:
     ends_s: float
     was_driving: bool  # the vehicle moved before
     verdict: str  # the first one
-    reasons: dict[str, str] = field(default_factory=dict)  # text by name, in order of appearance
+    reasons: dict[str, Cause] = field(default_factory=dict)  # by name, in order of appearance
 
     @property
     def lasts_s(self) -> float:
@@ -94,7 +94,7 @@ def stops(phases: Iterable[Phase]) -> list[Stop]:
         if current is not None:
             current.ends_s = phase.ends_s
             for cause in causes:
-                current.reasons.setdefault(cause.name, cause.text)
+                current.reasons.setdefault(cause.name, cause)
         driving = phase.state.verdict in ("run", "slow")
     return found
 

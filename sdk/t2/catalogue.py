@@ -755,7 +755,7 @@ EVENTS: tuple[EventRow, ...] = (
         ("Counters and velocities agree again.", "编码器计数与速度已恢复一致。"), NOTHING,
     ),
     EventRow(
-        "teleop", "gamepad", "info", ("Another gamepad, or none.", "手柄已更换或已断开。"),
+        "teleop", "gamepad", "info", ("Gamepad: {device}.", "手柄：{device}。"),
         (
             "nothing to do; a disconnected one counts as let go",
             "无需处理；断开的手柄视为已松开",

@@ -1,1 +1,1 @@
-"""Teleop: drive requests from an operator's keys and gamepad."""
+"""Teleop: drive requests from an operator's keyboard and gamepad."""

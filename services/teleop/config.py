@@ -11,7 +11,7 @@ Index = Annotated[int, Meta(ge=0, le=31)]  # of an axis or a button, as SDL coun
 
 
 class Teleop(settings.Section, frozen=True, kw_only=True):
-    """Keys and gamepad; the speeds of the gears are the vehicle's."""
+    """Keyboard and gamepad; the speeds of the gears are the vehicle's."""
 
     source: SourceName = "teleop"  # the name to drive under; safety knows its priority
     # that a tap drives: most terminals send the first repeat after ~0.5 s

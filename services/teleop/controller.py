@@ -141,8 +141,8 @@ class Controller:
         stick = self._gamepad.read()
         status = self._gamepad.status
         if status != before:
-            name = status.name.partition(".")[2]
-            self._report("gamepad", "info", Phrase("gamepad.status"), status, status=name)
+            device = status.fields.get("device", status.name.partition(".")[2])
+            self._report("gamepad", "info", Phrase("gamepad.status"), status, device=device)
         self._rules.report_gamepad(GAMEPAD_SILENCE_S, self._gamepad.ignored)
         is_drawn = now_ns - self._drawn_ns <= SCREEN_TIMEOUT_S * NS_PER_S
         is_shown = is_drawn and not self.terminal.has_stopped(now_ns)

@@ -56,6 +56,6 @@ class OperatorReset:
     def _refused(self, check: ResetCheck, refusal: Refusal) -> None:
         if self._check is check:
             self._check = None
-        if refusal == no_answer("safety") and self._is_denied():
+        if refusal.phrases == no_answer("safety").phrases and self._is_denied():
             refusal = not_allowed("safety")
         self._event_log.add("safety", "warning", refusal.phrases, refusal.text)

@@ -136,7 +136,7 @@ def test_a_healthy_robot_and_a_complete_checkout(
         for _ in tries(it, "Bumper"):
             it.wait("NOW press the bumper")
             stack.control.do(Bumper(pressed=True))
-            it.wait("NOW release")
+            it.wait("NOW let go")
             assert "The bumper was hit. (brake, latched)" in wrong()
             stack.control.do(Bumper(pressed=False))
         for _ in tries(it, "Emergency stop"):

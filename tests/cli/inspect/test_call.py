@@ -118,10 +118,12 @@ def test_no_operators_call_without_a_state(
     assert "no state of safety within 0.3 s" in result.err
 
 
-def test_replies_and_refusals(buses: BusFixture, tool: Tool) -> None:
+def test_replies_and_refusals(
+    buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def led(request: m.LedRequest, caller: Caller[m.Done]) -> None:
         if request.channel:
-            caller.refuse("no such lamp")
+            caller.refuse(m.Phrase("board.failure"))
         else:
             caller.reply(m.Done(text="lit"))
 
@@ -129,11 +131,14 @@ def test_replies_and_refusals(buses: BusFixture, tool: Tool) -> None:
     first = '{"channel": 0, "mode": 1}'
     for key in ("led", "bridge/led", "/srv/bridge/led"):
         result = tool("call", key, first)
-        assert (result.code, result.lines) == (0, [{"text": "lit", "boot": 0}])
+        assert (result.code, result.lines) == (0, [{"text": "lit", "phrases": [], "boot": 0}])
     assert tool("call", "bridge/led", first, text=True).out == "text: lit\nboot: 0\n"
     result = tool("call", "bridge/led", '{"channel": 1, "mode": 1}')
     assert (result.code, result.out) == (1, "")
-    assert result.err == "t2 call: refused: no such lamp\n"
+    assert result.err == "t2 call: refused: The board reports a failure (0xAA).\n"
+    monkeypatch.setenv("T2_LANG", "zh")
+    result = tool("call", "bridge/led", '{"channel": 1, "mode": 1}')
+    assert result.err == "t2 call: refused: 主控板报告失败（0xAA）。\n"
 
 
 @pytest.mark.parametrize(

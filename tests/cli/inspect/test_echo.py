@@ -13,7 +13,7 @@ import pytest
 from cli.inspect import echo
 from common.bus.bus import Bus
 from t2 import codec, keys
-from t2.messages import Bumper, Event
+from t2.messages import Bumper, Event, Phrase
 from tests.cli.inspect.tool import Tool, pretend
 from tests.cli.processes import PATIENCE_S, running, sets, t2
 from tests.common.bus_fixture import BusFixture
@@ -74,14 +74,22 @@ def test_control_characters_are_escaped(buses: BusFixture, tool: Tool) -> None:
     assert json.loads(shown)["message"] == {f"a{hostile}": {f"b{hostile}": hostile}}
 
 
-def test_earlier_events_are_shown(buses: BusFixture, tool: Tool) -> None:
+def test_earlier_events_are_shown_in_the_readers_language(
+    buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def publish(bus: Bus) -> None:
         bus.publisher(keys.EVENTS, service="mine").put(
-            Event(name="stop", level="info", text="long ago")
+            Event(name="stop", level="info", text="Bumper.", phrases=(Phrase("contact"),))
         )
 
     buses.bus(publish)
-    assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "long ago"
+    assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "Bumper."
+    shown = tool("echo", "evt/**", "--once", text=True).out
+    assert "text: The bumper was hit.\n" in shown
+    monkeypatch.setenv("T2_LANG", "zh")
+    shown = tool("echo", "evt/**", "--once", text=True).out
+    assert "text: 防撞条已触发。\n" in shown
+    assert "phrases" not in shown
 
 
 def test_silence(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -72,7 +72,7 @@ def test_stop_of_one_site(join: Join, t2: Tool) -> None:
     wait_until(lambda: len(events) == 2, "an event for each robot")
     key, event = events[0].key, events[0].message
     assert key in ("t2/v1/berlin-001/evt/estop", "t2/v1/berlin-002/evt/estop")
-    assert (event.name, event.text) == ("estop", f"emergency stop requested by {USER}")
+    assert (event.name, event.text) == ("estop", f"Emergency stop requested by {USER}.")
     assert event.about == {"by": USER}
 
 
@@ -130,7 +130,10 @@ def test_a_latched_stop_that_the_board_may_not_hear_is_no_stop(join: Join, t2: T
     robot(join("berlin-001"), causes=(lost,))
     result = t2("estop", "--robot", "berlin-001")
     assert (result.code, result.out) == (1, "")
-    assert "does not hear the vehicle. USE THE VEHICLE'S OWN SWITCH, then `t2 doctor" in result.err
+    assert (
+        "receives nothing from the vehicle. USE THE VEHICLE'S OWN SWITCH, then `t2 doctor"
+        in result.err
+    )
 
 
 def test_a_driver_of_some_robots_stops_them_by_name(

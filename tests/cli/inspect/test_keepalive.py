@@ -9,7 +9,7 @@ import pytest
 from cli.inspect.estop import described
 from common.bus.bus import Arrival, Bus
 from t2 import keys
-from t2.messages import Limit
+from t2.messages import Limit, Phrase
 from tests.cli.inspect.tool import FakeSafety, Tool
 from tests.common.bus_fixture import BusFixture
 from tests.factories import limit_source, safety_state
@@ -55,7 +55,7 @@ def test_signs_of_life_enter_and_the_end(buses: BusFixture, safety: Safety) -> N
             assert not safety.stops
             assert process.stdin is not None
             process.stdin.write("\n")
-            process.stdin.close()  # the end of its input is no key
+            process.stdin.close()  # the end of its input is no keystroke
             wait_until(lambda: safety.stops, "the emergency stop")
             more()  # they pause during a stop
             stops = len(safety.stops)
@@ -78,5 +78,7 @@ def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
         assert f"safety does not expect '{name}': it expects pendant" in result.err
 
 
-def test_a_described_state_is_printable() -> None:
+def test_a_described_state_is_printable_and_in_the_readers_language() -> None:
+    state = safety_state(text="Emergency stop.", phrases=(Phrase("estop"),))
+    assert described(state, "pendant", "zh").endswith("  急停。")
     assert described(safety_state(text="\x1b[2J"), "pendant").endswith("  \\u001b[2J")

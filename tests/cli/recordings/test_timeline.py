@@ -107,7 +107,9 @@ def test_a_contact_while_driving_with_a_reset() -> None:
     )
     assert (stop.begins_s, stop.ends_s, stop.lasts_s) == (2, 5, 3)
     assert (stop.was_driving, stop.verdict) == (True, "brake")
-    assert stop.reasons == {"contact": "The bumper was hit."}
+    assert {name: cause.text for name, cause in stop.reasons.items()} == {
+        "contact": "The bumper was hit."
+    }
 
 
 def test_consecutive_reasons_are_one_stop() -> None:
