@@ -190,8 +190,5 @@ class SafetyClient:
         """
         runs = services(self.probe, self.robot, call.server)
         barred = runs and not self.probe.has_server(key)
-        if barred:
-            why = not_allowed(call.server)
-        else:
-            why = no_answer(call.server, self.probe.doctor)
+        why = not_allowed(call.server) if barred else no_answer(call.server, self.probe.doctor)
         return render(why.phrases, self.language, why.text)

@@ -32,6 +32,7 @@ from services.safety.core.sonars import Axis, SonarOverrides
 from services.safety.core.sources import Arbiter
 from services.safety.core.state import State
 from services.safety.service import SafetyService
+from sim import requests as q
 from t2 import keys
 from t2 import messages as m
 from t2.messages import Command
@@ -70,6 +71,14 @@ def brakes_go_off_and_on(stack: Stack) -> None:
     for on in (False, True):
         stack.send(framing.pack(BumperBrakeReport(on)))
         stack.run(60)
+
+
+def tap_in_a_gap(stack: Stack) -> None:
+    """Press the bumper for 60 ms while its samples are lost."""
+    stack.vehicle.inject(q.Mute(reports=("bumper",)))
+    stack.tap(60)
+    stack.run(80)
+    stack.vehicle.inject(q.Mute())
 
 
 def successor(
@@ -370,6 +379,10 @@ MUTATIONS: dict[str, Mutation] = {
     "a successor need not know of the latch": (
         (leases, "on_motion", whoever), (successor_hears_of_no_latch, *GO_ON),
         "bridge knows of estop",
+    ),
+    "the age of the bumper's samples does not matter": (
+        (conditions, "_bumper", lambda *_: Observation("bumper", False)), (tap_in_a_gap,),
+        "a press of 60 ms was missed",
     ),
     "a hit needs no judgement": (
         received(m.Motion, lambda motion: replace(motion, judged=2**62)),

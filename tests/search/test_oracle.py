@@ -8,7 +8,7 @@ from common.freshness import NS_PER_S
 from common.wire.reports import BumperReport
 from tests.search.mutations import MUTATIONS, driver_blinks
 from tests.search.scripted_stack import ScriptedStack, driving
-from verification.search.bridge_book import BridgeBook
+from verification.search.bridge_book import BridgeBook, PressBook
 from verification.search.ros import PATTERNS
 
 
@@ -133,3 +133,33 @@ def hits(samples: Iterable[tuple[int, bool]]) -> list[int]:
         for number, (port, pressed) in enumerate(samples)
         if book.on_report(BumperReport(pressed), port, number * NS_PER_S // 50)
     ]
+
+
+@pytest.mark.parametrize(
+    ("closed_ms", "report_ms", "stop_ms", "missed"),
+    [
+        (50, None, None, False),  # too short
+        (60, None, None, True),
+        (300, None, None, True),
+        (60, 100, None, False),
+        (60, None, 170, False),  # it is stopped in time
+        (60, None, 200, True),
+    ],
+)
+def test_a_press_is_reported_or_the_vehicle_stops(
+    closed_ms: int, report_ms: int | None, stop_ms: int | None, missed: bool
+) -> None:
+    book = PressBook()
+    book.on_frame(moves=True)
+    found = []
+    for ms in range(0, 500, 10):
+        if ms == stop_ms:
+            book.on_frame(moves=False)
+        book.noticed |= ms == report_ms
+        found.append(book.look(ms < closed_ms, ms * NS_PER_S // 1000))
+    assert sum(found) == missed
+
+
+def test_a_press_while_the_vehicle_is_not_driven_is_not_missed() -> None:
+    book = PressBook()
+    assert not any(book.look(ms < 60, ms * NS_PER_S // 1000) for ms in range(0, 500, 10))

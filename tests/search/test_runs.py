@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from services.safety.core.planning import SonarLimit, Zones
 from services.teleop.core.hold import Deadman
-from verification.search.draw import Draw, Value, draw
+from verification.search.draw import Draw, Value, draw, ranges
 from verification.search.run import run
 
 BATCHES, BATCH = 25, 8
@@ -34,6 +34,14 @@ def test_what_was_found_stays_fixed(found: dict[str, Any]) -> None:
     assert not result.violations
     assert not result.stops
     assert result.finished or result.faulty
+
+
+def test_taps_come_beside_lost_answers_only() -> None:
+    (tapped,) = [one for one in ranges() if one.beside]
+    draws = [set(draw(seed).values) for seed in range(200)]
+    found = [names for names in draws if tapped.name in names]
+    assert found
+    assert all(names & set(tapped.beside) for names in found)
 
 
 def test_a_run_is_the_same_each_time() -> None:

@@ -1,4 +1,7 @@
-"""Oracle's book on one bridge: messages delivered to it, and the RUN frames they permit."""
+"""Oracle's books on one bridge, and on short presses of the bumper.
+
+The first one has the messages delivered to the bridge, and the RUN frames they permit.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -12,6 +15,8 @@ LEASE_NS, SILENCE_NS = NS_PER_S // 5, NS_PER_S // 5
 SLACK_NS = NS_PER_S // 40  # the bridge looks every 10 ms
 BEGIN_NS = 3 * NS_PER_S  # that BRAKE of the guard continues without a motion message
 CLEAR_SAMPLES = 3
+PRESS_NS = NS_PER_S * 60 // 1000  # the shortest press that counts
+NOTICE_NS = NS_PER_S * 120 // 1000  # after it: the vehicle is no longer driven
 
 
 @dataclass(slots=True)
@@ -94,3 +99,39 @@ class BridgeBook:
             yield "the board is silent, or its brakes are not both on"
         if not self.neutral:
             yield "no neutral motion came since the bridge began, lost something or changed hands"
+
+
+@dataclass(slots=True)
+class PressBook:
+    """The real contact of the strip, whether or not a sample of it reaches a bridge.
+
+    A press while the vehicle is driven must be reported to a bridge, or the vehicle be stopped.
+    """
+
+    since_ns: int | None = None  # since when it is closed
+    counts: bool = False  # whether it was closed long enough
+    noticed: bool = False  # whether it was reported, or another frame than a RUN has left
+    driven: bool = False  # whether the newest frame is a RUN that moves
+    slack_ns: int = 0  # of cable and stalls
+
+    def on_frame(self, moves: bool) -> None:
+        """Record a motion frame that leaves for the board."""
+        self.driven = moves
+        self.noticed = self.noticed or not moves
+
+    def look(self, closed: bool, now_ns: int) -> bool:
+        """Look at the contact; return whether a press was missed."""
+        if self.since_ns is None:
+            if closed:
+                self.since_ns, self.counts, self.noticed = now_ns, False, not self.driven
+            return False
+        self.counts = self.counts or now_ns - self.since_ns >= PRESS_NS
+        if not self.counts and not closed:
+            self.since_ns = None
+            return False
+        over = now_ns - self.since_ns > PRESS_NS + NOTICE_NS + self.slack_ns
+        missed = over and not self.noticed
+        if (over or self.noticed) and not closed:
+            self.since_ns = None
+        self.noticed = self.noticed or missed
+        return missed

@@ -41,6 +41,7 @@ class Range(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     choices: tuple[Value, ...] = ()
     chance: float = 1.0
     fault: bool = False
+    beside: tuple[str, ...] = ()
 
     def draw(self, chance: random.Random) -> Value:
         """Return a value."""
@@ -106,8 +107,14 @@ def draw(seed: int) -> Draw:
     chance = random.Random(seed)
     faulty = chance.random() < FAULTY
     usual = [one for one in ranges() if not one.fault and _own(seed, one).random() < one.chance]
-    faults = [one for one in ranges() if one.fault]
+    faults = [one for one in ranges() if one.fault and not one.beside]
     faults = chance.sample(faults, chance.randint(1, MOST_FAULTS)) if faulty else []
+    names = {one.name for one in faults}
+    faults += [
+        one
+        for one in ranges()
+        if not names.isdisjoint(one.beside) and _own(seed, one).random() < one.chance
+    ]
     return Draw(seed, {one.name: one.draw(_own(seed, one, "value")) for one in (*usual, *faults)})
 
 

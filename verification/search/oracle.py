@@ -13,11 +13,11 @@ from common.freshness import NS_PER_S
 from common.wire import framing
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
 from common.wire.framing import Received
-from common.wire.reports import FROM_BOARD
+from common.wire.reports import FROM_BOARD, BumperReport
 from sim import requests as q
 from sim import trace as t
 from t2 import messages as m
-from verification.search.bridge_book import BridgeBook
+from verification.search.bridge_book import BridgeBook, PressBook
 from verification.search.bus import MS, Envelope, Process
 from verification.search.condition_books import BRAKING_RADPS2, StandstillBook
 from verification.search.safety_book import FAST_S, SafetyBook
@@ -62,6 +62,7 @@ class Oracle:
     recess: float = 0.0  # m that each sonar is deep in the hull
     turn_braking: float = BRAKING_RADPS2  # rad/s^2, of the settings
     estop_session_up: bool = True
+    press: PressBook = field(default_factory=PressBook)
     _records: dict[tuple[int, int], Record] = field(default_factory=dict)
     _links: dict[tuple[int, int], frozenset[Trip]] = field(default_factory=dict)
     _moved_ns: int | None = None  # when the board last took a RUN that moves
@@ -139,7 +140,11 @@ class Oracle:
         """Record a datagram of the board, on this port, before the bridge handles it."""
         bridge_book = self.bridge_books[process.boot]
         for part in framing.read(datagram, FROM_BOARD):
-            if isinstance(part, Received) and bridge_book.on_report(part.frame, port, self.now_ns):
+            if not isinstance(part, Received):
+                continue
+            if part.frame == BumperReport(True):
+                self.press.noticed = True
+            if bridge_book.on_report(part.frame, port, self.now_ns):
                 self.trip("contact", process.boot, (process.boot, bridge_book.published + 1))
 
     def on_router(self, up: bool) -> None:
@@ -182,6 +187,8 @@ class Oracle:
 
     def on_end(self, process: Process) -> None:
         """Close the book of a process; trips known only to it are dropped."""
+        if process.name == "bridge":
+            self.press.on_frame(moves=False)  # the guard brakes
         self.safety_books.pop(process.boot, None)
         self.bridge_books.pop(process.boot, None)
         for trip in self.trips:
@@ -250,7 +257,9 @@ class Oracle:
             if bridge_book.may_only_brake(self.now_ns) and not brakes:
                 self.violations.append("a new bridge replaced the guard's BRAKE")
             bridge_book.brake_due, bridge_book.braked = False, brakes
-            if frame.kind is MotionKind.RUN and (frame.linear_mmps or frame.angular_raw):
+            drives = frame.kind is MotionKind.RUN and bool(frame.linear_mmps or frame.angular_raw)
+            self.press.on_frame(drives)
+            if drives:
                 complaints = self._of_frame(bridge_book, process.taking, frame)
                 self.violations += [f"{frame.linear_mmps} mm/s: {one}" for one in complaints]
 
@@ -286,6 +295,11 @@ class Oracle:
                 self.comeback_ns = self.now_ns if on else self.comeback_ns
             case t.Disturbed(request=q.Freeze(seconds=s) | q.PowerCycle(seconds=s)):
                 self._deaf_until_ns = self.now_ns + round(s * NS_PER_S)
+
+    def on_contact(self, closed: bool) -> None:
+        """Check that no press of the bumper is missed."""
+        if self.press.look(closed, self.now_ns):
+            self.violations.append("a press of 60 ms was missed")
 
     def on_step(self, trace: Iterable[t.Line]) -> None:
         """Check the command that the board holds (invariant 2) after these lines of its trace."""

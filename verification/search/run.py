@@ -26,6 +26,7 @@ from verification.search.stack import START_NS, Stack
 STEP_NS = 10 * MS
 ACT_MS = 50
 LONGEST_S = 90.0
+TAP_MS, TAPS, TAPS_S = 60, 6, 2.7  # the shortest press that counts, after the bounce
 TAIL_MS = 1200  # after the script: everything must stand
 
 
@@ -103,6 +104,7 @@ class Trial:
         self.stack.sources["teleop"] = self.operator
         self.judge = Judge(START_NS)
         self.contacts = 0
+        self.bounce_ms = math.ceil(model.bumper.bounce * 1000)
         self._origin = self.stack.vehicle.simulation.pose
         self._odometry: m.Odometry | None = None
         self._faults = sorted(
@@ -165,6 +167,10 @@ def _mute(report: q.ReportName, seconds: float) -> tuple[tuple[float, Step], ...
     return (0.0, _inject(q.Mute(reports=(report,)))), (seconds, _inject(q.Mute()))
 
 
+def _tap(trial: Trial) -> None:
+    trial.stack.tap(TAP_MS + trial.bounce_ms)
+
+
 def _silence(trial: Trial) -> None:
     trial.operator.muted_until_ns = trial.stack.net.now_ns + NS_PER_S
 
@@ -200,6 +206,7 @@ FAULTS: dict[str, tuple[tuple[float, Step], ...]] = {
         (0.0, _inject(q.Bumper(pressed=True))),
         (0.1, _inject(q.Bumper(pressed=False))),
     ),
+    "fault.bumper_tapped": tuple((number * TAPS_S, _tap) for number in range(TAPS)),
     "fault.bumper_muted": _mute("bumper", 0.5),
     "fault.velocity_muted": _mute("velocity", 0.5),
     "fault.ultrasonic_muted": _mute("ultrasonic", 0.8),

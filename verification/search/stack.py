@@ -19,6 +19,7 @@ from services.odom.odometer import Odometer
 from services.ros2.command import SOURCE
 from services.safety.config import LimitSource, Safety, SafetyConfig
 from services.safety.service import SafetyService
+from sim import requests as q
 from sim import trace as t
 from sim.model import Model
 from sim.requests import Asked
@@ -145,13 +146,16 @@ class Stack:
             self.oracle.recess = FRONT - front.x
         # Lost and late datagrams may take the STOP that would have been in time.
         for line in (model.cable.to_board, model.cable.to_pc):
-            self.oracle.slack_ns += round((line.delay + line.jitter) * 1e9)
+            late_ns = round((line.delay + line.jitter) * 1e9)
+            self.oracle.slack_ns += late_ns
+            self.oracle.press.slack_ns += late_ns
             self.oracle.slack_ns += 150 * MS if line.drop or line.corrupt else 0
         self.vehicle = Vehicle(self.net, model, plan, seed)
         self._step_ns = step_ns
         self._body = model.vehicle
         self._boots = 1000
         self._brake_ns = 0  # when the guard brakes next
+        self._free_ns: int | None = None  # when a tap of the bumper ends
         self._starts: dict[str, int] = {}
         self.processes = {name: self._start(name) for name in CONFIGS}
         self.sources = {
@@ -186,7 +190,11 @@ class Stack:
             if due_ns <= self.net.now_ns:
                 self.processes[name] = self._start(name)
                 del self._starts[name]
+        if self._free_ns is not None and self._free_ns < self.net.now_ns:
+            self._free_ns = None
+            self.vehicle.inject(q.Bumper(pressed=False))
         self.vehicle.turn()
+        self.oracle.on_contact(self.vehicle.simulation.board.pressed)
         self._guard()
         self.net.turn()
         for process in self.processes.values():
@@ -250,6 +258,8 @@ class Stack:
         self.processes[name].stall(duration_ms)
         if name == "bridge":
             self.oracle.slack_ns = max(self.oracle.slack_ns, duration_ms * MS)
+            press = self.oracle.press
+            press.slack_ns = max(press.slack_ns, duration_ms * MS)
 
     def router(self, up: bool) -> None:
         """Take the router away, or bring it back."""
@@ -262,6 +272,11 @@ class Stack:
     def estop(self) -> None:
         """Press the emergency stop."""
         self.hand.post(keys.estop_key(ROBOT), m.Message())
+
+    def tap(self, duration_ms: int) -> None:
+        """Press the bumper for this time."""
+        self.vehicle.inject(q.Bumper(pressed=True))
+        self._free_ns = self.net.now_ns + duration_ms * MS
 
     def _look(self, arrival: Any) -> None:
         self.seen = arrival.message
