@@ -26,7 +26,7 @@ Part = Literal["", "router", "safety", "bridge", "relay", "board"]
 # Causes of safety that it has without a bridge, and others that follow from a missing bridge, relay
 # or board. One that latches, or that brakes a moving vehicle, is not among them.
 WITHOUT_BRIDGE: tuple[CauseName, ...] = ("starting", "bumper", "silent", "link")
-FROM_LINK: tuple[CauseName, ...] = (*WITHOUT_BRIDGE, "bumper_lossy", "sonar", "switches", "unarmed")
+FROM_LINK: tuple[CauseName, ...] = (*WITHOUT_BRIDGE, "sonar", "switches", "unarmed")
 
 
 class RootCause(Struct, frozen=True):

@@ -19,7 +19,7 @@ STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOME
 # Safety's causes that follow from a stream that is not sent.
 ANY_STREAM = ("starting", "silent")
 FROM_STREAM = {
-    keys.BUMPER.path: (*ANY_STREAM, "bumper", "bumper_lossy"),
+    keys.BUMPER.path: (*ANY_STREAM, "bumper"),
     keys.ULTRASONIC.path: (*ANY_STREAM, "sonar"),
 }
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle

@@ -193,13 +193,6 @@ CAUSES: dict[CauseName, Entry] = {
     ),
     "no_request": Entry(("No source requests motion.", "没有行驶请求。"), NOTHING),
     "release": Entry(("Creeping off the bumper.", "正在缓慢脱离碰撞。"), NOTHING),
-    "bumper_lossy": Entry(
-        ("Creeping: bumper polls were lost.", "防撞条查询有丢失，只能低速行驶。"),
-        (
-            "check the cable and the board's load: t2 echo tel/bridge/bumper",
-            "请检查线缆和主控板负载：t2 echo tel/bridge/bumper",
-        ),
-    ),
     "limit": Entry(("Slowed by a limit source.", "被限速源限速。"), WHO_LIMITS),
     "obstacle": Entry(
         ("Slowed by an obstacle.", "因障碍物减速。"),
@@ -255,13 +248,6 @@ PHRASES: dict[str, Words] = {
     "link.never": ("No frame came from the board yet.", "尚未收到主控板的数据帧。"),
     "bumper.restarted": ("The bridge has restarted.", "桥接服务已重启。"),
     "bumper.samples": ("Samples of the bumper were lost.", "防撞条的采样有丢失。"),
-    "bumper.polls": (
-        "{polls} bumper polls of 0.2 s were lost.", "最近 0.2 s 内丢失了 {polls} 次防撞条查询。",
-    ),
-    "bumper_lossy.polls": (
-        "Creeping: {polls} bumper polls of 0.2 s were lost.",
-        "低速行驶：最近 0.2 s 内丢失了 {polls} 次防撞条查询。",
-    ),
     "two_publishers.of": ("Two publishers use {sources}.", "{sources} 有两个发布者。"),
     "limit_stop.by": ("Stopped by {sources}.", "{sources} 要求停车。"),
     "limit_silent.of": ("No speed limit arrives of {sources}.", "收不到 {sources} 的限速消息。"),

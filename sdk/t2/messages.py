@@ -43,8 +43,8 @@ if TYPE_CHECKING:
         "contact", "estop", "estop_reader", "estop_keepalive", "predecessor", "runaway",
         "uncommanded_motion", "not_stopping", "driver_left", "driver_right", "flapping", "leaving",
         "starting", "link", "switches", "bumper", "silent", "unarmed", "limit_stop",
-        "limit_silent", "two_publishers", "neutral", "blocked", "no_request", "release",
-        "bumper_lossy", "limit", "obstacle", "sonar",
+        "limit_silent", "two_publishers", "neutral", "blocked", "no_request", "release", "limit",
+        "obstacle", "sonar",
     ]  # fmt: skip
 else:
     CauseName = Name  # the client library knows the names, for type checkers
@@ -139,7 +139,6 @@ class Bumper(Message, frozen=True, kw_only=True):
     """The bumper strip, one bit for the whole vehicle (manual 2.4)."""
 
     pressed: bool
-    lost: int = 0  # bumper polls of the last 0.2 s that the board did not answer
 
 
 class Driver(Message, frozen=True, kw_only=True):

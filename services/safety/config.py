@@ -57,7 +57,7 @@ def _sources() -> dict[str, Source]:
 class TimeLimits(Struct, frozen=True, kw_only=True):
     """Time limits in seconds: an older sample or request stops the vehicle."""
 
-    bumper_age: float = 0.15  # 7 polls
+    bumper_age: float = 0.07  # 3 polls: a press of 60 ms is in one of them
     ultrasonic_age: float = 0.3  # 6 polls
     velocity_age: float = 0.2  # 10 reports
     link_age: float = 0.6  # 3 messages
@@ -86,7 +86,7 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     margin: Annotated[float, allowed("m", ge=0.0, le=2.0, safe=(0.05, 2.0))] = 0.20
     # from reading to slowing down
     react: Annotated[float, allowed("s", ge=0.0, le=2.0, safe=(0.1, 2.0))] = 0.25
-    # while a sonar or the bumper is doubtful
+    # while a sonar is doubtful
     creep_speed: Annotated[float, allowed("m/s", gt=0.0, le=10.0, safe=(0.0, 0.25))] = 0.15
     release_speed: Annotated[float, allowed("m/s", gt=0.0, le=10.0, safe=(0.0, 0.15))] = 0.1
     # in total until a reset

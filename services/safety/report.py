@@ -256,7 +256,7 @@ def _limits(policy: Policy, state: State, now_ns: int) -> Limits:
     distances = planner.cautious(state, state.verdict.source)
 
     def most(asked: Twist) -> Twist:
-        twist = planner.limited(asked, state.latches)
+        twist = planner.limited(asked)
         twist, _ = state.speed_limits.limited(twist, now_ns)
         return twist.scaled(planner.zones.limit(twist, distances).factor)
 

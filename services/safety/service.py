@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from common import clock
 from common.bus.bus import Arrival, Bus, Caller
-from common.freshness import NS_PER_S, Latest
+from common.freshness import NS_PER_S, Latest, fresh
 from common.heartbeat import Heartbeat
 from common.motion import BRAKE, RUN, STOP
 from common.service import Node
@@ -145,6 +145,9 @@ class SafetyService:
 
     def _on_bumper(self, arrival: Arrival[Bumper]) -> None:
         bumper, before = arrival.message, self._inputs.bumper
+        age_s = self._node.config.safety.times.bumper_age
+        if before is not None and not fresh(before, arrival.received_ns, age_s):
+            self._decide()  # no decision may have fallen into the gap that this sample ends
         self._inputs = replace(self._inputs, bumper=Latest(bumper, arrival.received_ns))
         self._hit_due |= bumper.pressed and (before is None or not before.value.pressed)
         # Most samples repeat that the bumper is free, and change no verdict. But a decision counts
@@ -253,8 +256,8 @@ class SafetyService:
         return measured is None or measured.value.is_standing
 
 
-def _content(bumper: Bumper) -> tuple[bool, int, int]:
-    return bumper.pressed, bumper.lost, bumper.boot
+def _content(bumper: Bumper) -> tuple[bool, int]:
+    return bumper.pressed, bumper.boot
 
 
 def source_of(key: str) -> str:

@@ -93,7 +93,6 @@ LABELS: dict[str, Words] = {
     "cause.blocked": ("blocked", "空间不足"),
     "cause.no_request": ("no_request", "无行驶请求"),
     "cause.release": ("release", "脱离碰撞"),
-    "cause.bumper_lossy": ("bumper_lossy", "防撞条查询丢失"),
     "cause.limit": ("limit", "限速"),
     "cause.obstacle": ("obstacle", "障碍物"),
     "cause.sonar": ("sonar", "超声波不可信"),

@@ -24,7 +24,7 @@ FOLDED = ("bumper", "silent")
         (False, None, None, "router", ()),
         (True, None, link(state="lost"), "safety", ()),
         (True, LACKING, None, "bridge", FOLDED),
-        (True, state("sonar", "bumper_lossy"), None, "", ()),  # the vehicle drives
+        (True, state("sonar", "obstacle"), None, "", ()),  # the vehicle drives
         (True, state("no_request"), None, "", ()),  # lost on the way to this screen only
         (True, LACKING, link(state="lost", relay=RELAY), "relay", FOLDED),
         (True, LACKING, link(state="never"), "board", FOLDED),

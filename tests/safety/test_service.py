@@ -313,7 +313,7 @@ def test_a_new_hit_under_a_brake_is_acknowledged_at_once(
         [(True, 1), (True, 0), (False, 0), (True, 1), (True, 0)], 1
     ):
         before = len(sent)
-        bumper = Bumper(pressed=pressed, lost=0, seq=seq, boot=5)
+        bumper = Bumper(pressed=pressed, seq=seq, boot=5)
         service._on_bumper(Arrival(bumper, "", clock.now_ns(), None))
         assert [motion.judged for motion in sent[before:]] == [seq] * leave
         service._on_tick(0)  # takes the turn back
@@ -323,7 +323,7 @@ def test_a_contact_that_chatters_neither_adds_motions_nor_silences_safety(
     service: SafetyService, sent: list[Motion]
 ) -> None:
     for seq in range(1, 65):  # the queue after a stall
-        bumper = Bumper(pressed=bool(seq % 2), lost=0, seq=seq, boot=5)
+        bumper = Bumper(pressed=bool(seq % 2), seq=seq, boot=5)
         service._on_bumper(Arrival(bumper, "", clock.now_ns(), None))
     assert len(sent) == 1
     for _ in range(2):
@@ -334,13 +334,28 @@ def test_a_contact_that_chatters_neither_adds_motions_nor_silences_safety(
 def test_bumper_samples_without_news_are_decided_on_in_time_and_not_one_by_one(
     service: SafetyService,
 ) -> None:
-    def decisions(seq: int, *, pressed: bool = False, lost: int = 0) -> int:
+    def decisions(seq: int, *, pressed: bool = False, boot: int = 5) -> int:
         before = service._state.decision
-        bumper = Bumper(pressed=pressed, lost=lost, seq=seq, boot=5)
+        bumper = Bumper(pressed=pressed, seq=seq, boot=boot)
         service._on_bumper(Arrival(bumper, "", clock.now_ns(), None))
-        assert "bumper" not in service._state.latches  # no sample seems lost
         return service._state.decision - before
 
     assert [decisions(seq) for seq in range(1, 9)] == [1, 0, 0, 1, 0, 0, 1, 0]
     assert [decisions(9, pressed=True), decisions(10, pressed=True)] == [1, 1]
-    assert [decisions(11), decisions(12), decisions(13, lost=1)] == [1, 0, 1]
+    assert [decisions(11), decisions(12)] == [1, 0]
+    assert "bumper" not in service._state.latches  # no sample seems lost
+    assert decisions(13, boot=6) == 1
+
+
+@pytest.mark.parametrize(("gap_ns", "stops"), [(70_000_000, False), (70_000_001, True)])
+def test_a_gap_between_bumper_samples_stops_without_a_decision_in_it(
+    service: SafetyService, gap_ns: int, stops: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A press of 60 ms may hide in it."""
+    now_ns = clock.now_ns()
+    monkeypatch.setattr(clock, "now_ns", lambda: now_ns)
+    for seq in (1, 2):
+        arrival = Arrival(Bumper(pressed=False, seq=seq, boot=5), "", now_ns, None)
+        service._on_bumper(arrival)
+        now_ns += gap_ns
+    assert ("bumper" in service._state.latches) is stops

@@ -139,7 +139,7 @@ def test_the_safety_panel_shows_all_its_rows_and_hides_no_other(
     screen: Screen, size: tuple[int, int], alarm: Phrases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(type(screen.controller), "_alarm", lambda *_: alarm)
-    still = "The bumper was hit. Bumper polls were lost: move off first, then reset it here."
+    still = "The bumper was hit. The vehicle must stand: move off first, then reset it here."
 
     async def act(pilot: Pilot[None]) -> None:
         screen.node.fake.deliver(keys.SAFETY, contact_state(text=still), screen.now_ns)

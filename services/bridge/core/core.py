@@ -196,8 +196,7 @@ class Core:
             self._bumper_seq += 1
             # A short hit stays in the samples until safety has acknowledged one: some may be lost.
             pressed = self._bumper.pressed or self.motions.lease.hit is not None
-            lost = self._polling.lost("bumper", now_ns)
-            yield Publish("bumper", m.Bumper(pressed=pressed, lost=lost), raw)
+            yield Publish("bumper", m.Bumper(pressed=pressed), raw)
         if hit:
             yield Event("contact", "error")
 
@@ -264,8 +263,6 @@ class Core:
         """Update the rates and counters of the last second; publish the brakes."""
         self._rates = {name: float(count) for name, count in sorted(self._frames.items())}
         self._frames.clear()
-        for name, count in self._polling.missed().items():
-            self._counters[f"missed_{name}"] = count
         yield Publish("switches", self.readiness.message())
 
     # --- the link message ----------------------------------------------------------------

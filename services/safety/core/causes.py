@@ -86,7 +86,6 @@ RULES = (
     Rule("blocked", "stop", Clears.AT_ONCE),
     Rule("no_request", "stop", Clears.AT_ONCE),
     Rule("release", "slow", Clears.AT_ONCE),
-    Rule("bumper_lossy", "slow", Clears.AT_ONCE),
     Rule("limit", "slow", Clears.AT_ONCE),
     Rule("obstacle", "slow", Clears.AT_ONCE),
     Rule("sonar", "slow", Clears.AT_ONCE),

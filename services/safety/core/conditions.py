@@ -16,9 +16,6 @@ T = TypeVar("T")
 # The bridge ends a hit after three clear samples, so a hit is at least three samples long. Fewer
 # lost samples cannot hide it.
 LOST_SAMPLES = 3  # between two decisions, at most
-# Of the polls of the last 0.2 s, ten at the full rate: this many lost ones can hide a hit of 60 ms.
-LOST_POLLS = 3
-FEW_POLLS = 1  # hysteresis: the cause clears at this number
 # A shorter stall loses no emergency stop: it waits in the session, or the session is opened again.
 STALL_S = 1.0
 
@@ -38,7 +35,6 @@ def observe_inputs(
     yield from _link(inputs)
     yield _switches(inputs, settings)
     yield _bumper(inputs, settings, judged, now_ns)
-    yield _bumper_lossy(inputs, "bumper_lossy" in state.latches)
     yield _silent(inputs, settings, state, now_ns)
     yield from _motion(state.motion, now_ns)
     yield from state.speed_limits.observations(now_ns)
@@ -137,21 +133,10 @@ def _bumper(
     if not fresh(inputs.bumper, now_ns, settings.times.bumper_age):
         return Observation("bumper", True)
     boot, seq = inputs.bumper.value.boot, inputs.bumper.value.seq
-    polls = inputs.bumper.value.lost
-    if polls > LOST_POLLS:
-        return Observation("bumper", True, phrases=(Phrase("bumper.polls", {"polls": polls}),))
     if judged is not None and boot != judged[0]:
         return Observation("bumper", True, phrases=(Phrase("bumper.restarted"),))
     lost = judged is not None and seq - judged[1] > LOST_SAMPLES
     return Observation("bumper", lost, phrases=(Phrase("bumper.samples"),))
-
-
-def _bumper_lossy(inputs: Inputs, held: bool) -> Observation:
-    # 1 equivalent mutant: a single lost poll is not lossy either.
-    polls = inputs.bumper.value.lost if inputs.bumper else 0
-    lossy = polls >= LOST_POLLS or (held and polls > FEW_POLLS)
-    phrases = (Phrase("bumper_lossy.polls", {"polls": polls}),)
-    return Observation("bumper_lossy", lossy, phrases=phrases)
 
 
 def _silent(inputs: Inputs, settings: SafetyConfig, state: State, now_ns: int) -> Observation:

@@ -18,8 +18,8 @@ from msgspec import Struct
 
 from common.motion import RUN, STILL, Twist, clamp
 from services.safety.config import SafetyConfig
-from services.safety.core.causes import BARRING, Latches, Observation
-from services.safety.core.release import stopping_distance, sweep
+from services.safety.core.causes import BARRING, Observation
+from services.safety.core.release import stopping_distance
 from services.safety.core.sonars import Axis, axes
 from services.safety.core.state import State
 from t2.messages import CauseName
@@ -144,16 +144,12 @@ class Planner:
         if is_release:
             twist = state.release.away(self._settings.release_speed)
         else:
-            twist = self.limited(state.arbiter.channels[source].requested, state.latches)
+            twist = self.limited(state.arbiter.channels[source].requested)
         return RequestedTwist(source, *state.speed_limits.limited(twist, now_ns), is_release)
 
-    def limited(self, asked: Twist, held: Latches) -> Twist:
-        """Return the twist within the limits; at creep speed while bumper polls are lost."""
-        twist = asked.within(self._vehicle.max_linear, self._vehicle.max_angular)
-        if "bumper_lossy" not in held:
-            return twist
-        fastest = sweep(twist, self.reach)
-        return twist.scaled(min(1.0, self._settings.creep_speed / fastest)) if fastest else twist
+    def limited(self, asked: Twist) -> Twist:
+        """Return the twist within the vehicle's limits."""
+        return asked.within(self._vehicle.max_linear, self._vehicle.max_angular)
 
     def cautious(self, state: State, source: str | None) -> tuple[float, ...]:
         """Return the distances that a source plans with."""

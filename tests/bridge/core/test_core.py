@@ -566,13 +566,3 @@ def test_one_call_of_each_is_pending(bench: Bench, call: Call, what: str) -> Non
     call(bench, first)
     call(bench, second)
     assert (first.refusals, second.refusals) == ([], [f"Another call for the {what} is pending."])
-
-
-def test_lost_polls_are_counted_each_second(bench: Bench) -> None:
-    bench.arm()
-    for _ in range(100):
-        bench.tick()
-    bench.carried_out(bench.core.second())
-    assert bench.counters["missed_bumper"] > 0
-    bench.receive(HIT)
-    assert published(bench.outputs, "bumper")[-1].lost > 5

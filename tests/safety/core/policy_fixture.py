@@ -76,7 +76,7 @@ class PolicyFixture:
         self.driver_boot, self.driver_seq = 99, 0
         self.keepalive_seq = 0
         self.limit_boot, self.limit_seq = 55, 0
-        self.pressed, self.lost = False, 0
+        self.pressed = False
         self.ranges, self.status = FREE, NO_ECHO
         self.linear: float | None = None  # measured; None follows the command
         self.angular: float | None = None
@@ -117,7 +117,7 @@ class PolicyFixture:
             "velocity": Velocity(linear=linear, angular=angular),
             "mileage": Mileage(distance=self.distance, heading=self.heading, epoch=0),
             "ultrasonic": Ultrasonic(ranges=self.ranges, status=self.status),
-            "bumper": Bumper(pressed=self.pressed, lost=self.lost),
+            "bumper": Bumper(pressed=self.pressed),
             "left": Driver(faults=(), bits=self.left_bits),
             "right": Driver(faults=(), bits=self.right_bits),
             "switches": self.switches,

@@ -47,7 +47,6 @@ TABLE: list[tuple[str, Action, Clears]] = [
     ("blocked", "stop", AT_ONCE),
     ("no_request", "stop", AT_ONCE),
     ("release", "slow", AT_ONCE),
-    ("bumper_lossy", "slow", AT_ONCE),
     ("limit", "slow", AT_ONCE),
     ("obstacle", "slow", AT_ONCE),
     ("sonar", "slow", AT_ONCE),

@@ -10,7 +10,6 @@ from msgspec.structs import replace
 from common.motion import RUN, STILL, Twist
 from common.settings import Vehicle, sonar_mounts
 from services.safety.config import Safety, SafetyConfig
-from services.safety.core.causes import Held
 from services.safety.core.planning import (
     GRAZING,
     Planner,
@@ -276,12 +275,3 @@ def test_a_turn_slows_down_at_its_own_deceleration() -> None:
     state = under_way(Twist(0.0, 0.5), only("front", math.inf))
     plan = planner().plan(state, STILL, RequestedTwist("teleop", STILL), 0.1)
     assert (plan.twist.linear, plan.twist.angular) == pytest.approx((0.0, 0.4))
-
-
-@pytest.mark.parametrize(
-    ("asked", "given"), [(0.5, 0.15), (0.15, 0.15), (0.05, 0.05), (0.0, 0.0), (-0.5, -0.15)]
-)
-def test_lost_bumper_polls_limit_a_twist_to_the_creep_speed(asked: float, given: float) -> None:
-    limited = planner().limited(Twist(asked), {"bumper_lossy": Held(0, 0, 0, (0, 0), ())})
-    assert (limited.linear, limited.angular) == pytest.approx((given, 0.0))
-    assert planner().limited(Twist(asked), {}) == Twist(asked)
