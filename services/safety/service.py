@@ -145,7 +145,7 @@ class SafetyService:
 
     def _on_bumper(self, arrival: Arrival[Bumper]) -> None:
         bumper, before = arrival.message, self._inputs.bumper
-        age_s = self._node.config.safety.times.bumper_age
+        age_s = self._node.config.times.bumper_age
         if before is not None and not fresh(before, arrival.received_ns, age_s):
             self._decide()  # no decision may have fallen into the gap that this sample ends
         self._inputs = replace(self._inputs, bumper=Latest(bumper, arrival.received_ns))

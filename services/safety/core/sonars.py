@@ -6,19 +6,18 @@ or too near to measure counts as distance zero, so the same rule accepts a sonar
 good samples. ``no_echo`` is free space, at infinity.
 
 **Suspicion.** A reading that is constant to the millimetre is not a fault by itself: a wall
-alongside, or a surface beyond the sensor's range, gives the same. It contradicts odometry when the
-vehicle moved along the sonar's axis or turned, and nothing else explains it:
+alongside gives the same. It contradicts odometry when the vehicle moved along the sonar's axis or
+turned, and nothing else explains it:
 
 - from the start, the reading is reduced by the distance that the vehicle came nearer
 - after half a metre along the axis, or half a radian of turning, the sonar is *suspect*
 - three consecutive samples with another reading end the suspicion
 
 Suspicion never blocks. It limits the speed toward the sonar's sector (``Sonar.cautious``). A
-constant reading is plausible when one of these explains it:
-
-- It is the greatest range of the sensors, which another sonar gives as well (``Saturation``).
-- A wall runs alongside: a corner sonar keeps its reading while the flank sonar on its side sees a
-  surface at the matching distance.
+constant reading is plausible while a wall runs alongside: a corner sonar keeps its reading while
+the flank sonar on its side sees a surface at the matching distance. Sensors that report their
+greatest range need it as ``vehicle.sonar_max``: from there on a reading is ``no_echo``. Below that
+they seem constant, and the vehicle creeps.
 
 The sonars on the flanks look across the driving direction, so driving straight predicts no change.
 A measured velocity below the standstill threshold is noise or bias and does not add up to motion.
@@ -48,7 +47,6 @@ STUCK_TRAVEL_M = 0.5
 SAME_M = 0.0015  # the board counts millimetres
 STUCK_TURN = 0.5  # rad; a flat surface does not keep its distance over such a turn
 LONGEST_STEP_S = 0.3  # between two samples; over longer gaps the motion is unknown
-SHARED_SAMPLES = 20  # a second
 SHOWN_NS = NS_PER_S  # time for an operator to read the fault
 FLANK_OF = {
     "front_left": "left",
@@ -122,7 +120,6 @@ class Moved(Struct, frozen=True):
 
     along: float = 0.0  # m along the axis, toward the sector
     turn: float = 0.0  # rad
-    beyond: bool = False  # whether the reading is the sensor's greatest range
     alongside: bool = False  # whether a surface alongside explains it
 
 
@@ -167,8 +164,6 @@ def _watch(sonar: Sonar, distance: float, moved: Moved) -> Sonar:
         if sonar.suspect and changed < CHANGED_SAMPLES:
             return replace(sonar, changed=changed)
         return _begin(sonar, distance)
-    if moved.beyond:
-        return _begin(sonar, sonar.same)
     # 1 equivalent mutant: only the magnitude counts.
     turned = sonar.turned + moved.turn
     nearer, travel = (0.0, 0.0) if moved.alongside else _span(sonar, moved.along)
@@ -189,41 +184,6 @@ def _span(sonar: Sonar, along: float) -> tuple[float, float]:
 
 
 SILENT = (Sonar(),) * len(SONAR_NAMES)
-
-
-class Saturation(Struct, frozen=True):
-    """The greatest range of the sensors, when they report one instead of "no echo".
-
-    What the real sensors report with nothing in range is unknown. A range counts as the greatest
-    one when two sonars share it to the millimetre for a second and none exceeds it. A single frozen
-    sonar cannot establish one. An echo of a real surface seldom does; then only that exact value
-    counts as explained.
-    """
-
-    reading: float | None = None  # m
-    candidate: float = 0.0  # m, shared by at least two sonars now
-    samples: int = 0  # in a row with that candidate
-
-    def updated(self, readings: Sequence[float]) -> "Saturation":
-        """Return the state after one sample of all sonars; infinity: no echo, 0: no reading."""
-        top = max(readings)
-        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
-        known = None if self.reading is not None and top > self.reading + SAME_M else self.reading
-        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
-        sharing = sum(top - one < SAME_M for one in readings)
-        if math.isinf(top) or sharing < 2:
-            return Saturation(known)
-        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
-        if abs(top - self.candidate) >= SAME_M:
-            return Saturation(known, top, 1)
-        samples = self.samples + 1
-        reached = samples >= SHARED_SAMPLES
-        return Saturation(self.candidate if reached else known, self.candidate, samples)
-
-    def explains(self, reading: float) -> bool:
-        """Return whether a reading is the greatest one."""
-        # 1 equivalent mutant: readings are whole millimetres, never at the limit.
-        return self.reading is not None and abs(reading - self.reading) < SAME_M
 
 
 class SonarOverrides(Struct, frozen=True):
@@ -256,7 +216,6 @@ class SonarArray(Struct, frozen=True):
     sonars: tuple[Sonar, ...] = SILENT
     token: Token | None = None
     at_ns: int = 0
-    saturation: Saturation = Saturation()
     unseen: frozenset[int] = frozenset()  # sonars without a reading while samples are fresh
 
     @property
@@ -290,7 +249,7 @@ class SonarFilter(Struct, frozen=True):
         """Return the array with the newest sample; each sample is processed once."""
         if latest is None or not fresh(latest, now_ns, self.age_s):
             # 1 equivalent mutant: a sample that is too old never becomes fresh again.
-            return SonarArray(SILENT, array.token, array.at_ns, array.saturation)
+            return SonarArray(SILENT, array.token, array.at_ns)
         sample = latest.value
         token = (sample.boot, sample.seq)
         if token == array.token:
@@ -299,7 +258,6 @@ class SonarFilter(Struct, frozen=True):
         step_s = min((latest.received_ns - array.at_ns) / NS_PER_S, LONGEST_STEP_S)
         # 3 equivalent mutants: both have a row for each sonar.
         readings, faults = zip(*map(trusted, sample.ranges, sample.status), strict=True)
-        saturation = array.saturation.updated(readings)
         rooms = [max(0.0, readings[n] - axis.recess) for n, axis in enumerate(self.axes)]
         sonars = tuple(
             updated(
@@ -309,14 +267,13 @@ class SonarFilter(Struct, frozen=True):
                 Moved(
                     along=self.axes[n].along(moved) * step_s,
                     turn=moved.angular * step_s,
-                    beyond=saturation.explains(readings[n]),
                     alongside=_is_alongside(n, rooms),
                 ),
             )
             for n, sonar in enumerate(array.sonars)
         )
         unseen = frozenset(n for n, sonar in enumerate(sonars) if sonar.fault in UNSEEN)
-        return SonarArray(sonars, token, latest.received_ns, saturation, unseen)
+        return SonarArray(sonars, token, latest.received_ns, unseen)
 
 
 def _is_alongside(sonar: int, rooms: Sequence[float]) -> bool:

@@ -73,11 +73,10 @@ def test_old_ranges_close_every_sector() -> None:
 
 
 def beside_a_wall() -> PolicyFixture:
-    """Return a fixture with exact readings, the front sonars at their greatest range."""
+    """Return a fixture with exact readings, and no echo in front."""
     fixture = PolicyFixture().ready()
     fixture.sonar(
-        left=0.57, front_left=0.8, rear_left=0.8, front=4.5, front_right=4.5, right=1.1,
-        rear=2.0, rear_right=1.3,
+        left=0.57, front_left=0.8, rear_left=0.8, right=1.1, rear=2.0, rear_right=1.3,
     )  # fmt: skip
     fixture.drive(seconds=1.5)
     return fixture
@@ -90,6 +89,14 @@ def test_exact_readings_beside_a_wall_let_the_vehicle_drive_on() -> None:
         assert fixture.verdict.twist.linear == pytest.approx(0.5)
     for linear, angular in ((-0.1, 0.0), (0.0, 0.1), (0.0, -0.1)):
         assert fixture.drive(linear, angular, seconds=1.0).command == "run"
+
+
+def test_sensors_with_another_greatest_range_than_the_setting_creep_and_are_not_blocked() -> None:
+    fixture = PolicyFixture().ready()
+    fixture.sonar(**dict.fromkeys(SONAR_NAMES, 3.0))
+    assert fixture.drive(0.5, seconds=4.0).twist.linear == pytest.approx(0.15)
+    assert "sonar" in fixture.state.latches
+    assert fixture.drive(-0.5, seconds=4.0).command == "run"
 
 
 @pytest.mark.parametrize("frozen_m", [2.0, 1.2])

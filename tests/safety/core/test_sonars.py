@@ -10,10 +10,8 @@ from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
 from common.settings import Place, Vehicle
 from services.safety.core.sonars import (
-    SHARED_SAMPLES,
     SHOWN_NS,
     Moved,
-    Saturation,
     Sonar,
     SonarArray,
     SonarFilter,
@@ -76,7 +74,7 @@ def test_farther_counts_after_three_by_5_cm(readings: tuple[float, ...], distanc
 def test_what_cannot_be_trusted_is_no_distance(
     reading: float | None, status: RangeStatus, fault: str
 ) -> None:
-    assert trusted(reading, status) == (0.0, fault)  # 0 is no reading for the saturation either
+    assert trusted(reading, status) == (0.0, fault)
     bad = read(GOOD, reading, status, STILL)
     assert (bad.distance, bad.fault) == (0.0, fault)
     recovering = feed(bad, 1.0, 1.0)
@@ -142,15 +140,12 @@ def test_half_a_metre_is_enough() -> None:
     assert feed(feed(GOOD, 2.0, 2.0), 2.0, 2.0, moved=along(0.25)).suspect
 
 
-def test_what_explains_a_constant_reading() -> None:
+def test_a_wall_alongside_explains_a_constant_reading() -> None:
     sonar = feed(GOOD, 2.0, 2.0, 2.0)
-    far = feed(sonar, *[2.0] * 9, moved=Moved(along=0.2, turn=0.2, beyond=True))
-    assert (far.suspect, far.cautious(ROOM_M)) == (False, 2.0)
     wall = feed(sonar, *[2.0] * 9, moved=Moved(along=0.2, alongside=True))
     assert (wall.suspect, wall.cautious(ROOM_M)) == (False, 2.0)
     suspect = feed(sonar, *[2.0] * 3, moved=along(0.2))
     assert suspect.suspect
-    assert not feed(suspect, 2.0, moved=Moved(beyond=True)).suspect
     assert not feed(suspect, 2.0, moved=Moved(alongside=True)).suspect
 
 
@@ -279,57 +274,9 @@ def test_a_parked_vehicle_makes_no_sonar_suspect() -> None:
     assert doubts(drive(20 * 60, Twist(-0.019, 0.049), front=1.0, left=0.8)) == ""
 
 
-# --- greatest range of the sensors ------------------------------------------------------------
-
-SHARED = (3.0, 0.5, 3.001, 0.0)
-
-
-def after(saturation: Saturation, *samples: tuple[float, ...], times: int = 1) -> Saturation:
-    for _ in range(times):
-        for sample in samples:
-            saturation = saturation.updated(sample)
-    return saturation
-
-
-def known() -> Saturation:
-    return after(Saturation(), SHARED, times=SHARED_SAMPLES)
-
-
-def test_it_takes_a_second_of_sharing() -> None:
-    assert after(Saturation(), SHARED, times=SHARED_SAMPLES - 1).reading is None
-    assert known().reading == 3.001
-    assert SHARED_SAMPLES == 20
-
-
-@pytest.mark.parametrize(
-    "other",
-    [(3.0, 0.5, 0.7, 0.0), (3.0, 0.5, 3.0, 4.0), (3.0, 3.0, 3.0, math.inf), (2.9, 2.9, 0.5, 0.5)],
-)
-def test_anything_else_begins_anew(other: tuple[float, ...]) -> None:
-    some = after(Saturation(), SHARED, times=SHARED_SAMPLES - 1)
-    assert after(some, other, SHARED).reading is None
-
-
-def test_it_explains_itself_and_nothing_else() -> None:
-    assert known().explains(3.0)
-    assert known().explains(3.002)
-    assert not known().explains(2.9995)
-    assert not known().explains(3.0026)
-    assert not Saturation().explains(3.0)
-
-
-def test_it_is_remembered_until_a_sonar_sees_farther() -> None:
-    assert after(known(), (1.0, 0.5, 0.7, 0.0), (2.0, 2.0, 0.0, 0.0)).reading == 3.001
-    assert after(known(), (3.002, 0.5, 0.7, 0.0)).reading == 3.001
-    assert after(known(), (3.1, 0.5, 0.7, 0.0)).reading is None
-    assert after(known(), (1.0, 0.5, math.inf, 0.0)).reading is None
-
-
-def test_each_sample_counts_once_and_a_silence_keeps_the_saturation() -> None:
-    array = SonarArray(saturation=known())
-    once = FILTER.update(array, sample(1, front=2.0), None, STEP_NS)
+def test_each_sample_counts_once() -> None:
+    once = FILTER.update(SonarArray(), sample(1, front=2.0), None, STEP_NS)
     assert FILTER.update(once, sample(1, front=2.0), None, STEP_NS) is once
-    assert FILTER.update(array, None, None, STEP_NS).saturation == known()
 
 
 # --- overrides of faulty sonars ---------------------------------------------------------------
