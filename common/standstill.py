@@ -110,7 +110,6 @@ def _steady(before: Twist, after: Twist) -> Twist:
 
 
 def _common(one: float, other: float) -> float:
-    # 1 equivalent mutant: the smaller of the two is zero then.
     return 0.0 if one * other <= 0 else min(one, other, key=abs)
 
 

@@ -105,20 +105,17 @@ class Frame(msgspec.Struct, frozen=True, gc=False):
         cls.OPENING = OPENING.pack(MAGIC, cls.SIZE, cls.ID)
 
     def __post_init__(self) -> None:
-        # 3 equivalent mutants: there is a row for each attribute.
         for name, field in zip(self.__struct_fields__, self.FIELDS, strict=True):
             field.check(name, getattr(self, name))
 
     def to_bytes(self) -> bytes:
         """Return the payload, without the header."""
-        # 3 equivalent mutants: there is a row for each attribute.
         values = zip(self.FIELDS, astuple(self), strict=True)
         return self.LAYOUT.pack(*[field.encode(value) for field, value in values])
 
     @classmethod
     def from_wire(cls, numbers: tuple[int, ...]) -> Self:
         """Decode the numbers of ``LAYOUT``; raise ``WireError`` for invalid ones."""
-        # 3 equivalent mutants: there is a row for each attribute.
         rows = zip(cls.FIELDS, cls.__struct_fields__, numbers, strict=True)
         return cls(*[field.decode(name, number) for field, name, number in rows])
 

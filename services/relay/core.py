@@ -51,11 +51,8 @@ class Relay:
         self._renewed_ns = now_ns - LEASE_NS
         self._braked_ns = now_ns - BRAKE_PERIOD_NS
         self._reported_ns = now_ns - REPORT_PERIOD_NS
-        # 1 equivalent mutant: None is as false as False.
         self._pressed = False
-        # 1 equivalent mutant: it is read only after a press, which sets it.
         self._sampled_ns = now_ns
-        # 1 equivalent mutant: a press sets the counts to zero.
         self._clear = [0] * ports  # samples in a row, by port: copies must not count twice
 
     def from_pc(self, datagram: bytes, port: int, received_ns: int, now_ns: int) -> list[Send]:

@@ -70,5 +70,4 @@ def bumper_samples(datagram: bytes) -> Iterator[bool]:
     for opening in SAMPLE_OPENING.finditer(datagram):
         answer = datagram[opening.start() :][:SAMPLE_SIZE]
         if answer in SAMPLES:
-            # 1 equivalent mutant: the high byte of the CRC of one byte is zero for zero only.
             yield answer[-1] != 0

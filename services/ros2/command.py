@@ -222,7 +222,6 @@ class Commands:
                 received_ns=now_ns,
                 moved_ns=self._since_ns,
                 moved_source_ns=self._since_ns - delivery_ns,
-                # 1 equivalent mutant: any gap counts.
                 sequence=about.sequence - 1 if about.sequence <= UNHEARD else 0,
             )
         self._known[about.gid] = known  # the last one of the dictionary

@@ -2,7 +2,8 @@
 
 The default is all cores; ``--changed`` selects those that differ from the fork point of the branch,
 and ``--tests`` prints the tests of all cores instead.
-Exit code 1 when a mutant survives that is not marked as equivalent, or a marked one was killed.
+Exit code 1 when a mutant survives that ``equivalent.toml`` does not name, when one that it names
+was killed, or when a row of it fits no line.
 """
 
 import os
@@ -11,6 +12,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+from verification.mutation.equivalent import TableError, check, table
 from verification.mutation.selection import changed, cores
 from verification.mutation.trial import TrialError, complaints, run
 
@@ -19,7 +21,7 @@ SCRATCH = Path("mutants")
 
 
 def main(words: list[str]) -> None:
-    """Choose files, test them, compare with the marks."""
+    """Choose files, test them, compare with the table."""
     os.chdir(ROOT)
     found = cores()
     if words == ["--tests"]:
@@ -28,6 +30,10 @@ def main(words: list[str]) -> None:
     if unknown := set(words) - {"--changed", *found}:
         sys.exit(f"mutants: no core: {', '.join(sorted(unknown))}")
     chosen = changed(found) if words == ["--changed"] else {f: found[f] for f in words or found}
+    try:
+        check(table(), ROOT)
+    except TableError as error:
+        sys.exit(f"mutants: {error}")
     files = sorted(chosen, key=lambda file: -Path(file).stat().st_size)  # largest first
     with ProcessPoolExecutor() as pool:
         wrong = list(pool.map(judge, files, [chosen[file] for file in files]))
@@ -41,7 +47,7 @@ def judge(file: str, tests: list[str]) -> int:
         count, surviving = run(file, tests, SCRATCH / file.removesuffix(".py").replace("/", "."))
     except (TrialError, subprocess.TimeoutExpired) as error:
         sys.exit(f"mutants: {file}: {error}")
-    wrong = complaints(Path(file).read_text("utf-8"), surviving)
+    wrong = complaints([row for row in table() if row.file == file], surviving)
     print(
         f"{file}: {count} mutants, {len(surviving)} not killed",
         *(f"\n{file}: {complaint}\n" for complaint in wrong), sep="\n" if wrong else "", flush=True,

@@ -1,27 +1,27 @@
 """Run mutmut on one file in a copy of the source, and judge the mutants that no test killed.
 
 A mutant counts as killed only when a test fails. Every other outcome, such as an endless loop, is a
-survivor. A survivor is allowed when it is equivalent to the original, and the line above the
-changed one gives the number of such mutants and the reason: ``# 1 equivalent mutant: ...``.
+survivor. A survivor is allowed when it is equivalent to the original: then a row of
+``equivalent.toml`` gives its line, the number of such mutants, and the reason.
 """
 
 import contextlib
-import re
 import shutil
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import get_diff_for_mutant
+from mutmut.utils.format_utils import orig_function_and_class_names_from_key
+
+from verification.mutation.equivalent import Row
 
 KILLED = 1  # pytest: a test failed
 OUTCOMES = {None: "not run", 0: "survived", 33: "untested", 36: "endless", -24: "endless"}
-MARK = re.compile(r" *# (\d+) equivalent mutants?: \S")
 COPIED = "cli", "common", "config", "services", "sim", "tests", "verification"
 LONGEST_S = 2 * 3600  # timeout of one file, also on a slow host
 SETTINGS = """\
@@ -59,6 +59,7 @@ class Survivor(NamedTuple):
     """A change of the source that no test detected."""
 
     outcome: str
+    function: str  # ``Class.method``
     diff: str
 
     @property
@@ -82,7 +83,11 @@ def run(file: str, tests: Sequence[str], where: Path) -> tuple[int, list[Survivo
         data.load()
         codes = data.exit_code_by_key
         return len(codes), [
-            Survivor(OUTCOMES.get(code, f"exit code {code}"), get_diff_for_mutant(name, path=file))
+            Survivor(
+                OUTCOMES.get(code, f"exit code {code}"),
+                function_of(name),
+                get_diff_for_mutant(name, path=file),
+            )
             for name, code in codes.items()
             if code != KILLED
         ]
@@ -100,23 +105,21 @@ def _mutmut() -> None:
         raise TrialError(f"{log}\nmutmut ended with exit code {ended.returncode}")
 
 
-def complaints(source: str, survivors: Sequence[Survivor]) -> list[str]:
-    """Return the lines whose survivors are not as many as their mark gives, with the diffs."""
-    allowed, found = marked(source), Counter(survivor.line for survivor in survivors)
+def function_of(mutant: str) -> str:
+    """Return the function that mutmut changed in this mutant."""
+    name, class_name = orig_function_and_class_names_from_key(mutant)
+    return f"{class_name}.{name}" if class_name else name
+
+
+def complaints(rows: Iterable[Row], survivors: Sequence[Survivor]) -> list[str]:
+    """Return the lines whose survivors are not as many as their row gives, with the diffs."""
+    allowed = Counter({(row.function, row.line): row.mutants for row in rows})
+    found = Counter((survivor.function, survivor.line) for survivor in survivors)
     return [
         "\n".join([
-            f"{found[line]} survivors, {allowed[line]} marked as equivalent: {line}",
-            *(f"{each.outcome}\n{each.diff}" for each in survivors if each.line == line),
+            f"{found[key]} survivors, {allowed[key]} equivalent in the table: {key[0]}: {key[1]}",
+            *(f"{one.outcome}\n{one.diff}" for one in survivors if (one.function, one.line) == key),
         ])
-        for line in dict.fromkeys([*found, *allowed])
-        if found[line] != allowed[line]
+        for key in dict.fromkeys([*found, *allowed])
+        if found[key] != allowed[key]
     ]  # fmt: skip
-
-
-def marked(source: str) -> Counter[str]:
-    """Return the number of equivalent mutants by the text of the line below the mark."""
-    counts: Counter[str] = Counter()
-    for mark, line in pairwise(source.splitlines()):
-        if found := MARK.match(mark):
-            counts[line.strip()] += int(found[1])
-    return counts

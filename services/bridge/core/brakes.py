@@ -35,7 +35,6 @@ class Brake:
     def __init__(self, command: Callable[[bool], Frame]) -> None:
         """Set up with the frame that sets it."""
         self._command = command
-        # 2 equivalent mutants: the first frame of the board sets it again.
         self.on_return(0)
 
     def on_return(self, now_ns: int) -> None:
@@ -47,7 +46,6 @@ class Brake:
         self.wanted = on
         self.since_ns = now_ns
         self._confirmed: bool | None = None
-        # 1 equivalent mutant: a confirmation sets it before it counts.
         self._unconfirmed = 0  # sends since the last confirmation
         self.send_at_once()
 

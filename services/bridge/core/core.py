@@ -107,9 +107,7 @@ class Core:
         self._faults: dict[Side, int] = {}
         self._frames: Counter[str] = Counter()  # since the last second
         self._rates: dict[str, float] = {}  # of the last second, in Hz
-        # 1 equivalent mutant: the first tick publishes.
         self._linked: tuple[object, ...] = ()  # what the newest link message says
-        # 2 equivalent mutants: the first tick publishes.
         self._linked_ns = 0
         self._handlers: dict[type[Frame], Handler] = {
             reports.VelocityReport: self._on_velocity,
@@ -160,7 +158,6 @@ class Core:
         self._frames[kind.__name__] += 1
         yield from self.readiness.on_frame(now_ns)
         if not self.readiness.ready:
-            # 1 equivalent mutant: None is as false as False.
             self.motions.on_ready(False)  # now, not at the next tick: no RUN in between
         if self.motions.port != self._ports.main:
             self.motions.port = self._ports.main
@@ -213,7 +210,6 @@ class Core:
         ):
             yield from self.readiness.on_restart(now_ns)
             self._bumper = BumperFilter()
-            # 1 equivalent mutant: None is as false as False.
             self.motions.on_ready(False)  # also where a firmware that confirms nothing stays ready
             after = self._translator.mileage(frame, self.readiness.epoch)
         self._mileage = Latest(after, asked_ns)

@@ -55,16 +55,12 @@ class MotionOutput:
         self._translator = translator
         self._counters = counters
         self._velocity: Latest[Twist] | None = None
-        # 2 equivalent mutants: it is read after a hit only.
         self._hit_ns = 0  # when the hit was read that the lease waits for
-        # 1 equivalent mutant: None is as false as False.
         self._has_braked = False  # for a hit that ``on_hit`` has not taken yet
         self._stopping_ns: int | None = None
-        # 1 equivalent mutant: no ``boot`` is an empty text.
         self._refused: int | None = None  # ``boot`` of the second authority that was reported
         self._vehicle, self._times = config.vehicle, config.times
         self._valid_ns = round(self._times.lease * NS_PER_S)
-        # 1 equivalent mutant: the first tick begins anew.
         self._over_since_ns: int | None = None  # the end of the lease that is supervised
         self._limit_ns = round(self._times.coast * NS_PER_S)  # from then until it must stand
         self._displacement: Displacement | None = None  # None until standstill after that end
@@ -94,7 +90,6 @@ class MotionOutput:
         """Hold BRAKE for a hit until safety has judged the sample that is published as ``seq``."""
         if not self._has_braked:  # its datagram holds more than the hit
             yield from self.reflex(now_ns)
-        # 1 equivalent mutant: None is as false as False.
         self._has_braked = False
         self.lease = leases.on_hit(self.lease, seq, now_ns)
 
@@ -156,7 +151,6 @@ class MotionOutput:
         """Stop the vehicle before exit; only the first call sends a frame."""
         if self._stopping_ns is None:
             self._stopping_ns = now_ns
-            # 2 equivalent mutants: a stopping bridge is never ready.
             self.on_ready(False)
             yield self.order(BRAKE if self.lease.braking else STOP)
 

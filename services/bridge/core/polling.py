@@ -17,7 +17,6 @@ class Query:
     def __init__(self, frame: Frame, rate_hz: float, timeout_ns: int, early_ns: int) -> None:
         """Set up; it may be sent ``early_ns`` before it is due."""
         self.frame = frame
-        # 1 equivalent mutant: the first poll is long overdue in any case.
         self.due_ns = 0
         self.round_trip_ns: int | None = None
         self._period_ns = round(NS_PER_S / rate_hz)

@@ -61,5 +61,4 @@ class Ports:
     def to_ask(self, now_ns: int) -> int:
         """Return the port to send a query or a setting from."""
         stream = self.streams.get(BumperReport, Stream(self.main, self._began_ns))
-        # 1 equivalent mutant: a nanosecond is no turn: both give the first port.
         return (stream.port + max(0, now_ns - stream.received_ns) // UNANSWERED_NS) % self._count

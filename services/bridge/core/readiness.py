@@ -23,7 +23,6 @@ class Readiness:
 
     def __init__(self, times: TimeLimits, board: Board) -> None:
         self.link: m.LinkState = "never"
-        # 2 equivalent mutants: the first frame sets it.
         self.up_ns = 0  # start of the current ``up`` phase
         self.gap_ns = 0  # end of the last short silence (no lost link) of the board
         self.epoch = 0
@@ -31,14 +30,12 @@ class Readiness:
         self.bumper = Brake(BumperBrakeSet)
         self.relay = RelayStatus(bool(board.relay_port))
         self._brakes = self.ultrasonic, self.bumper
-        # 1 equivalent mutant: the first frame sets it.
         self._received_ns = 0
         self._ports = ", ".join(map(str, board.listen_ports))
         self._silence_ns = round(times.silence * NS_PER_S)
         self._echo_ns = round(times.echo * NS_PER_S)
         self._required = board.require_switches
         self._published = self.message()
-        # 2 equivalent mutants: the first tick sets it.
         self._inhibited = False
 
     @property

@@ -36,9 +36,7 @@ class RelayStatus:
         self._required = required
         self._state: m.LinkState = "never"
         self._report = RelayReport("", "", 0.0, {})
-        # 2 equivalent mutants: a report sets it.
         self._received_ns = 0
-        # 2 equivalent mutants: no event has such a name.
         self._event = ""  # the newest one
 
     def take(self, datagram: bytes, now_ns: int) -> bool:

@@ -160,7 +160,6 @@ class Estimator:
     def _advance(self, now_ns: int) -> None:
         """Extrapolate the predicted pose to now: by the velocity while it is valid."""
         start_ns = held_ns = self._predicted_ns or now_ns
-        # 1 equivalent mutant: without a velocity no time is seen.
         linear = angular = 0.0
         if self._velocity is not None:
             linear, angular = self._velocity.value.linear, self._velocity.value.angular

@@ -44,7 +44,6 @@ class Pose(Struct, frozen=True):
 
 def chord_ratio(turn: float) -> tuple[float, float]:
     """Return the ratio of chord to arc length, and its derivative by the turn."""
-    # 1 equivalent mutant: both formulas give the same at the limit.
     if abs(turn) < SMALL_TURN:
         return 1.0 - turn * turn / 24, -turn / 12
     ratio = math.sin(turn / 2) / (turn / 2)

@@ -109,7 +109,6 @@ class Standstill(Struct, frozen=True):
         """Return the state of a motion; the time limit is kept until the vehicle stands."""
         began_ns = self.began_ns if self.phase is Phase.MOVING else now_ns
         due_ns = None if self.displacement.is_standing else self.due_ns
-        # 1 equivalent mutant: None is as false as False.
         return replace(self.begin(Phase.MOVING, due_ns), began_ns=began_ns, rolls=False)
 
     def settled(self, now_ns: int) -> "Standstill":
@@ -176,7 +175,6 @@ class Supervisor:
         now_ns: int,
     ) -> Standstill:
         displacement = before.displacement.with_velocity(velocity).with_mileage(mileage)
-        # 1 equivalent mutant: None is as false as False.
         after = replace(before, displacement=displacement, has_left=False)
         if not commanded:
             return after.moving(now_ns)

@@ -128,7 +128,6 @@ def answered(state: State, inputs: Inputs, settings: SafetyConfig, now_ns: int) 
     waited for.
     """
     release, source = state.release, state.arbiter.in_control(now_ns)
-    # 2 equivalent mutants: without a source its request does not matter.
     asked = state.arbiter.channels[source].release if source else "none"
     if source is None or asked == "none":
         return replace(release, direction=None, refusal=())

@@ -68,7 +68,6 @@ class Zones(Struct, frozen=True):
             if speed <= MEASURED_CREEP_MPS:
                 continue
             allowed = speed * self._factor(speed, way, distances[sonar])
-            # 1 equivalent mutant: a measured speed, at the limit or above it.
             if not allowed or speed > allowed + MEASURED_EXCESS_MPS:
                 return sonar
         return None
@@ -201,7 +200,6 @@ def _step(current: float, target: float, up: float, down: float) -> float:
     """Return one component after a step; a change of direction stops at zero first."""
     if current * target < 0:
         target = 0.0
-    # 1 equivalent mutant: between equal values there is no step.
     return current + clamp(target - current, up if abs(target) > abs(current) else down)
 
 
@@ -213,10 +211,8 @@ def ramp_start(measured: Twist, target: Twist) -> Twist:
 
 
 def _overlap(measured: float, target: float) -> float:
-    # 1 equivalent mutant: with a zero the smaller of both is zero, too.
     if measured * target <= 0:
         return 0.0
-    # 1 equivalent mutant: of two equal values either is the smaller.
     return measured if abs(measured) < abs(target) else target
 
 

@@ -116,11 +116,9 @@ class Policy:
     def decide(self, state: State, inputs: Inputs, now_ns: int) -> Decision:
         """Return the new state, and the motion for the bridge."""
         step_s = min((now_ns - (state.decided_ns or now_ns)) / NS_PER_S, LONGEST_STEP_S)
-        # 2 equivalent mutants: any step tells one decision from the next.
         state = replace(state, decision=state.decision + 1)
         state = self._sense(state, inputs, step_s, now_ns)
         state = self._observe(state, inputs, now_ns)
-        # 1 equivalent mutant: an empty text is as false as None.
         reply = None
         if inputs.reset is not None:
             state, reply = carry_out(inputs.reset, state, inputs, self.settings, now_ns)
@@ -183,7 +181,6 @@ class Policy:
         arbiter, overrides = self._noting_rest(state, now_ns), state.overrides
         if state.sonar_array.unseen or overrides.since:
             neutral = {
-                # 1 equivalent mutant: both are before any fault.
                 name: arbiter.channels[name].neutral_ns or 0
                 for name in self.settings.safety.operators & arbiter.requesting_zero(now_ns)
             }
@@ -199,7 +196,6 @@ class Policy:
         plan = Plan()
         if requested and (BARRING & state.latches.keys()) <= ignored:
             known = inputs.known_velocity(now_ns, self.settings.times.velocity_age)
-            # 1 equivalent mutant: an unknown velocity bars motion.
             measured = known.value if known else STILL
             plan = self.planner.plan(state, measured, requested, step_s)
         seen = observations(state, requested, plan)
@@ -213,7 +209,6 @@ class Policy:
         return replace(state, latches=held), Verdict(
             name=_name(worst, held),
             command=command,
-            # 1 equivalent mutant: without RUN the plan stands still, too.
             twist=plan.twist if command is RUN else STILL,
             source=source,
             control=source if source and BARRING.isdisjoint(held) else None,

@@ -96,7 +96,6 @@ class Release(Struct, frozen=True):
 
     def away(self, speed: float) -> Twist:
         """Return the straight motion in the granted direction."""
-        # 1 equivalent mutant: the sign is 1 or -1: to divide by it is to multiply.
         return STILL if self.direction is None else Twist(speed * SIGN[self.direction])
 
     def moving(

@@ -145,7 +145,6 @@ def _accept(sonar: Sonar, distance: float) -> Sonar:
     # A faulty sonar has no distance to compare with: any good readings end the fault. A near one
     # that did not would leave the obstacle unseen, and an operator may creep toward that.
     if not sonar.fault:
-        # 1 equivalent mutant: an equal distance is within the hysteresis, too.
         if distance <= sonar.distance:
             return replace(sonar, distance=distance, farther=())
         if distance < sonar.distance + HYSTERESIS_M:
@@ -158,13 +157,11 @@ def _accept(sonar: Sonar, distance: float) -> Sonar:
 
 def _watch(sonar: Sonar, distance: float, moved: Moved) -> Sonar:
     """Compare the reading with the previous one and with the motion."""
-    # 1 equivalent mutant: readings are whole millimetres, never at the limit.
     if math.isinf(distance) or abs(distance - sonar.same) >= SAME_M:
         changed = sonar.changed + 1
         if sonar.suspect and changed < CHANGED_SAMPLES:
             return replace(sonar, changed=changed)
         return _begin(sonar, distance)
-    # 1 equivalent mutant: only the magnitude counts.
     turned = sonar.turned + moved.turn
     nearer, travel = (0.0, 0.0) if moved.alongside else _span(sonar, moved.along)
     against = travel >= STUCK_TRAVEL_M or abs(turned) >= STUCK_TURN
@@ -206,7 +203,6 @@ class SonarOverrides(Struct, frozen=True):
 
     def acknowledged_by(self, source: str | None) -> frozenset[int]:
         """Return the sonars toward which this source may creep without a reading."""
-        # 1 equivalent mutant: no source has such a name.
         return self.acknowledged.get(source or "", frozenset())
 
 
@@ -248,7 +244,6 @@ class SonarFilter(Struct, frozen=True):
     ) -> SonarArray:
         """Return the array with the newest sample; each sample is processed once."""
         if latest is None or not fresh(latest, now_ns, self.age_s):
-            # 1 equivalent mutant: a sample that is too old never becomes fresh again.
             return SonarArray(SILENT, array.token, array.at_ns)
         sample = latest.value
         token = (sample.boot, sample.seq)
@@ -256,7 +251,6 @@ class SonarFilter(Struct, frozen=True):
             return array
         moved = STILL if measured is None or measured.is_standing else measured
         step_s = min((latest.received_ns - array.at_ns) / NS_PER_S, LONGEST_STEP_S)
-        # 3 equivalent mutants: both have a row for each sonar.
         readings, faults = zip(*map(trusted, sample.ranges, sample.status), strict=True)
         rooms = [max(0.0, readings[n] - axis.recess) for n, axis in enumerate(self.axes)]
         sonars = tuple(
@@ -282,5 +276,4 @@ def _is_alongside(sonar: int, rooms: Sequence[float]) -> bool:
     if flank is None:
         return False
     low, high = (share * rooms[sonar] for share in ALONGSIDE)
-    # 2 equivalent mutants: a range of measured numbers, with or without its ends.
     return low <= rooms[SONAR_NAMES.index(flank)] <= high

@@ -107,7 +107,6 @@ class Controls:
         """Process a press or its repeat."""
         keystroke = press.keystroke
         if keystroke in (ESTOP, STOP):
-            # 1 equivalent mutant: only a pause needs the time.
             self.stop(now_ns)
             return Action.ESTOP if keystroke == ESTOP else Action.NONE
         if keystroke not in KEYSTROKES:
@@ -134,7 +133,6 @@ class Controls:
 
     def stop(self, now_ns: int) -> None:
         """Let go of everything and send zeros, even if nothing was sent before."""
-        # 1 equivalent mutant: only a pause needs the time.
         self.enforce("stop", now_ns)
         self._requests.stop()
 
@@ -157,7 +155,6 @@ class Controls:
     def tick(self, stick: Stick | None, now_ns: int) -> Drive | None:
         """Return the request to send now, or None; ``stick`` is None without a gamepad."""
         if stick is None:
-            # 1 equivalent mutant: only a pause needs the time.
             self.enforce("gamepad_gone", now_ns)
         else:
             self._deadman.update(stick.deadman, stick.events, now_ns)
@@ -177,7 +174,6 @@ class Controls:
         moves = push != Deflection()
         self.is_gamepad_silent = moves and self._deadman.is_silent(now_ns)
         if self.is_gamepad_silent:
-            # 1 equivalent mutant: only a pause needs the time.
             self.enforce("gamepad_silent", now_ns)
             return None
         self._by_gamepad = moves

@@ -127,11 +127,8 @@ class Deadman:
 
     def __init__(self) -> None:
         self.is_held = False
-        # 1 equivalent mutant: None is as false as False.
         self._seen_up = False
-        # 1 equivalent mutant: any value that is no number of changes.
         self._events: int | None = None
-        # 2 equivalent mutants: the first ``update`` sets it.
         self._event_ns = 0  # the last change
 
     def update(self, down: bool, events: int, now_ns: int) -> None:

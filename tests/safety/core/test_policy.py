@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
+from common.settings import Host
 from services.safety.config import SafetyConfig
 from services.safety.core.causes import FAILURES, RULES, FaultBudget, Held, latched
 from services.safety.core.inputs import DriveRequest, Inputs
@@ -321,7 +322,9 @@ def test_the_first_bumper_sample_follows_none() -> None:
 
 def test_a_pause_of_the_process_does_not_leap_the_ramp() -> None:
     """It may pause for so long only where its host is known to."""
-    fixture = PolicyFixture(Safety(stall=0.1, unsafe_overrides=("stall",))).ready()
+    fixture = PolicyFixture(
+        SafetyConfig(host=Host(stall=0.1), unsafe_overrides=("host.stall",))
+    ).ready()
     before = fixture.drive(0.5).twist.linear
     fixture.now_ns += NS_PER_S // 8
     fixture.feed()
