@@ -244,7 +244,7 @@ class SonarFilter(Struct, frozen=True):
     ) -> SonarArray:
         """Return the array with the newest sample; each sample is processed once."""
         if latest is None or not fresh(latest, now_ns, self.age_s):
-            return SonarArray(SILENT, array.token, array.at_ns)
+            return SonarArray()  # a sample that is too old never becomes fresh again
         sample = latest.value
         token = (sample.boot, sample.seq)
         if token == array.token:
