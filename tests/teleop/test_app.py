@@ -192,7 +192,7 @@ SITUATIONS: dict[str, tuple[dict[str, Any], tuple[Phrase, ...], list[str]]] = {
     "unconfirmed": (
         {"text": "-", "phrases": (Phrase("control.of", {"source": "web"}),)},
         (Phrase("event.estop_unconfirmed"), Phrase("estop.repeated", {"seconds": 27.0})),
-        ["急停未被确认：请使用车身上的急停开关。将继续发送 27 秒。", " 运行  web 取得控制权。"],
+        ["急停未被确认：请使用车身上的急停开关。将继续发送 27 秒。", " 运行  web 拥有控制权。"],
     ),
     "contact": (
         {
