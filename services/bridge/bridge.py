@@ -23,7 +23,7 @@ from common.service import Node, run
 from services.bridge.config import BridgeConfig
 from services.bridge.core.core import TICK_S, Core
 from services.bridge.core.output import Event, Output, Publish, Reacted, Refuse, Reply, Send
-from services.bridge.guard import BRAKES_ENV, DESCRIPTORS_ENV, Heartbeat
+from services.bridge.guard import BRAKES_ENV, DESCRIPTORS_ENV, Pulse
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 from t2 import keys
 from t2 import messages as m
@@ -87,7 +87,7 @@ class Bridge:
         self._node = node
         drive = node.open_drive(listens=True)  # safety accepts samples only from this link
         self._sockets = Sockets(node.config.board, sockets)
-        self._heartbeat = None if pipe is None else Heartbeat(pipe, self._on_no_guard)
+        self._pulse = None if pipe is None else Pulse(pipe, self._on_no_guard)
         self._reactions = {"reflex": Histogram(), "judged_stop": Histogram()}
         self._core = Core(node.config, node.bus.boot, node.counters, clock.now_ns())
         self._ticked_ns = clock.now_ns()
@@ -210,9 +210,9 @@ class Bridge:
             self._beat()  # the guard learns of a BRAKE at once
 
     def _beat(self) -> None:
-        if self._heartbeat is not None:
+        if self._pulse is not None:
             motions = self._core.motions
-            self._heartbeat.beat(motions.port, brakes=motions.lease.braking)
+            self._pulse.beat(motions.port, brakes=motions.lease.braking)
 
     # --- the end ------------------------------------------------------------------------------
 
@@ -229,8 +229,8 @@ class Bridge:
 
     def _on_exit(self) -> None:
         self._send(self._core.motions.on_exit(clock.now_ns()))
-        if self._heartbeat is not None:
-            self._heartbeat.end()
+        if self._pulse is not None:
+            self._pulse.end()
 
 
 if __name__ == "__main__":

@@ -13,10 +13,10 @@ class TimeLimits(Struct, frozen=True, kw_only=True):
     lease: float = 0.2  # that a motion message is valid
     silence: float = 0.2  # without a frame: the link is lost
     failover: float = 0.1  # until the other port takes over; under ``silence``
-    heartbeat: float = 0.2  # without a heartbeat of the bridge until the guard brakes
+    pulse: float = 0.2  # without a pulse of the bridge until the guard brakes
     coast: float = 1.0  # of STOP at most until BRAKE
     answer: float = 0.1  # for a query's answer
-    echo: float = 0.5  # for the echo of a brake's switch or of a lamp
+    confirmation: float = 0.5  # of the board: for a brake's switch or a lamp
 
 
 class BridgeConfig(settings.Shared, frozen=True, kw_only=True):

@@ -1,13 +1,13 @@
 """The bridge's parent process: sends BRAKE whenever the bridge does not work.
 
 It opens the sockets to the board, so that source port and receive queue survive a restart, starts
-the bridge as its child and reads its heartbeat. Without a heartbeat it sends BRAKE at 20 Hz through
+the bridge as its child and reads its pulse. Without a pulse it sends BRAKE at 20 Hz through
 the socket that the bridge used:
 
 ============== =============================== ==============================================
 phase          BRAKE                           ends with
 ============== =============================== ==============================================
-starting       until the first heartbeat, that a heartbeat: alive; none in 10 s of its CPU time
+starting       until the first pulse, that a pulse: alive; none in 10 s of its CPU time
                follows the bridge's first BRAKE or of its sleep (``Start``): killed
 alive          from 200 ms without one         five BRAKEs without one: killed; the pipe's end
 ending, killed until the child has exited      exit: restarted, the first time at once
@@ -18,7 +18,7 @@ SIGTERM, SIGINT and SIGHUP are passed on; a bridge that stops the vehicle sends 
 itself. A signal after the parent has died means that the supervisor was killed: the system sends it
 then (see ``cli.run.supervisor``), and the bridge brakes at once instead of coasting.
 
-The bridge inherits the sockets and the write end of a pipe. A byte on the pipe is a heartbeat of
+The bridge inherits the sockets and the write end of a pipe. A byte on the pipe is a pulse of
 the bridge's event loop; its value is the index of the port that commands leave from, and whether
 the bridge holds BRAKE (``BRAKES``). The next bridge then holds it, too. End of file means that the
 bridge exits or has died.
@@ -45,7 +45,7 @@ from services.bridge.config import BridgeConfig
 from services.bridge.udp import BRAKE_ATTEMPTS, Sockets
 
 BRAKE_MS = 50
-HANG_BRAKES_MAX = 5  # BRAKEs without a heartbeat, until the bridge is killed
+HANG_BRAKES_MAX = 5  # BRAKEs without a pulse, until the bridge is killed
 START_S = 10.0  # of CPU time and of sleep, until a starting bridge is killed
 EXIT_BRAKES_MAX = 20  # BRAKEs after the bridge closed its pipe, until it is killed
 NOT_STARTED = 1  # exit code when the bridge could not be started
@@ -54,10 +54,10 @@ STOP_TIMEOUT_S = 4.0  # for a bridge that stops the vehicle
 # of the write end of the pipe.
 DESCRIPTORS_ENV = "T2_BRIDGE_DESCRIPTORS"
 BRAKES_ENV = "T2_BRIDGE_BRAKES"  # "1" when the bridge before held BRAKE
-BRAKES = 0x80  # in a heartbeat: BRAKE is held until safety or an operator ends it
+BRAKES = 0x80  # in a pulse: BRAKE is held until safety or an operator ends it
 
 
-class Heartbeat:
+class Pulse:
     """The bridge's end of the pipe."""
 
     def __init__(self, descriptor: int, on_gone: Callable[[], None]) -> None:
@@ -66,11 +66,11 @@ class Heartbeat:
         os.set_blocking(descriptor, False)
 
     def beat(self, port: int, *, brakes: bool = False) -> None:
-        """Send a heartbeat; ``on_gone`` is called once when the guard has died."""
+        """Send a pulse; ``on_gone`` is called once when the guard has died."""
         if self._descriptor is None:
             return
         try:
-            with suppress(BlockingIOError):  # the pipe is full: the guard has heartbeats to read
+            with suppress(BlockingIOError):  # the pipe is full: the guard has pulses to read
                 os.write(self._descriptor, bytes((port | BRAKES * brakes,)))
         except OSError:
             self.end()
@@ -99,7 +99,7 @@ class Start:
         self._cpu_s = 0.0
 
     def add(self, period_s: float) -> None:
-        """Add a period without a heartbeat."""
+        """Add a period without a pulse."""
         state, cpu_s = self._read()
         if cpu_s > self._cpu_s:
             self.used_s += cpu_s - self._cpu_s
@@ -123,7 +123,7 @@ class Guard:
     def __init__(self, config: BridgeConfig, sockets: Sockets, command: Sequence[str]) -> None:
         self._sockets = sockets
         self._command = command
-        self._missed_ms = round(config.times.heartbeat * 1000)
+        self._missed_ms = round(config.times.pulse * 1000)
         self._brake = framing.pack(MotionCommand(MotionKind.BREAK))
         self._port = 0  # index of the port that the bridge uses
         self._brakes = False  # whether the bridge holds BRAKE
@@ -154,17 +154,17 @@ class Guard:
     def _run_bridge(self) -> int:
         """Start a bridge, watch it until it exits, and return its exit code as a shell does."""
         try:
-            child, heartbeat = self._start()
+            child, pulse = self._start()
         except (OSError, MemoryError, subprocess.SubprocessError) as error:
             self._log.error("the bridge cannot be started; sending BRAKE", error=str(error))
             return NOT_STARTED
-        self._watch(child, heartbeat)
-        os.close(heartbeat)
+        self._watch(child, pulse)
+        os.close(pulse)
         return self._end(child)
 
     def _start(self) -> tuple["subprocess.Popen[bytes]", int]:
         self._child = None
-        heartbeat, to_guard = os.pipe()
+        pulse, to_guard = os.pipe()
         try:
             given = (*(sock.fileno() for sock in self._sockets.sockets), to_guard)
             # Own session: ctrl-c reaches only the guard, which passes it on once; a kill of the
@@ -176,30 +176,30 @@ class Guard:
                 start_new_session=True,
             )
         except BaseException:
-            os.close(heartbeat)
+            os.close(pulse)
             raise
         finally:
             os.close(to_guard)
         if self._stopping:  # signal during the start
             self._child.terminate()
-        return self._child, heartbeat
+        return self._child, pulse
 
     def _state(self, descriptors: Sequence[int]) -> dict[str, str]:
         """Return the variables that a bridge begins with."""
         brakes = "1" if self._brakes else ""
         return {DESCRIPTORS_ENV: ",".join(map(str, descriptors)), BRAKES_ENV: brakes}
 
-    def _watch(self, child: "subprocess.Popen[bytes]", heartbeat: int) -> None:
-        """Read heartbeats and brake while they are missing; return when the pipe is closed."""
+    def _watch(self, child: "subprocess.Popen[bytes]", pulse: int) -> None:
+        """Read pulses and brake while they are missing; return when the pipe is closed."""
         poll = select.poll()
-        poll.register(heartbeat, select.POLLIN)
+        poll.register(pulse, select.POLLIN)
         timeout_ms, missed, alive, start = BRAKE_MS, 0, False, Start(child.pid)
         while missed < HANG_BRAKES_MAX and start.used_s < START_S:
             if poll.poll(timeout_ms):
-                beats = os.read(heartbeat, 4096)
-                if not beats:
+                pulses = os.read(pulse, 4096)
+                if not pulses:
                     return
-                self._port, self._brakes = beats[-1] & ~BRAKES, bool(beats[-1] & BRAKES)
+                self._port, self._brakes = pulses[-1] & ~BRAKES, bool(pulses[-1] & BRAKES)
                 self._systemd.ready(clock.now_ns())
                 timeout_ms, missed, alive = self._missed_ms, 0, True
             else:

@@ -23,7 +23,7 @@ from common.wire.commands import MotionKind
 from services.bridge import __main__ as program
 from services.bridge import guard as guard_module
 from services.bridge.config import BridgeConfig
-from services.bridge.guard import Guard, Heartbeat, Start
+from services.bridge.guard import Guard, Pulse, Start
 from services.bridge.udp import Sockets
 from t2.errors import LinkError
 from tests.common.rights import needs_right
@@ -31,7 +31,7 @@ from tests.common.systemd_manager import PATIENCE_US, Manager
 from verification.harness.fake_board import Board, board
 from verification.harness.waiting import wait_until
 
-# In the bridge's place: each heartbeat names the second port.
+# In the bridge's place: each pulse names the second port.
 CHILD = f"""
 import os, signal, sys, time
 from pathlib import Path
@@ -258,15 +258,15 @@ def test_a_bridge_that_runs_away_on_the_only_core_is_braked_for_and_killed() -> 
 
 def test_a_beat_names_the_port_waits_for_nobody_and_the_end_is_final() -> None:
     out, into = os.pipe()
-    heartbeat = Heartbeat(into, pytest.fail)
+    pulse = Pulse(into, pytest.fail)
     for port in (0, 1, 0):
-        heartbeat.beat(port)
+        pulse.beat(port)
     assert os.read(out, 10) == b"\0\1\0"
     for _ in range(100_000):  # more than a pipe takes
-        heartbeat.beat(0)
-    heartbeat.end()
-    heartbeat.end()
-    heartbeat.beat(0)
+        pulse.beat(0)
+    pulse.end()
+    pulse.end()
+    pulse.beat(0)
     while os.read(out, 65536):
         pass
     os.close(out)

@@ -23,13 +23,13 @@ from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
 from services.ros2 import command
 from services.safety.config import LimitSource, Safety, SafetyConfig
-from services.safety.core import causes, conditions, operator_requests, planning, sources
+from services.safety.core import arbiter, causes, conditions, operator_requests, planning
+from services.safety.core.arbiter import Arbiter
 from services.safety.core.causes import Held, Observation
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import Standstill
 from services.safety.core.release import Release
 from services.safety.core.sonars import Axis, SonarOverrides
-from services.safety.core.sources import Arbiter
 from services.safety.core.state import State
 from services.safety.service import SafetyService
 from sim import requests as q
@@ -515,7 +515,7 @@ MUTATIONS: dict[str, Mutation] = {
         "safety knows of estop_reader",
     ),
     "a suspended program drives on": (
-        (sources, "LAPSE_S", 1e9),  # another source drives on, so the vehicle never stands
+        (arbiter, "LAPSE_S", 1e9),  # another source drives on, so the vehicle never stands
         (lambda s: s.request(None), lambda s: s.request(0.0, 450, source="nav"),
          lambda s: s.request(0.5, 1500, source="nav"), *GO), "teleop was not neutral",
     ),

@@ -51,7 +51,7 @@ RESET: tuple[Outcome, ...] = ("after a reset",)
 
 MOTION_LEASE = by_limit(lambda config: bridge(config).lease)
 LEASE_AND_COAST = by_limit(lambda config: bridge(config).lease + bridge(config).coast)
-HEARTBEAT = by_limit(lambda config: bridge(config).heartbeat)
+HEARTBEAT = by_limit(lambda config: bridge(config).pulse)
 SILENCE = by_limit(lambda config: bridge(config).silence)
 BUMPER_AGE = by_limit(lambda config: safety_config(config).times.bumper_age)
 VELOCITY_AGE = by_limit(lambda config: safety_config(config).times.velocity_age)

@@ -17,7 +17,7 @@ from verification.harness.results import table
 from verification.soak.verdict import Record, Sample, results
 
 KILLS_PART = 0.4  # of the time; afterwards every process lives long enough to be judged
-HANG_S = 0.2  # without a heartbeat the guard kills its child
+HANG_S = 0.2  # without a pulse the guard kills its child
 
 
 def in_rounds(faults: Sequence[Fault], random: Random) -> Iterator[Fault]:

@@ -97,7 +97,7 @@ class Core:
             config, self._translator, boot=boot, counters=counters, now_ns=now_ns
         )
         self.readiness = readiness = Readiness(times, config.board)
-        self.calls = Calls(readiness, times.echo, self._ask)
+        self.calls = Calls(readiness, times.confirmation, self._ask)
         failover_ns = round(times.failover * NS_PER_S)
         self._ports = Ports(len(config.board.listen_ports), failover_ns, now_ns)
         self._polling = Polling(QUERIES, times.answer, TICK_S)

@@ -33,7 +33,7 @@ class Readiness:
         self._received_ns = 0
         self._ports = ", ".join(map(str, board.listen_ports))
         self._silence_ns = round(times.silence * NS_PER_S)
-        self._echo_ns = round(times.echo * NS_PER_S)
+        self._confirmation_ns = round(times.confirmation * NS_PER_S)
         self._required = board.require_switches
         self._published = self.message()
         self._inhibited = False
@@ -144,7 +144,7 @@ class Readiness:
 
     def _report_inhibited(self, now_ns: int) -> Outputs:
         since_ns = max(brake.since_ns for brake in self._brakes)
-        inhibited = now_ns - since_ns > self._echo_ns and not self._brakes_on
+        inhibited = now_ns - since_ns > self._confirmation_ns and not self._brakes_on
         if inhibited and not self._inhibited:
             yield Event("switches_unverified", "error")
         self._inhibited = inhibited

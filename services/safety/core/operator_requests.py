@@ -9,6 +9,7 @@ and the release that frees it needs the reset. Causes that the reset does not na
 from msgspec.structs import replace
 
 from services.safety.config import SafetyConfig
+from services.safety.core.arbiter import DriveChannel
 from services.safety.core.causes import (
     BARRING,
     FaultBudget,
@@ -21,7 +22,6 @@ from services.safety.core.causes import (
 )
 from services.safety.core.inputs import Inputs
 from services.safety.core.release import SIGN, Release, stopping_distance
-from services.safety.core.sources import DriveChannel
 from services.safety.core.state import Reply, State
 from t2.messages import Direction, Phrase, Phrases, ResetRequest
 

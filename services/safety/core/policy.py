@@ -1,7 +1,8 @@
 """Policy: one decision, from inputs and state to the motion for the bridge.
 
-Messages of sources are accepted or refused as they arrive (``sources.py``). Each decision takes
-these steps, always in this order, so that a trip wins over a reset that arrives with it:
+Messages of sources are accepted or refused as they arrive (``arbiter.py``, ``speed_limits.py``).
+Each decision takes these steps, always in this order, so that a trip wins over a reset that arrives
+with it:
 
 1. sense     update sonars, runaway, standstill and the travel of a release
 2. observe   observe every cause that does not depend on a request (``conditions.py``); while one
@@ -23,6 +24,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S
 from common.motion import BRAKE, RUN, STILL, STOP
 from services.safety.config import SafetyConfig
+from services.safety.core.arbiter import Arbiter
 from services.safety.core.causes import (
     BARRING,
     BY_NAME,
@@ -34,13 +36,14 @@ from services.safety.core.causes import (
     observe,
     ordered,
 )
+from services.safety.core.channel import Admission
 from services.safety.core.conditions import observe_inputs
 from services.safety.core.inputs import DriveRequest, Inputs, LimitRequest, SourceRequest
 from services.safety.core.motion_watch import Supervisor
 from services.safety.core.operator_requests import answered, carry_out
 from services.safety.core.planning import Plan, Planner, observations
 from services.safety.core.sonars import SonarFilter
-from services.safety.core.sources import Admission, Arbiter, SpeedLimits
+from services.safety.core.speed_limits import SpeedLimits
 from services.safety.core.state import State, Verdict
 from t2.messages import CauseName, Command, Motion
 from t2.messages import Verdict as VerdictName

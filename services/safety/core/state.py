@@ -4,11 +4,12 @@ from msgspec import Struct
 
 from common.heartbeat import Heartbeat
 from common.motion import STILL, STOP, Twist
+from services.safety.core.arbiter import Arbiter
 from services.safety.core.causes import FaultBudget, Latches, Token
 from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.release import Leg, Release
 from services.safety.core.sonars import SonarArray, SonarOverrides
-from services.safety.core.sources import Arbiter, SpeedLimits
+from services.safety.core.speed_limits import SpeedLimits
 from t2.messages import Command, Phrases
 from t2.messages import Verdict as VerdictName
 

@@ -10,17 +10,13 @@ from common.motion import Twist
 from common.settings import Board
 from common.standstill import Displacement
 from services.safety.config import LimitSource, SafetyConfig
+from services.safety.core.arbiter import Arbiter, DriveChannel
 from services.safety.core.causes import Observation
 from services.safety.core.conditions import observe_inputs
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch, Phase, Standstill
 from services.safety.core.policy import Policy
-from services.safety.core.sources import (
-    Arbiter,
-    DriveChannel,
-    LimitChannel,
-    SpeedLimits,
-)
+from services.safety.core.speed_limits import LimitChannel, SpeedLimits
 from services.safety.core.state import State, Verdict
 from t2.messages import Bumper, Driver, Phrase, Switches, Ultrasonic, Velocity
 from t2.words import render

@@ -14,16 +14,11 @@ from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
 from services.safety.config import LimitSource, Safety
+from services.safety.core.arbiter import Arbiter, DriveChannel
 from services.safety.core.causes import Observation
+from services.safety.core.channel import CONFLICT_NS, Admission
 from services.safety.core.inputs import DriveRequest, LimitRequest
-from services.safety.core.sources import (
-    CONFLICT_NS,
-    Admission,
-    Arbiter,
-    DriveChannel,
-    LimitChannel,
-    SpeedLimits,
-)
+from services.safety.core.speed_limits import LimitChannel, SpeedLimits
 from t2.messages import Drive, Limit, LimitState
 from t2.words import render
 
