@@ -23,7 +23,8 @@ class Safe(NamedTuple):
     unit: str = ""
 
     def __str__(self) -> str:
-        return f"{self.low}..{self.high} {self.unit}".rstrip()
+        bounds = f"{self.low}" if self.low == self.high else f"{self.low}..{self.high}"
+        return f"{bounds} {self.unit}".rstrip()
 
 
 def allowed(unit: str = "", *, safe: tuple[float, float] | None = None, **bounds: float) -> Meta:

@@ -250,7 +250,7 @@ PHRASES: dict[str, Words] = {
     "bumper.samples": ("Samples of the bumper were lost.", "防撞条的采样有丢失。"),
     "two_publishers.of": ("Two publishers use {sources}.", "{sources} 有两个发布者。"),
     "limit_stop.by": ("Stopped by {sources}.", "{sources} 要求停车。"),
-    "limit_silent.of": ("No speed limit arrives of {sources}.", "收不到 {sources} 的限速消息。"),
+    "limit_silent.of": ("No speed limit arrives from {sources}.", "收不到 {sources} 的限速消息。"),
     "limit.by": ("Slowed by {source}.", "被 {source} 限速。"),
     "neutral.overruled": (
         "{other} was in control: {source} needs a neutral request first.",
@@ -289,6 +289,9 @@ PHRASES: dict[str, Words] = {
     # control
     "control.of": ("{source} is in control.", "{source} 拥有控制权。"),
     "control.you": ("You are in control.", "您拥有控制权。"),  # to the operator of that source
+    "control.asked": (
+        "{by} requests motion while {other} is in control.", "{other} 控制期间，{by} 请求行驶。",
+    ),
     "control.none": ("No source is in control.", "没有请求源拥有控制权。"),
     # the next step at a latch
     "next.reset": ("Reset to go on.", "复位后方可行驶。"),
@@ -436,7 +439,7 @@ PHRASES: dict[str, Words] = {
     ),
     "relay.never": ("Nothing received from the relay yet.", "尚未收到中继器的数据。"),
     "relay.lost": ("The relay is silent.", "收不到中继器的数据。"),
-    "relay.brakes": ("The relay brakes: {reason:word}.", "中继器正在制动：{reason:word}。"),
+    "relay.brakes": ("The relay brakes ({reason:word}).", "中继器正在制动（{reason:word}）。"),
     # the first part of the path that is missing
     "root.router": ("No connection to the robot.", "未连接到机器人。"),
     "root.safety": (
@@ -580,7 +583,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "bridge", "relay_braking", "warning",
-        ("The relay brakes: {reason:word}.", "中继器正在制动：{reason:word}。"),
+        ("The relay brakes, with the reason.", "中继器正在制动，并给出原因。"),
         (
             "nothing at once: STOP ends it; if frequent, check the cable to the relay and the load of "
             "both computers",
@@ -913,8 +916,9 @@ WORDS: dict[str, Words] = {
     ),
     "never": ("never up", "从未连接"),
     "lost": ("lost", "已断开"),
-    "start": ("it waits for a neutral command", "等待零速指令"),
-    "hit": ("it waits for the answer to a bumper hit", "等待对防撞条触发的应答"),
+    "relay_start": ("it waits for a neutral command", "等待零速指令"),
+    "relay_silent": ("it has lost the commands of the PC", "收不到工控机的指令"),
+    "relay_hit": ("it waits for the answer to a bumper hit", "等待对防撞条触发的应答"),
     "silent": ("silent", "无数据"),
     "faulty": ("faulty", "故障"),
     "too_near": ("too near to measure", "过近，无法测量"),
@@ -928,6 +932,11 @@ WORDS: dict[str, Words] = {
     "bridge": ("bridge", "桥接服务"),
     "safety": ("safety", "安全服务"),
     "contact": ("contact", "防撞条触发"),
+    "estop_reader": ("emergency stop not received", "急停信号接收中断"),
+    "estop_keepalive": ("emergency stop keepalive", "急停保活中断"),
+    "predecessor": ("restart of safety", "安全服务重启"),
+    "uncommanded_motion": ("uncommanded motion", "无指令移动"),
+    "flapping": ("repeated input failures", "输入反复失效"),
     "runaway": ("runaway", "未按指令运动"),
 }  # fmt: skip
 

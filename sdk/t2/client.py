@@ -7,7 +7,7 @@ phase      tick with a request tick without a request
 ========== =================== =========================================
 SILENT     zero; DRIVING       nothing
 DRIVING    the request         zero; ENDING, two zeros remain
-ENDING  zero; DRIVING       zero; SILENT after the last one
+ENDING     zero; DRIVING       zero; SILENT after the last one
 ========== =================== =========================================
 
 A request is a twist, or a release off a pressed bumper. The zero before it is the neutral request

@@ -20,7 +20,7 @@ from t2.client import (
     request,
     reset_request,
 )
-from t2.codec import decode, encode
+from t2.codec import decode, encode, refusal
 from t2.drive import Drive, attended_s, dropped
 from t2.errors import (
     Late,
@@ -310,9 +310,9 @@ class Robot:
         ):
             if answer.ok is not None:
                 return decode(answer.ok.payload.to_bytes(), call.reply)
-            text = answer.err.payload.to_bytes().decode(errors="replace") if answer.err else ""
-            if text != "Timeout":  # Zenoh's own
-                raise Refused(text)
+            payload = answer.err.payload.to_bytes() if answer.err else b""
+            if payload != b"Timeout":  # Zenoh's own
+                raise Refused(refusal(payload).text)
         raise self._unanswered(key, call.server)
 
     def _unanswered(self, key: str, service: str) -> T2Error:

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shutil
 import socket
 import subprocess
@@ -16,6 +15,7 @@ from typing import Any, Literal
 
 from t2.connection import open_session
 from t2.errors import LinkError, NoData, Refused
+from t2.messages import Cause
 from t2.robot import Robot
 
 START_S, END_S, POLL_S = 60.0, 10.0, 0.05
@@ -24,9 +24,6 @@ HOST = "127.0.0.1"
 ANSWER_S, LARGEST = 5.0, 65_535  # of the simulator's control socket: time, bytes
 # The causes of a robot that waits for a source, or for the third parties in its settings.
 READY = {"no_request", "neutral", "limit_silent"}
-KEEPALIVES = re.compile(
-    r"Waiting for the first sample of: (emergency stop keepalive of [^,]+,? ?)+"
-)
 
 
 SonarName = Literal[
@@ -173,6 +170,11 @@ def sim(
                     process.kill()
 
 
+def waits_for_keepalive(cause: Cause) -> bool:
+    """Return whether only the program under test is missing: it keeps an emergency stop alive."""
+    return {phrase.name for phrase in cause.phrases} == {"starting.keepalives"}
+
+
 def _connected(endpoint: str, process: "subprocess.Popen[bytes]", log: Path) -> SimulatedRobot:
     """Return the robot when it is ready to drive."""
     end_s, reason = time.monotonic() + START_S, "no router"
@@ -182,7 +184,7 @@ def _connected(endpoint: str, process: "subprocess.Popen[bytes]", log: Path) -> 
             robot = robot or SimulatedRobot(open_session(endpoint, None)[0], ID, endpoint)
             state = robot.safety.latest(timeout=POLL_S)
             robot.odometry.latest(timeout=POLL_S)
-            if all(it.name in READY or KEEPALIVES.fullmatch(it.text) for it in state.causes):
+            if all(it.name in READY or waits_for_keepalive(it) for it in state.causes):
                 return robot
             reason = state.text
         except (LinkError, NoData) as error:

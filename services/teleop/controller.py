@@ -129,7 +129,8 @@ class Controller:
         was_silent = self._controls.is_silent
         self._requested = self._controls.tick(self._read_stick(now_ns), now_ns)
         if was_silent and not self._controls.is_silent and (other := self._rules.other_driver):
-            self._report("take_over", "info", by=self._operator, other=other)
+            asked = Phrase("control.asked", {"by": self._operator, "other": other})
+            self._report("take_over", "info", asked)
         if self._requested is not None:
             self._source.put(self._requested)
         self._estop.tick(state, now_ns)

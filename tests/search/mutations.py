@@ -56,7 +56,11 @@ GO_ON = (*STAND, *GO)
 HIT: Script = (lambda s: s.press(True, 1500),)
 STUCK: Script = (lambda s: s.request(None), *HIT)
 LATE_MOTIONS: Script = (lambda s: s.disturb("motion", Disturbance(late_ms=60), 300),)
-LATE_STREAMS: Script = (lambda s: s.disturb("streams", Disturbance(late_ms=120), 300),)
+# Later by 40 ms at a time: a longer gap between samples of the bumper would stop the vehicle.
+LATE_STREAMS: Script = tuple(
+    partial(Stack.disturb, route="streams", disturbance=Disturbance(late_ms=late_ms), ms=100)
+    for late_ms in (40, 80, 120, 160, 200)
+)
 RESET: Script = (lambda s: s.reset(), lambda s: s.run(300))
 PROTECTIVE_STOP: Script = (
     lambda s: s.limit(0.0, 1500, source=IGNORED),
@@ -356,7 +360,7 @@ MUTATIONS: dict[str, Mutation] = {
          lambda s: s.net.disturbances.pop("motion")), "no neutral motion came",
     ),
     "silence is not noticed": (
-        timed(BridgeConfig, silence=10.0), (*LATE_STREAMS, lambda s: s.freeze(240)),
+        timed(BridgeConfig, silence=10.0), (*LATE_STREAMS, lambda s: s.freeze(280)),
         "the board is silent",
     ),
     "brakes that are off": (

@@ -13,7 +13,7 @@ import msgspec
 from common.freshness import NS_PER_S
 from services.bridge.core.output import Event, Outputs
 from t2 import messages as m
-from t2.messages import Few, Field, Name, Phrase, Phrases
+from t2.messages import Few, Name, Phrase, Phrases
 
 RELAY_SILENCE_NS = NS_PER_S // 2  # five reports
 
@@ -56,9 +56,9 @@ class RelayStatus:
             self._state, self.waiting = "lost", (Phrase("relay.lost"),)
             event = Event("relay_lost", "error")
         elif self._report.braking:
-            reason: dict[str, Field] = {"reason": self._report.braking}
-            self.waiting = (Phrase("relay.brakes", reason),)
-            event = Event("relay_braking", "warning", reason)
+            reason = self._report.braking
+            self.waiting = (Phrase("relay.brakes", {"reason": f"relay_{reason}"}),)
+            event = Event("relay_braking", "warning", {"reason": reason}, self.waiting)
         else:
             self.waiting = ()
             event = Event("relay_up", "info")

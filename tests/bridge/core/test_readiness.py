@@ -216,7 +216,12 @@ LOST = Event("relay_lost", "error")
 
 
 def braking(why: str) -> Event:
-    return Event("relay_braking", "warning", {"reason": why})
+    return Event(
+        "relay_braking",
+        "warning",
+        {"reason": why},
+        (Phrase("relay.brakes", {"reason": f"relay_{why}"}),),
+    )
 
 
 def take(bench: Bench, datagram: bytes) -> list[Output]:
@@ -251,7 +256,7 @@ def test_without_the_setting_reports_change_nothing(bench: Bench) -> None:
 def test_while_the_relay_brakes_stop_is_sent_and_a_neutral_motion_re_arms(why: str) -> None:
     bench = armed()
     assert take(bench, report(why)) == [braking(why)]
-    assert bench.link().waiting.startswith("The relay brakes: ")
+    assert bench.link().waiting.startswith("The relay brakes (")
     assert motions(bench.move(linear=0.3)) == [MotionKind.STOP]  # neutral to the relay
     assert take(bench, report(why)) == []
     assert take(bench, report()) == [UP]

@@ -310,7 +310,7 @@ def test_all_silent_sources_are_named() -> None:
     needed = LimitSource(lease=LEASE_S, silence="stop")
     _, silent, _ = SpeedLimits({"lidar": needed, "person": needed}).observations(0)
     assert (silent.name, render(silent.phrases)) == (
-        "limit_silent", "No speed limit arrives of lidar, person.",
+        "limit_silent", "No speed limit arrives from lidar, person.",
     )  # fmt: skip
 
 

@@ -83,7 +83,8 @@ def test_a_needed_source_stops_from_the_start_until_its_first_limit() -> None:
     fixture.drive(0.5, seconds=1.0)
     assert fixture.verdict.command == "stop"
     assert (
-        render(fixture.state.latches["limit_silent"].phrases) == "No speed limit arrives of lidar."
+        render(fixture.state.latches["limit_silent"].phrases)
+        == "No speed limit arrives from lidar."
     )
     for _ in range(10):
         fixture.limit()
