@@ -28,7 +28,7 @@ from verification.harness.bus import set_options
 from verification.harness.ports import free_port, udp_ports
 from verification.harness.waiting import wait_until
 
-STALL_S = 0.5  # of a busy host, which a test whose subject is not time must bear
+STALL_S = 0.3  # of a busy host, which a test whose subject is not time must bear
 UP_S = 60.0  # on a shared host
 SETTINGS_FILE = "stack.toml"  # read by all processes when it is in the folder of the stack
 
