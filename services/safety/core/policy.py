@@ -38,7 +38,7 @@ from services.safety.core.causes import (
 )
 from services.safety.core.channel import Admission
 from services.safety.core.conditions import observe_inputs
-from services.safety.core.inputs import DriveRequest, Inputs, LimitRequest, SourceRequest
+from services.safety.core.inputs import DriveRequest, Inputs, SourceRequest
 from services.safety.core.motion_watch import Supervisor
 from services.safety.core.operator_requests import answered, carry_out
 from services.safety.core.planning import Plan, Planner, observations
@@ -87,11 +87,10 @@ class Policy:
                 checked = self._admission(state, settings.times.max_echo_age, now_ns)
                 arbiter, refused = arbiter.accept(request, checked)
                 return replace(state, arbiter=arbiter.overruled(now_ns)), refused
-            case LimitRequest():
+            case _:
                 source = settings.safety.limits.get(request.source)
                 # A sign of life is as old as its echo, and holds for the lease.
-                is_life = source is not None and source.latches
-                age_s = source.lease if source and is_life else settings.times.max_echo_age
+                age_s = source.lease if source and source.latches else settings.times.max_echo_age
                 checked = self._admission(state, age_s, now_ns)
                 limits, refused = state.speed_limits.accept(request, checked)
                 arbiter = state.arbiter
