@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
 
-from t2.simulator import SimulatedRobot, sim
+if TYPE_CHECKING:
+    from t2.simulator import SimulatedRobot
 
 Scope = Literal["session", "package", "module", "class", "function"]
 
@@ -26,7 +27,9 @@ def robot_fixture(
     """
 
     @pytest.fixture(scope=scope)
-    def robot() -> Iterator[SimulatedRobot]:
+    def robot() -> "Iterator[SimulatedRobot]":
+        from t2.simulator import sim  # only tests that use it wait for Zenoh
+
         with sim(world, sets=sets, configs=configs, command=command) as it:
             yield it
 
