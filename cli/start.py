@@ -75,8 +75,7 @@ def _owner(root: Path, path: str) -> str:
     """Return which other package has installed a file, if its list of files shows it."""
     for record in root.glob("*.dist-info/RECORD"):
         name = record.parent.name.removesuffix(".dist-info")
-        if not name.startswith(("t2-", "t2_sdk-")) and f"\n{path}," in "\n" + record.read_text(
-            "utf-8"
-        ):
+        is_ours = name.startswith(("t2-", "t2_sdk-"))
+        if not is_ours and f"\n{path}," in "\n" + record.read_text("utf-8"):
             return f": {name} has installed it"
     return ""

@@ -21,7 +21,7 @@ from t2.codec import Sample
 from t2.errors import MessageError
 from t2.keys import ESTOP_CLASS, Call, Topic, estop_key
 from t2.messages import Message, Phrase, Refusal
-from t2.words import render
+from t2.words import refusal
 
 M = TypeVar("M", bound=Message)
 Q = TypeVar("Q", bound=Struct)
@@ -382,11 +382,6 @@ def _subscriber(
 def is_timeout(reply: zenoh.Reply) -> bool:
     """Return whether a reply is Zenoh's own "Timeout", not a server's refusal."""
     return reply.err is not None and reply.err.payload.to_bytes() == b"Timeout"
-
-
-def refusal(*reasons: Phrase) -> Refusal:
-    """Return the refusal of a call for these reasons."""
-    return Refusal(text=render(reasons), phrases=reasons)
 
 
 def no_answer(server: str, doctor: str = "`t2 doctor`") -> Refusal:

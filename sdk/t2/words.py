@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
 from t2.catalogue import TEXTS, WORDS, Words
-from t2.messages import Done, Field, Phrase
+from t2.messages import Done, Field, Phrase, Refusal
 
 Language = Literal["en", "zh"]
 LANGUAGES: tuple[Language, ...] = get_args(Language)
@@ -41,6 +41,11 @@ def render(
 def done(*phrases: Phrase, boot: int = 0) -> Done:
     """Return the answer to a call that was carried out."""
     return Done(text=render(phrases), phrases=phrases, boot=boot)
+
+
+def refusal(*reasons: Phrase) -> Refusal:
+    """Return the error reply to a call that was not carried out."""
+    return Refusal(text=render(reasons), phrases=reasons)
 
 
 def in_language(words: Words, language: Language) -> str:

@@ -106,8 +106,8 @@ class Safety(settings.Section, frozen=True, kw_only=True):
         for name in self.limits.keys() & self.sources.keys():
             if not self.limits[name].latches:  # a driver may only keep an emergency stop alive
                 raise ValueError(
-                    f"limits.{name} has the name of a source: who drives as {name} could lift the "
-                    "limit; choose another name"
+                    f"limits.{name} has the name of a source of motion, whose driver could lift "
+                    "the limit: choose another name"
                 )
         names: dict[int, str] = {}  # by priority
         for name, source in self.sources.items():

@@ -46,7 +46,6 @@ LABELS: dict[str, Words] = {
         "停车请使用车身上的急停开关。下一步：{doctor}",
     ),
     "text.next": ("Next: {doctor}", "下一步：{doctor}"),
-    "text.you": ("You are in control.", "您拥有控制权。"),
     "off.believed": ("RELEASE  believed free: ", "脱离碰撞  推断可脱离："),
     "off.came": (
         " (moved {came:word}; net {travelled:+.2f} m)", "（最近{came:word}，净 {travelled:+.2f} m）",

@@ -160,7 +160,7 @@ def safety(view: View, say: Labels, rows: int, width: int = 200) -> Text:
 def _summary(view: View, state: SafetyState, say: Labels) -> str:
     """Return safety's text; the operator in control is "you"."""
     is_ours = view.may_drive and view.requested is not None  # another terminal has the same name
-    own, you = Phrase("control.of", {"source": view.source}), Phrase("text.you")
+    own, you = Phrase("control.of", {"source": view.source}), Phrase("control.you")
     phrases = [you if is_ours and phrase == own else phrase for phrase in state.phrases]
     return say.render(phrases, state.text)
 

@@ -24,9 +24,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.heartbeat import Heartbeat
-from t2.messages import (
-    SourceMessage,
-)
+from t2.messages import SourceMessage
 
 C = TypeVar("C", bound="Channel")
 

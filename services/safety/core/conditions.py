@@ -114,7 +114,8 @@ def _link(inputs: Inputs) -> Iterator[Observation]:
     # safety. The bridge's own boot means a motion that it braked without a safety service.
     due = link.latched_by not in (None, inputs.boot)
     moved = due and link.latched_by == link.boot
-    yield Observation("predecessor", due, phrases=(Phrase("predecessor.moved"),) * moved)
+    phrases = (Phrase("predecessor.moved"),) if moved else ()
+    yield Observation("predecessor", due, phrases=phrases)
 
 
 def _switches(inputs: Inputs, settings: SafetyConfig) -> Observation:

@@ -31,11 +31,7 @@ from services.safety.config import LimitSource
 from services.safety.core.causes import Observation
 from services.safety.core.channel import Admission, Channel
 from services.safety.core.inputs import LimitRequest
-from t2.messages import (
-    MAX_REASON,
-    LimitState,
-    Phrase,
-)
+from t2.messages import MAX_REASON, LimitEffect, LimitState, Phrase
 
 
 class LimitChannel(Channel, frozen=True, kw_only=True):
@@ -125,9 +121,11 @@ class SpeedLimits(Struct, frozen=True):
         if not self.sources:
             return ()
         valid = dict(self._valid(now_ns))
-        stopping = {name for name, one in valid.items() if one.stops}
-        stopping.update(self._silent(now_ns), self.missing)
         lost = self._lost(now_ns)
+        effects: dict[str, LimitEffect] = {} if slowing is None else {slowing: "slow"}
+        effects |= dict.fromkeys((name for name, one in valid.items() if one.stops), "stop")
+        effects |= dict.fromkeys((*self._silent(now_ns), *self.missing), "stop")
+        effects |= dict.fromkeys(lost, "brake")  # the worst one last
         return tuple(
             LimitState(
                 source=name,
@@ -138,15 +136,7 @@ class SpeedLimits(Struct, frozen=True):
                 lease=source.lease,
                 silence=source.silence,
                 silent=name not in valid or name in lost,
-                effect=(
-                    "brake"
-                    if name in lost
-                    else "stop"
-                    if name in stopping
-                    else "slow"
-                    if name == slowing
-                    else "none"
-                ),
+                effect=effects.get(name, "none"),
             )
             for name, source in self.sources.items()
         )
