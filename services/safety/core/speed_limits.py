@@ -122,7 +122,7 @@ class SpeedLimits(Struct, frozen=True):
             return ()
         valid = dict(self._valid(now_ns))
         lost = self._lost(now_ns)
-        effects: dict[str, LimitEffect] = {} if slowing is None else {slowing: "slow"}
+        effects: dict[str | None, LimitEffect] = {slowing: "slow"}
         effects |= dict.fromkeys((name for name, one in valid.items() if one.stops), "stop")
         effects |= dict.fromkeys((*self._silent(now_ns), *self.missing), "stop")
         effects |= dict.fromkeys(lost, "brake")  # the worst one last

@@ -83,6 +83,13 @@ def test_without_inputs_the_first_samples_are_due() -> None:
             "not_stopping", "two_publishers",
         )
     ]  # fmt: skip
+    (starting,) = (each for each in found if each.present)
+    assert starting.phrases == (
+        Phrase("starting.missing", {"inputs": (
+            "velocity", "ultrasonic", "bumper", "driver_left", "driver_right", "link", "switches",
+            "estop",
+        )}),
+    )  # fmt: skip
 
 
 def bumper(age_s: float = 0.0, **fields: Any) -> dict[str, Any]:
