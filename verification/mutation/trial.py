@@ -22,11 +22,14 @@ from verification.mutation.equivalent import Row
 
 KILLED = 1  # pytest: a test failed
 OUTCOMES = {None: "not run", 0: "survived", 33: "untested", 36: "endless", -24: "endless"}
-COPIED = "cli", "common", "config", "services", "sim", "tests", "verification"
+# The client library lies beside the other packages, as where it is installed.
+SDK = "sdk/"
+COPIED = "sdk/t2", "cli", "common", "config", "services", "sim", "tests", "verification"
 LONGEST_S = 2 * 3600  # timeout of one file, also on a slow host
 SETTINGS = """\
 [mutmut]
 source_paths =
+    t2
     common
     services
     sim
@@ -35,9 +38,12 @@ only_mutate = {file}
 also_copy =
     config
     verification
-# Without conftest the tests do not load zenoh; this profile makes hypothesis deterministic.
+# Without conftest the tests do not load zenoh; this profile makes hypothesis deterministic. The
+# plugin of the client library would import the one that is installed, without mutants.
 pytest_add_cli_args =
     --noconftest
+    -p
+    no:t2
     --hypothesis-profile=ci
     -m
     not campaign
@@ -73,8 +79,10 @@ def run(file: str, tests: Sequence[str], where: Path) -> tuple[int, list[Survivo
     """Return the number of mutants of a file, and the survivors."""
     shutil.rmtree(where, ignore_errors=True)
     for part in COPIED:
-        shutil.copytree(part, where / part, ignore=shutil.ignore_patterns("__pycache__"))
+        to = where / part.removeprefix(SDK)
+        shutil.copytree(part, to, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy("pyproject.toml", where)
+    file = file.removeprefix(SDK)
     settings = SETTINGS.format(file=file, tests="\n    ".join(tests))
     (where / "setup.cfg").write_text(settings, "utf-8")
     with contextlib.chdir(where):

@@ -200,6 +200,7 @@ def test_losing_readiness_takes_the_neutral_and_stops_at_once() -> None:
     assert lost == replace(ARMED, ready=False, neutral=False, sent_ns=leases.AT_ONCE)
     assert on_ready(replace(lost, sent_ns=NOW), True) == replace(NOT_NEUTRAL, sent_ns=NOW)
     assert on_tick(lost, NOW, LEASE, COAST, True)[1] is STOP
+    assert on_tick(lost, NOW, LEASE, 0, False)[1] is STOP  # its lease is valid, so it coasts for 0
     assert on_tick(replace(lost, renewed_ns=0), 0, LEASE, COAST, True)[1] is STOP
     assert obey(on_ready(lost, True), run())[1:] == (STOP, Refusal.NOT_NEUTRAL)
     assert on_ready(ARMED, True) is ARMED
