@@ -1,7 +1,6 @@
 """A simulated vehicle without sockets and clock, and a PC controlled by the test."""
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import msgspec
@@ -40,15 +39,8 @@ WALL_AHEAD = room(walls=[{"points": [[3.0, -5.0], [3.0, 5.0]]}])
 class SimFixture:
     """A simulation, the PC's side of the wire, and all that came of it."""
 
-    def __init__(
-        self,
-        plan: Plan = EMPTY,
-        vehicle: Model | None = None,
-        seed: int = 1,
-        ports: Sequence[int] = PORTS,
-    ) -> None:
-        vehicle = vehicle or model()
-        self.simulation = Simulation(vehicle, plan, START_NS, seed, ports)
+    def __init__(self, plan: Plan = EMPTY, vehicle: Model | None = None) -> None:
+        self.simulation = Simulation(vehicle or model(), plan, START_NS, 1, PORTS)
         self.now_ns = START_NS
         self.datagrams: list[Datagram] = []
         self.records: list[Line] = []

@@ -9,13 +9,11 @@ from common.freshness import NS_PER_S
 from common.motion import Twist
 from common.wire import commands as c
 from common.wire import reports as r
-from common.wire.frame import Frame, Side
 from sim.board import BREAK, STOP, Board, Switch
 from sim.model import Model
 from sim.sonar import Ranges
 
 CLEAR: Ranges = (5000, 5000, 5000, 5000, 5000, 5000, 5000, 5000)
-LED = c.LedSet(3, 1, 8, 2, 3, 4, 5, 6, 7)
 FORWARD = c.MotionCommand(c.MotionKind.RUN, 500)
 BACKWARD = c.MotionCommand(c.MotionKind.RUN, -100)
 TURN = c.MotionCommand(c.MotionKind.RUN, 0, 300)
@@ -39,36 +37,6 @@ def hit(way: float) -> Board:
     return some
 
 
-@pytest.mark.parametrize(
-    ("command", "answer"),
-    [
-        (c.DistanceQuery(), r.DistanceReport(0, 0)),
-        (c.UltrasonicQuery(), r.UltrasonicReport(CLEAR)),
-        (c.BumperQuery(), r.BumperReport(False)),
-        (c.UltrasonicBrakeSet(True), r.UltrasonicBrakeReport(True)),
-        (c.UltrasonicBrakeSet(False), r.UltrasonicBrakeReport(False)),
-        (c.BumperBrakeSet(True), r.BumperBrakeReport(True)),
-        (c.BumperBrakeSet(False), r.BumperBrakeReport(False)),
-        (c.DriverQuery(Side.LEFT), r.DriverReport(Side.LEFT, 0)),
-        (c.DriverQuery(Side.RIGHT), r.DriverReport(Side.RIGHT, 0)),
-        (LED, r.LedReport(True)),
-    ],
-)
-def test_every_query_and_setting_is_answered(command: Frame, answer: Frame) -> None:
-    assert board().answer(command) == answer
-
-
-def test_a_motion_command_is_held_without_an_answer_whatever_is_sensed() -> None:
-    some = board()
-    assert some.drive() == STOP
-    assert some.answer(FORWARD) is None
-    some.sense(Twist(0.25, math.radians(-12)), near(2), pressed=True)
-    assert some.drive() == FORWARD  # both emergency brakes are off at first
-    assert some.velocity() == r.VelocityReport(250, -120)
-    assert some.answer(c.UltrasonicQuery()) == r.UltrasonicReport(near(2))
-    assert some.answer(c.BumperQuery()) == r.BumperReport(True)
-
-
 def test_each_direction_has_its_angular_unit() -> None:
     wire = {"command_angular_unit": "milliradian", "feedback_angular_unit": "decidegree"}
     some = board(wire=wire)
@@ -82,12 +50,8 @@ def test_each_direction_has_its_angular_unit() -> None:
     ("counted", "report"),
     [
         ([(1.5, 30), (-0.25, -45)], (1250, -150)),  # with their signs
-        ([(0.0, 179.9)], (0, 1799)),  # the heading wraps at half a turn
-        ([(0.0, 180.2)], (0, -1798)),
-        ([(0.0, 725.0)], (0, 50)),
-        ([(2147483.647, 0)], (2**31 - 1, 0)),  # the distance wraps at 32 bits
-        ([(2147483.648, 0)], (-(2**31), 0)),
-        ([(-2147483.649, 0)], (2**31 - 1, 0)),
+        ([(0.0, 180.2)], (0, -1798)),  # the heading wraps at half a turn
+        ([(2147483.648, 0)], (-(2**31), 0)),  # the distance wraps at 32 bits
     ],
 )
 def test_counters_add_up_and_wrap(
@@ -111,16 +75,13 @@ def test_wheels_of_another_size_count_another_distance_and_turn() -> None:
     ("command", "rolling", "sonar", "millimetres", "brakes"),
     [
         (FORWARD, 0.0, 1, 100, True),
-        (FORWARD, 0.0, 2, 100, True),
         (FORWARD, 0.0, 3, 100, True),
         (FORWARD, 0.0, 0, 100, False),
-        (FORWARD, 0.0, 6, 100, False),
         (BACKWARD, 0.0, 2, 100, False),
         (BACKWARD, 0.0, 5, 100, True),
         (BACKWARD, 0.0, 7, 100, True),
         (BACKWARD, 0.5, 2, 100, True),  # still rolling the other way
         (STOP, 0.5, 2, 100, True),  # coasting
-        (STOP, 0.0, 2, 100, False),
         (TURN, 0.0, 2, 100, False),
         (FORWARD, 0.0, 2, 0, True),
         (FORWARD, 0.0, 2, 149, True),
@@ -142,14 +103,11 @@ def test_the_sonar_brake_watches_the_direction_of_motion(
 @pytest.mark.parametrize(
     ("way", "command", "brakes"),
     [
-        (0.5, FORWARD, True),
         (0.5, TURN, True),
-        (0.5, STOP, True),
         (0.5, BACKWARD, False),
         (-0.5, BACKWARD, True),
         (-0.5, FORWARD, False),
-        (0.0, FORWARD, True),  # pressed by hand while it had never moved
-        (0.0, BACKWARD, True),
+        (0.0, BACKWARD, True),  # pressed by hand while it had never moved
     ],
 )
 def test_the_bumper_brake_lets_it_only_back_off(
