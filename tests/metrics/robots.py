@@ -30,14 +30,14 @@ def event(name: Any) -> m.Event:
     return m.Event(name=name, level="error", text=name)
 
 
-def whole(at_ns: int = NOW_NS) -> RobotState:
-    """Return a robot whose messages all arrived at that time."""
+def whole() -> RobotState:
+    """Return a robot whose messages have all arrived now."""
     robot = RobotState()
     for name in SERVICES:
-        robot.on_live(name, "a", True, at_ns)
-        robot.on_message(f"tel/{name}/health", health(name), at_ns)
+        robot.on_live(name, "a", True, NOW_NS)
+        robot.on_message(f"tel/{name}/health", health(name), NOW_NS)
     for path, message in {SAFETY: safety(), LINK: link(), ODOMETRY: odometry(angular=-0.2)}.items():
-        robot.on_message(path, message, at_ns)
+        robot.on_message(path, message, NOW_NS)
     return robot
 
 

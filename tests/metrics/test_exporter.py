@@ -1,15 +1,16 @@
-"""The exporter on a real bus, scraped over HTTP."""
+"""The exporter as a process on a real bus, scraped over HTTP."""
 
 import contextlib
-import socket
 import subprocess
 import sys
-from collections.abc import Callable
+import urllib.request
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from prometheus_client.parser import text_string_to_metric_families
 
 from common.cli_args import EXIT_LINK
 from services.metrics import exporter
@@ -19,18 +20,64 @@ from t2 import messages as m
 from t2.keys import Topic
 from tests.cli.inspect.tool import pretend
 from tests.common.bus_fixture import BusFixture, until_received
+from tests.common.conftest import buses
 from tests.factories import health, odometry
-from tests.metrics.robots import event, link, names, safety
-from tests.metrics.scraping import running, scraped, value
-from verification.harness.bus import router_process
+from tests.metrics.robots import Values, event, flat, link, names, safety
+from verification.harness.bus import router_process, set_options
 from verification.harness.ports import free_port
-from verification.harness.waiting import wait_until
+from verification.harness.waiting import PATIENCE_S, wait_until
+
+__all__ = ["buses"]
 
 
-def test_scrape_of_a_running_robot(buses: BusFixture, tmp_path: Path) -> None:
+def scraped(port: int) -> Values:
+    """Scrape with the parser of Prometheus' client."""
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
+        text = answer.read().decode()
+    return flat(list(text_string_to_metric_families(text)))
+
+
+def value(port: int, name: str, /, **labels: str) -> float | None:
+    """Return a sample's value, None when there is no such sample."""
+    return scraped(port).get((name, frozenset(labels.items())))
+
+
+def command(endpoint: str, port: int, *sets: str) -> list[str]:
+    given = set_options(f"bus.connect={endpoint}", f"metrics.port={port}", *sets)
+    return [sys.executable, "-m", "cli", "metrics", *given]
+
+
+@contextlib.contextmanager
+def running(endpoint: str, folder: Path, *sets: str) -> Iterator[int]:
+    """Run the exporter as a process while the context lasts; yield its port."""
+    port = free_port()
+    with (
+        (folder / "metrics.log").open("wb") as log,
+        subprocess.Popen(command(endpoint, port, *sets), stdout=log, stderr=log) as process,
+    ):
+
+        def answers() -> bool:
+            assert process.poll() is None, (folder / "metrics.log").read_text()
+            with contextlib.suppress(OSError):
+                return value(port, "t2_bus_connected") == 1
+            return False
+
+        try:
+            wait_until(answers, "the page", 2 * PATIENCE_S)
+            yield port
+            process.terminate()
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            process.kill()
+
+
+def test_a_running_robot_and_a_second_exporter_on_the_port(
+    buses: BusFixture, tmp_path: Path
+) -> None:
     robot = {"robot": buses.robot}
     with running(buses.endpoint, tmp_path, f"robot.id={buses.robot}") as port:
         assert value(port, "t2_robot_up", **robot) == 0
+        assert value(port, "t2_service_up", service="bridge", **robot) == 0
         pretend(buses, "bridge", {keys.HEALTH: health, keys.LINK: link}, service="bridge")
         told: dict[Topic[Any], Callable[[], m.Message]] = {
             keys.SAFETY: lambda: safety("estop"),
@@ -44,7 +91,11 @@ def test_scrape_of_a_running_robot(buses: BusFixture, tmp_path: Path) -> None:
         assert value(port, "t2_robot_up", **robot) == 1
         assert value(port, "t2_service_up", service="bridge", **robot) == 1
         assert value(port, "t2_safety_latched", name="estop", **robot) == 1
-        assert value(port, "t2_link_rejected", name="crc", **robot) == 3
+        second = subprocess.run(
+            command(buses.endpoint, port), capture_output=True, text=True, timeout=60, check=False
+        )
+        assert second.returncode == EXIT_LINK
+        assert f"metrics cannot listen on 127.0.0.1:{port}" in second.stderr
 
 
 def test_all_robots_of_a_site_are_exported(buses: BusFixture, tmp_path: Path) -> None:
@@ -80,18 +131,6 @@ def test_router_loss_is_exported(tmp_path: Path) -> None:
         with router_process(endpoint):
             wait_until(lambda: value(port, "t2_bus_connected") == 1, "the next router")
             stack.close()
-
-
-def test_a_taken_port_ends_it_with_its_name(buses: BusFixture) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-        words = [f"bus.connect={buses.endpoint}", f"metrics.port={port}"]
-        done = subprocess.run(
-            [sys.executable, "-m", "services.metrics", *(w for t in words for w in ("--set", t))],
-            capture_output=True, text=True, timeout=60, check=False,
-        )  # fmt: skip
-    assert done.returncode == EXIT_LINK
-    assert f"metrics cannot listen on 127.0.0.1:{port}" in done.stderr
 
 
 def test_a_hanging_loop_raises_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
