@@ -86,22 +86,19 @@ def test_replay_publishes_the_original_bytes_without_actuation(
     assert str(came[0].encoding) == whole[0].encoding
 
 
-def test_options(path: Path, tool: Tool) -> None:
+def test_only_the_selected_keys_are_played(path: Path, tool: Tool) -> None:
     for words, played in (("--only @cmd/**", 0), ("--only velocity --only tel/mine", 6)):
         result = tool("replay", str(path), *words.split(), *FAST)
         assert (result.code, result.err) == (int(not played), f"played {played} messages\n")
-    for words in ("--rate 0", "--only //", "--only tel//x"):
-        assert tool("replay", str(path), *words.split()).code == 2
 
 
-@pytest.mark.parametrize("service", ["bridge", "safety"])
-def test_refused_while_bridge_or_safety_run(
-    path: Path, came: list[zenoh.Sample], buses: BusFixture, tool: Tool, service: str
+def test_refused_while_the_bridge_runs(
+    path: Path, came: list[zenoh.Sample], buses: BusFixture, tool: Tool
 ) -> None:
-    pretend(buses, service, {})
+    pretend(buses, "bridge", {})
     result = tool("replay", str(path), *FAST)
     assert result.code == 1
-    assert f"robot {buses.robot} has a running {service}" in result.err
+    assert f"robot {buses.robot} has a running bridge" in result.err
     assert tool("replay", str(path), *FAST, robot="nobody").code == 0
     assert came == []
 

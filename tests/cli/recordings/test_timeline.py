@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from cli.recordings.timeline import Phase, Series, Stream, add_state, downsampled, stops
+from cli.recordings.timeline import Phase, Series, Stop, Stream, add_state, downsampled, stops
 from t2.messages import Cause, Drive, SafetyState, Velocity, Verdict
 from tests import factories
 from tests.cli.recordings.drive_fixture import CONTACT, HIT_S, RESET_S, at, drive, timeline_of
@@ -68,18 +68,14 @@ def test_rate_gaps_and_losses() -> None:
     assert stream.gaps == [pytest.approx(0.08), pytest.approx(0.42)]
 
 
-def test_a_key_without_a_rate_has_no_gaps() -> None:
+def test_events_and_sources_have_no_gaps_and_an_emergency_stop_no_message_to_decode() -> None:
     stream = Stream("t2/v1/001/@cmd/drive/teleop")
     for at_s in (0.0, 9.0):
         stream.add(at_s, Drive(seq=int(at_s) + 1, boot=9, linear=0.0, angular=0.0, echo=1))
     assert (stream.gaps, stream.expected_hz) == ([], 0.0)
-    assert stream.hz == pytest.approx(1 / 9)
-
-
-def test_an_emergency_stop_has_no_message_to_decode() -> None:
-    stream = Stream("t2/v1/001/estop")
-    stream.add(0.0, None)
-    assert (stream.undecoded, stream.hz) == (0, None)
+    stop = Stream("t2/v1/001/estop")
+    stop.add(0.0, None)
+    assert (stop.undecoded, stop.hz) == (0, None)
 
 
 # --- stops --------------------------------------------------------------------------------------
@@ -93,40 +89,34 @@ def made_of(verdict: Verdict, causes: tuple[Cause, ...]) -> SafetyState:
     return factories.safety_state(verdict=verdict, causes=causes)
 
 
-def phases_of(*steps: tuple[float, float, Verdict, tuple[Cause, ...]]) -> list[Phase]:
-    """Return phases from begin, end, verdict and causes."""
-    return [
+Step = tuple[float, float, Verdict, tuple[Cause, ...]]  # begin, end, verdict, causes
+
+
+@pytest.mark.parametrize(
+    ("steps", "found"),
+    [
+        (  # a contact while driving, and a reset
+            [(0, 2, "run", ()), (2, 5, "brake", (CONTACT, IDLE)), (5, 9, "stop", (IDLE,))],
+            [Stop(2, 5, True, "brake", {"contact": CONTACT})],
+        ),
+        (  # consecutive reasons are one stop
+            [(0, 1, "inhibited", (LINK,)), (1, 2, "brake", (CONTACT, LINK)), (2, 3, "run", ())],
+            [Stop(0, 2, False, "inhibited", {"link": LINK, "contact": CONTACT})],
+        ),
+        ([(0, 5, "stop", (IDLE,)), (5, 9, "slow", (SLOWED,))], []),
+        (  # a gap in the state of safety ends a stop
+            [(0, 1, "inhibited", (LINK,)), (4, 5, "inhibited", (LINK,))],
+            [Stop(0, 1, False, "inhibited", {"link": LINK}),
+             Stop(4, 5, False, "inhibited", {"link": LINK})],
+        ),
+    ],
+)  # fmt: skip
+def test_stops_with_their_reasons(steps: list[Step], found: list[Stop]) -> None:
+    phases = [
         Phase(begins_s, ends_s, made_of(verdict, causes))
         for begins_s, ends_s, verdict, causes in steps
     ]
-
-
-def test_a_contact_while_driving_with_a_reset() -> None:
-    (stop,) = stops(
-        phases_of((0, 2, "run", ()), (2, 5, "brake", (CONTACT, IDLE)), (5, 9, "stop", (IDLE,)))
-    )
-    assert (stop.begins_s, stop.ends_s, stop.lasts_s) == (2, 5, 3)
-    assert (stop.was_driving, stop.verdict) == (True, "brake")
-    assert {name: cause.text for name, cause in stop.reasons.items()} == {
-        "contact": "The bumper was hit."
-    }
-
-
-def test_consecutive_reasons_are_one_stop() -> None:
-    (stop,) = stops(
-        phases_of((0, 1, "inhibited", (LINK,)), (1, 2, "brake", (CONTACT, LINK)), (2, 3, "run", ()))
-    )
-    assert list(stop.reasons) == ["link", "contact"]
-    assert (stop.verdict, stop.ends_s, stop.was_driving) == ("inhibited", 2, False)
-
-
-def test_an_idle_vehicle_is_not_a_stop() -> None:
-    assert stops(phases_of((0, 5, "stop", (IDLE,)), (5, 9, "slow", (SLOWED,)))) == []
-
-
-def test_a_gap_in_the_safety_state_ends_a_stop() -> None:
-    first, second = stops(phases_of((0, 1, "inhibited", (LINK,)), (4, 5, "inhibited", (LINK,))))
-    assert (first.ends_s, second.begins_s) == (1, 4)
+    assert stops(phases) == found
 
 
 @pytest.mark.parametrize(
