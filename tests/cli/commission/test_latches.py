@@ -44,8 +44,11 @@ def test_a_complete_test_passes_with_its_times() -> None:
     }
 
 
-def test_a_state_that_overtakes_its_cause_counts_as_zero() -> None:
-    verdict = judge_latch(latch_test()._replace(states=[state(-0.01, "estop")]))
+def test_a_state_that_overtakes_its_cause_and_commands_after_the_reset_pass() -> None:
+    test = latch_test()
+    early, late = [state(-0.01, "estop")], [*test.motions, motion(2.01, Command.STOP)]
+    verdict = judge_latch(test._replace(states=early, motions=late))
+    assert verdict.outcome == "passed"
     assert dict(verdict.data)["latch estop after"] == "0.000 s"
 
 
@@ -66,8 +69,3 @@ def test_missing_parts_are_named(change: dict[str, object], phrase: str) -> None
     assert verdict.outcome == "failed"
     assert verdict.text.startswith("It stays pressed. ")
     assert phrase in verdict.text
-
-
-def test_commands_after_the_reset_are_ignored() -> None:
-    more = [*latch_test().motions, motion(2.01, Command.STOP)]
-    assert judge_latch(latch_test()._replace(motions=more)).outcome == "passed"

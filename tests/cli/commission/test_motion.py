@@ -70,9 +70,8 @@ def both(factor: float, **more: Any) -> Vehicle:
     return Vehicle(counted=factor, measured=factor, **more)
 
 
-@pytest.mark.parametrize("requested", [FORWARD, LEFT])
-def test_a_good_vehicle_passes(requested: Twist) -> None:
-    verdict = judge_motion(Vehicle().run(requested))
+def test_a_good_vehicle_passes() -> None:
+    verdict = judge_motion(Vehicle().run(LEFT))
     assert verdict.outcome == "passed", verdict
     assert dict(verdict.data)["counted / commanded"] == "1.000"
     assert dict(verdict.data)["standstill after"] == "0.22 s"
@@ -86,7 +85,6 @@ COMMAND, FEEDBACK = "set wire.command_angular_unit = ", "set wire.feedback_angul
     [
         (FORWARD, both(1 + RATIO - 0.01), ""),
         (FORWARD, both(1 + RATIO + 0.01), "It goes 1.26 times as fast as commanded."),
-        (FORWARD, both(1 - RATIO - 0.01), "It goes 0.74 times as fast as commanded."),
         (FORWARD, both(0.0), "No motion: neither the velocity nor the di"),
         (FORWARD, Vehicle(counted=0.0), "but the distance does not."),
         (LEFT, Vehicle(counted=0.0), "a gyroscope counts only on the ground."),
@@ -95,11 +93,9 @@ COMMAND, FEEDBACK = "set wire.command_angular_unit = ", "set wire.feedback_angul
         (FORWARD, Vehicle(measured=-1.0), "The measured velocity has the wrong sign"),
         (FORWARD, Vehicle(measured=2.0), "2.00 times the velocity of the counter."),
         (FORWARD, Vehicle(stands_after_s=5.0), "It did not stand within 2 s"),
-        (FORWARD, Vehicle(driven_s=0.8), "did not grant the full speed for long enough"),
         (FORWARD, Vehicle(granted=0.5), "Measured at most 0.05 m/s of 0.10 requested. Safety rep"),
         # The firmware uses one unit for both directions, so its feedback looks correct.
         (LEFT, Vehicle(counted=MRAD), f'{COMMAND}"milliradian"'),
-        (LEFT, Vehicle(counted=1 / MRAD, unit="milliradian"), f'{COMMAND}"decidegree"'),
         (LEFT, Vehicle(counted=3.0), "It goes 3.00 times as fast as commanded."),
         # The counter shows the unit of the feedback.
         (LEFT, Vehicle(measured=1 / MRAD), f'{FEEDBACK}"milliradian"'),

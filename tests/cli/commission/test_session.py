@@ -1,6 +1,5 @@
 """``t2 checkout`` on a real stack whose messages queue up while a question waits for its answer."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -13,14 +12,6 @@ from sim.requests import Bumper
 from tests.cli.processes import PATIENCE_S
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
-
-
-@pytest.fixture
-def stack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunningStack]:
-    # A queue that is full within a second: the real one takes a question of a minute.
-    monkeypatch.setattr(probe, "QUEUE_MAX", 200)
-    with running_stack(tmp_path) as it:
-        yield it
 
 
 def nobody_reads(session: CheckoutSession) -> None:
@@ -39,8 +30,12 @@ def hit(stack: RunningStack) -> None:
     stack.control.do(Bumper(pressed=False))
 
 
-def test_a_hit_during_a_question_is_seen_and_reset(stack: RunningStack) -> None:
-    with checkout_session(stack.config) as session:
+def test_a_hit_during_a_question_is_seen_and_reset_and_ends_a_motion(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A queue that is full within a second: the real one takes a question of a minute.
+    monkeypatch.setattr(probe, "QUEUE_MAX", 200)
+    with running_stack(tmp_path) as stack, checkout_session(stack.config) as session:
         wait_until(lambda: not session.fresh_state().latched, "a healthy vehicle", PATIENCE_S)
         nobody_reads(session)
         hit(stack)
@@ -55,13 +50,7 @@ def test_a_hit_during_a_question_is_seen_and_reset(stack: RunningStack) -> None:
 
         wait_until(is_reset, "a reset", PATIENCE_S)
 
-
-def test_a_hit_before_the_confirmation_of_a_motion_ends_it(
-    stack: RunningStack, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    asked: list[str] = []
-
-    with checkout_session(stack.config) as session:
+        asked: list[str] = []
 
         def prompt(question: str) -> str:
             asked.append(question)
@@ -75,7 +64,7 @@ def test_a_hit_before_the_confirmation_of_a_motion_ends_it(
         monkeypatch.setattr(steps, "prompt", prompt)
         monkeypatch.setattr("cli.commission.session.READY_S", 60.0)
         found = steps.move(FORWARD, session)
-    assert any(PHRASE in question for question in asked)
-    assert found.outcome == "failed"
-    assert "The bumper was hit." in found.text
-    assert stack.last() != "run"
+        assert any(PHRASE in question for question in asked)
+        assert found.outcome == "failed"
+        assert "The bumper was hit." in found.text
+        assert stack.last() != "run"

@@ -19,25 +19,22 @@ from t2.messages import Bumper, Command, Health, Message, Mileage, Motion, Veloc
 from tests.cli.commission.stops_fixture import at, changed, speed_at, streams
 
 
-@pytest.mark.parametrize(("sign", "direction"), [(1, "forward"), (-1, "backward")])
-def test_a_stop_is_measured(sign: int, direction: str) -> None:
-    (stop,), left_out = find_stops(streams(sign=sign), "a.mcap")
+@pytest.mark.parametrize(
+    ("turns", "sign", "direction"),
+    [
+        (False, 1, "forward"),
+        (False, -1, "backward"),
+        (True, 1, "left"),  # across the end of the heading's range
+        (True, -1, "right"),
+    ],
+)
+def test_a_stop_is_measured(turns: bool, sign: int, direction: str) -> None:
+    (stop,), left_out = find_stops(streams(sign=sign, turns=turns), "a.mcap")
     assert not left_out
+    assert stop.axis is (TURNING if turns else DRIVING)
     assert (stop.kind, stop.direction, stop.file) == ("stop", direction, "a.mcap")
-    assert stop.speed == 0.8
-    assert stop.command == (6, 10 * NS_PER_S)
-    assert stop.reaction == pytest.approx(0.1, abs=0.002)
-    assert stop.deceleration == pytest.approx(0.5, abs=0.002)
-    assert stop.distance == pytest.approx(0.8 * 0.1 + 0.64, abs=0.008)
-
-
-@pytest.mark.parametrize(("sign", "direction"), [(1, "left"), (-1, "right")])
-def test_a_stop_of_a_turn_is_measured(sign: int, direction: str) -> None:
-    """Across the end of the heading's range."""
-    (stop,), left_out = find_stops(streams(sign=sign, turns=True))
-    assert not left_out
-    assert (stop.axis, stop.direction, stop.speed) == (TURNING, direction, 0.8)
-    assert stop.twist == Twist(0.0, sign * 0.8)
+    assert (stop.speed, stop.command) == (0.8, (6, 10 * NS_PER_S))
+    assert stop.twist == (Twist(0.0, sign * 0.8) if turns else Twist(sign * 0.8, 0.0))
     assert stop.reaction == pytest.approx(0.1, abs=0.002)
     assert stop.deceleration == pytest.approx(0.5, abs=0.002)
     assert stop.distance == pytest.approx(0.8 * 0.1 + 0.64, abs=0.008)
