@@ -70,17 +70,12 @@ class Integrator:
         for _ in range(TRIES):
             wait_until(lambda: not blocked(self.robot), "a vehicle that may drive")
             start = self.stack.control.truth()
-            errors = self.errors(program, router)
+            process = self.start(program, router)
+            errors = process.communicate(timeout=60)[1]
+            assert process.returncode == bool(errors)
             if not errors and 0.2 < self.driven(start) < 0.6:
                 return
         raise AssertionError(errors or "the vehicle does not drive as it should")
-
-    def errors(self, program: str, router: str = "") -> str:
-        """Run a program to its end; return its error text."""
-        process = self.start(program, router)
-        errors = process.communicate(timeout=60)[1]
-        assert process.returncode == bool(errors)
-        return errors
 
     def driven(self, start: Truth) -> float:
         """Return the distance of the vehicle from where it was, in m."""
