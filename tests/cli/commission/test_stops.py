@@ -57,7 +57,7 @@ def test_the_distance_begins_between_two_counters() -> None:
     for number in range(-15, 8):
         now = number * 0.02 + 0.01
         made.add(at(Velocity(linear=0.8 if now < 0.05 else 0.0, angular=0.0), now))
-    for now, distance in ((-0.03, 1.0), (0.01, 1.032), (0.05, 1.064), (0.09, 1.1), (0.13, 1.2)):
+    for now, distance in ((-0.03, 1.0), (0.01, 1.032), (0.05, 1.066), (0.09, 1.1), (0.13, 1.2)):
         made.add(at(Mileage(distance=distance, heading=0.0, epoch=0), now))
     (stop,), _ = find_stops(made)
     assert stop.file == ""
@@ -103,6 +103,29 @@ def test_a_single_velocity_of_zero_is_no_standstill() -> None:
     glitch = changed(streams(), lambda v, now: replace(v, linear=0.0) if 0.5 < now < 0.52 else v)
     (stop,), _ = find_stops(glitch)
     assert stop.distance > 0.7
+
+
+def test_all_stops_of_a_recording_are_found() -> None:
+    made, second = streams(), streams(sign=-1, begin_s=20.0)
+    made.motions += second.motions
+    made.velocities += second.velocities
+    made.mileages += second.mileages
+    assert [stop.direction for stop in find_stops(made)[0]] == ["forward", "backward"]
+
+
+def test_a_vehicle_may_stand_from_the_first_velocity_after_the_command_on() -> None:
+    made = changed(streams(), lambda v, now: replace(v, linear=0.0) if now > 0 else v)
+    (stop,), _ = find_stops(made)
+    assert stop.speed == 0.8
+
+
+def test_turning_slower_than_standstill_is_not_on_the_slope() -> None:
+    made = changed(
+        streams(speed=0.2, turns=True),
+        lambda v, now: replace(v, angular=0.021) if v.angular < 0.05 else v,
+    )
+    (stop,), _ = find_stops(made)
+    assert stop.deceleration == pytest.approx(0.5, abs=0.002)
 
 
 # --- left out -----------------------------------------------------------------------------------
