@@ -1,38 +1,21 @@
-"""``t2``: help, exit codes, and errors without the extras."""
+"""``t2``: help, unknown commands, and errors without the extras."""
 
-import re
 import subprocess
 import sys
-from argparse import Namespace
-from importlib.metadata import metadata
 from pathlib import Path
 
 import pytest
 
-from cli.__main__ import COMMANDS, main
-from common.cli_args import EXIT_CONFIG, EXIT_LINK
-from common.errors import ConfigError
-from t2.errors import LinkError, T2Error
+from cli.__main__ import main
 from tests.cli.processes import PATIENCE_S
-
-
-def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(["--help"])
-    assert end.value.code == 0
-    shown = capsys.readouterr().out
-    for name in COMMANDS:
-        assert re.search(rf"^  {name}\s", shown, re.MULTILINE), name
-    assert max(map(len, shown.splitlines())) <= 80
 
 
 @pytest.mark.parametrize(
     ("words", "code", "printed"),
     [
-        ("--version", 0, f"t2 {metadata('t2')['Version']}\n"),
+        ("", 0, "\nInspect:\n  doctor "),
         ("fly", 2, "unknown command 'fly'; \"t2 --help\" lists the commands"),
         ("eco safety/state", 2, "unknown command 'eco'; did you mean \"t2 echo\"?"),
-        ("up --nonsense", 2, "t2 up: error: unrecognized arguments: --nonsense"),
         ("--set board.port=1 up", 2, "options follow the command, as in: t2 COMMAND --set"),
     ],
 )
@@ -43,30 +26,6 @@ def test_command_lines(
         main(words.split())
     assert end.value.code == code
     assert printed in "".join(capsys.readouterr())
-
-
-@pytest.mark.parametrize(
-    ("error", "code", "printed"),
-    [
-        (ConfigError("a setting is wrong"), EXIT_CONFIG, "t2 config: a setting is wrong\n"),
-        (LinkError("a port is taken"), EXIT_LINK, "t2 config: a port is taken\n"),
-        (T2Error("something is missing"), 1, "t2 config: something is missing\n"),
-        (KeyboardInterrupt(), 130, ""),  # before the command handles it
-    ],
-)  # fmt: skip
-def test_errors_with_commands_to_paste_and_exit_codes(
-    error: BaseException,
-    code: int,
-    printed: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    def run(_: Namespace) -> int:
-        raise error
-
-    monkeypatch.setattr("cli.settings.run", run)
-    assert main(["config", "--config", "a b.toml", "--set", "x=1"]) == code
-    assert capsys.readouterr().err == printed
 
 
 # The robot's requirements have no extras: only commands that need one may fail, with a message.

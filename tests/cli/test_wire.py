@@ -1,7 +1,6 @@
 """``t2 wire decode``: captures and hex, frames as text, the reasons of invalid runs, errors."""
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -53,17 +52,6 @@ def as_pcap(*packets: bytes, link: int = pcap.DLT_EN10MB, writer: type = pcap.Wr
     return file.getvalue()
 
 
-@pytest.mark.parametrize("text", ["47530800", "0x47, 0x53, 0x08, 0x00", "47:53-08\n00"])
-def test_hex_formats(text: str) -> None:
-    assert datagrams(text) == [("", b"GS\x08\x00")]
-
-
-@pytest.mark.parametrize("text", ["no/such/file", "zz", ""])
-def test_neither_hex_nor_file(text: str) -> None:
-    with pytest.raises(T2Error, match="is neither hex nor a file"):
-        datagrams(text)
-
-
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
@@ -80,33 +68,28 @@ def test_unsuitable_content(content: bytes, reason: str, tmp_path: Path) -> None
         datagrams(str(file))
 
 
-def wrapped(kind: Callable[..., bytes]) -> bytes:
-    return bytes(kind(ethtype=ethernet.ETH_TYPE_IP, data=packet(RUN)))
-
-
 OTHER = packet(b"")
 OTHER.p, OTHER.data = 6, tcp.TCP()
+COOKED = {"ethtype": ethernet.ETH_TYPE_IP, "data": packet(RUN)}  # of `tcpdump -i any`
+MIXED = (
+    bytes(ethernet.Ethernet(type=ethernet.ETH_TYPE_ARP, data=arp.ARP())),
+    bytes(ethernet.Ethernet(type=0x9000, data=b"loop")),
+    on_ethernet(OTHER),
+    on_ethernet(packet(RUN)),
+)
 
 
 @pytest.mark.parametrize(
-    ("content", "found"),
+    ("content", "number"),
     [
-        (as_pcap(on_ethernet(packet(RUN)), writer=pcapng.Writer), [1]),
-        (as_pcap(wrapped(sll.SLL), link=pcap.DLT_LINUX_SLL), [1]),
-        (as_pcap(wrapped(sll2.SLL2), link=pcap.DLT_LINUX_SLL2), [1]),
-        (
-            as_pcap(
-                bytes(ethernet.Ethernet(type=ethernet.ETH_TYPE_ARP, data=arp.ARP())),
-                bytes(ethernet.Ethernet(type=0x9000, data=b"loop")),
-                on_ethernet(OTHER),
-                on_ethernet(packet(RUN)),
-            ),
-            [4],
-        ),
+        (as_pcap(on_ethernet(packet(RUN)), writer=pcapng.Writer), 1),
+        (as_pcap(bytes(sll.SLL(**COOKED)), link=pcap.DLT_LINUX_SLL), 1),
+        (as_pcap(bytes(sll2.SLL2(**COOKED)), link=pcap.DLT_LINUX_SLL2), 1),
+        (as_pcap(*MIXED), 4),
     ],
 )
-def test_the_payload_of_each_udp_packet(content: bytes, found: list[int]) -> None:
-    assert list(from_pcap("trip", content)) == [(f"packet {n} {ENDS}", RUN) for n in found]
+def test_the_payload_of_each_udp_packet(content: bytes, number: int) -> None:
+    assert list(from_pcap("trip", content)) == [(f"packet {number} {ENDS}", RUN)]
 
 
 # --- the command line -----------------------------------------------------------------------
@@ -115,47 +98,43 @@ def test_the_payload_of_each_udp_packet(content: bytes, found: list[int]) -> Non
 def test_decode_prints_one_line_per_frame(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["wire", "decode", (RUN + QUERY).hex()]) == 0
+    assert main(["wire", "decode", f"0x{RUN.hex(':')}, {QUERY.hex('-')}\n"]) == 0
     assert capsys.readouterr().out.splitlines() == [
         "+0    pc    MotionCommand kind=RUN linear_mmps=500 angular_raw=300",
         "+13   pc    DistanceQuery",
     ]
-    assert main(["wire", "decode", (RUN + b"\1\2" + QUERY).hex()]) == 1
-    _, bad, query = capsys.readouterr().out.splitlines()
+    corrupted = DISTANCE[:-1] + bytes([DISTANCE[-1] ^ 1])
+    assert main(["wire", "decode", (RUN + b"\1\2" + QUERY + corrupted).hex()]) == 1
+    _, bad, query, crc = capsys.readouterr().out.splitlines()
     assert bad == "+13   BAD no_magic: does not start with 47 53: 0102"
     assert query == "+15   pc    DistanceQuery"
+    assert "BAD bad_crc: header says 0x" in crc  # and not the wrong size of a query
     file = tmp_path / "trip.pcap"
     file.write_bytes(as_pcap(on_ethernet(packet(VELOCITY + DISTANCE))))
     assert main(["wire", "decode", str(file)]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith(f"packet 1 {ENDS} +0    board Velocity")
     assert "+12   board DistanceReport distance_mm=1234 heading_ddeg=-905" in second
+    for text in ("no/such/file", ""):
+        assert main(["wire", "decode", text]) == 1
+        assert f"t2 wire: {text!r} is neither hex nor a file: " in capsys.readouterr().err
 
 
 # --- frames as text -------------------------------------------------------------------------
 
 
-TEXTS = [
-    (c.DriverQuery(Side.RIGHT), "pc    DriverQuery side=RIGHT"),
-    (r.UltrasonicReport((1, 2, 3, 4, 5, 6, 0xFFFF, 8)),
-     "board UltrasonicReport ranges_mm=1,2,3,4,5,6,65535,8"),
-    (r.BumperBrakeReport(False), "pc or board BumperBrakeSet or BumperBrakeReport on=False"),
-    (r.DriverReport(Side.LEFT, 0x80000011),
-     "board DriverReport side=LEFT fault_bits=0x80000011,over_current,overload,bit_31"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("frame", "text"), TEXTS)
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        (r.UltrasonicReport((1, 2, 3, 4, 5, 6, 0xFFFF, 8)),
+         "board UltrasonicReport ranges_mm=1,2,3,4,5,6,65535,8"),
+        (r.BumperBrakeReport(False), "pc or board BumperBrakeSet or BumperBrakeReport on=False"),
+        (r.DriverReport(Side.LEFT, 0x80000011),
+         "board DriverReport side=LEFT fault_bits=0x80000011,over_current,overload,bit_31"),
+    ],
+)  # fmt: skip
 def test_a_frame_as_text(frame: Frame, text: str) -> None:
     assert [as_text(part) for _, part in parts(framing.pack(frame))] == [text]
-
-
-def test_the_reason_of_the_latest_check() -> None:
-    raw = bytearray(framing.pack(r.DistanceReport(5, 5)))
-    raw[-1] ^= 1
-    ((_, part),) = parts(bytes(raw))
-    assert isinstance(part, Rejected)
-    assert part.reason == "bad_crc"  # and not the wrong size of a query
 
 
 @given(st.lists(st.sampled_from([*COMMANDS, *REPORTS]).map(framing.pack) | st.binary(max_size=9)))
