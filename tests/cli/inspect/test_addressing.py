@@ -13,9 +13,7 @@ from t2 import keys
     [
         ("tel/odom/odometry", "t2/v1/7/tel/odom/odometry"),
         ("odometry", "t2/v1/7/tel/odom/odometry"),
-        ("safety/state", "t2/v1/7/tel/safety/state"),
         ("/safety/health", "t2/v1/7/tel/safety/health"),
-        ("driver/left", "t2/v1/7/tel/bridge/driver/left"),
         ("drive/nav", "t2/v1/7/@cmd/drive/nav"),
         ("bridge/none", "t2/v1/7/bridge/none"),
         ("mine/tel/safety/state", "t2/v1/7/mine/tel/safety/state"),
@@ -30,7 +28,7 @@ def test_whole_key_of_a_typed_key(word: str, key: str) -> None:
     assert expression(word, "7") == key
 
 
-@pytest.mark.parametrize("word", ["", "/", "tel//odom", "tel/a*b", "tel/#", "tel/$*$*"])
+@pytest.mark.parametrize("word", ["", "/", "tel//odom"])
 def test_invalid_keys(word: str) -> None:
     with pytest.raises(argparse.ArgumentTypeError, match="is not a key"):
         parse_key(word)
@@ -39,7 +37,6 @@ def test_invalid_keys(word: str) -> None:
 def test_topic_of_a_key() -> None:
     assert topic_of("t2/v1/7/tel/bridge/driver/left") is keys.DRIVER
     assert topic_of("t2/v1/7/tel/mine/health") is keys.HEALTH
-    assert topic_of("t2/v1/7/@cmd/drive/web") is keys.DRIVE
     assert topic_of("t2/v1/7/tel/mine/x/y") is None
     assert topic_of("t2/v1/7/tel/mine/temperature") is None
     assert topic_of("elsewhere") is None

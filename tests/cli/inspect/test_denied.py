@@ -3,9 +3,8 @@
 Each cell of the table of rights is tried in ``tests/cli/keys/test_rights.py``.
 """
 
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import msgspec
@@ -22,8 +21,9 @@ from common.settings import BusSettings as Where
 from common.source import DriveSource
 from t2 import client as machine
 from t2 import keys
-from t2.errors import T2Error
-from t2.messages import Drive, Event, ResetRequest
+from t2.messages import Drive, Event
+from tests.cli.inspect.tool import FakeSafety
+from tests.common.bus_fixture import BusFixture
 from tests.factories import safety_state
 from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site, connecting
@@ -50,8 +50,6 @@ class OnBoard:
             bus.on_any(keys.DRIVE.on(bus.robot, source=source), lambda _: None)
         bus.on_any(keys.estop_key(bus.robot), self.estops.append)
         bus.subscribe(keys.EVENTS, self.events.append, service="estop")
-        bus.serve(keys.RESET, lambda _, __: None)
-        bus.live(keys.live_key(bus.robot, "safety", "1"))
         self.state = bus.publisher(keys.SAFETY)
 
 
@@ -85,6 +83,8 @@ def made(folder: Path) -> Site:
         site.member("robot", robot, "--address", "127.0.0.1")
     site.member("site", "berlin", "--address", "127.0.0.1")
     site.member("driver", "anna", "--robot", "001")
+    site.member("driver", "planner", "--robot", "001", "--source", "patrol")
+    site.member("device", "lidar", "--robot", "001", "--source", "lidar")
     site.member("viewer", "hall")
     site.member("fleet", "room")
     return site
@@ -104,106 +104,55 @@ def join() -> Iterator[Join]:
         )
 
 
-def test_t2_estop_reports_the_reason_before_the_advice(
-    site: Site,
-    join: Join,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+def declare(bus: Bus) -> None:
+    """Declare what safety does for its sources, and a reset that it never answers."""
+    for topic, source in ((keys.DRIVE, "patrol"), (keys.LIMIT, "lidar")):
+        bus.on_any(topic.on(bus.robot, source=source), lambda _: None)
+    names = ("sources.patrol.priority", "sources.web.priority", "limits.lidar.lease")
+    config = {f"safety.{name}": {"value": 1, "origin": "default"} for name in names}
+    key = keys.info_key(bus.robot, "safety", "config")
+    bus.answer(key, lambda: msgspec.json.encode(config), "application/json")
+    bus.serve(keys.RESET, lambda _, __: None)
+
+
+def test_the_tools_report_what_a_certificate_may_not_do(
+    site: Site, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def stopped(role: str, name: str, robot: str = "001") -> list[str]:
+    def lines(role: str, name: str, *words: str) -> list[str]:
         where = connecting(site.settings(role, name), secured)
         sets = [f"--set=bus.{field}={getattr(where, field)}" for field in CERTIFIED]
-        code = main(["estop", "--robot", robot, *sets, f"--set=bus.connect={secured}"])
-        assert code == 1
-        return capsys.readouterr().err.splitlines()
+        assert main([*words, *sets, f"--set=bus.connect={secured}"]) == 1
+        return "".join(capsys.readouterr()).splitlines()
 
     monkeypatch.setattr(machine, "ESTOP_TICKS", 10)
     monkeypatch.setattr(estop, "ESTOP_WAIT_S", 0.0)
-    with site.router(site.settings("robot", "001")) as (secured, onboard):
-        OnBoard(join, onboard)
-        reason, advice = stopped("viewer", "hall")
+    robot = site.settings("robot", "001")
+    with site.router(robot) as (secured, onboard), BusFixture(onboard) as buses:
+        buses.robot = "001"
+        FakeSafety(buses, declare, obeys=False)
+        reason, advice = lines("viewer", "hall", "estop")
         assert reason.startswith(
             "t2 estop: not allowed: this certificate has no right to stop robot 001 (as it seems: "
         )
         assert "USE THE VEHICLE'S OWN SWITCH, then `t2 doctor --robot 001 --set bus.ca=" in advice
         assert advice.endswith(f" --set bus.connect={secured}`.")
-        (advice,) = stopped("driver", "anna")
+        (advice,) = lines("driver", "anna", "estop")
         assert "does not confirm" in advice
-        (unknown,) = stopped("driver", "anna", "009")
+        (unknown,) = lines("driver", "anna", "estop", "--robot", "009")
         assert "robot 009 is not at this router (seen: 001). If it moves, USE THE" in unknown
-
-
-@contextmanager
-def repeated(call: Callable[[], object]) -> Iterator[None]:
-    """Repeat a call in a thread for the context."""
-    ended = threading.Event()
-
-    def run() -> None:
-        while not ended.wait(0.05):
-            call()
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-
-
-def test_t2_doctor_judges_the_rights_of_its_own_certificate(
-    join: Join, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def rights(role: str, name: str) -> list[str]:
-        where = connecting(site.settings(role, name), secured)
-        sets = [f"--set=bus.{field}={getattr(where, field)}" for field in CERTIFIED]
-        main(["doctor", "--duration", "1", *sets, f"--set=bus.connect={secured}"])
-        lines = capsys.readouterr().out.splitlines()
-        return [line for line in lines if line.startswith("rights")]
-
-    def safety(bus: Bus) -> None:
-        for topic, source in ((keys.DRIVE, "patrol"), (keys.DRIVE, "web"), (keys.LIMIT, "lidar")):
-            bus.on_any(topic.on(bus.robot, source=source), lambda _: None)
-        names = ("sources.patrol.priority", "sources.web.priority", "limits.lidar.lease")
-        config = {f"safety.{name}": {"value": 1, "origin": "default"} for name in names}
-        bus.answer(
-            keys.info_key(bus.robot, "safety", "config"),
-            lambda: msgspec.json.encode(config),
-            "application/json",
-        )
-
-    site = Site(tmp_path / "keys")
-    site.member("robot", "001", "--address", "127.0.0.1")
-    site.member("driver", "planner", "--robot", "001", "--source", "patrol")
-    site.member("device", "lidar", "--robot", "001", "--source", "lidar")
-    site.member("viewer", "hall")
-    with site.router(site.settings("robot", "001")) as (secured, onboard):
-        robot = OnBoard(join, onboard)
-        join(at(onboard), "001", safety)
-        with repeated(lambda: robot.state.put(safety_state(heartbeat=1))):
-            (planner,) = rights("driver", "planner")
-            assert "ok" in planner.split()
-            assert planner.endswith("this laptop may read; drive as patrol")
-            (lidar,) = rights("device", "lidar")
-            assert lidar.endswith("this laptop may read; limit as lidar")
-            (hall,) = rights("viewer", "hall")
-            assert "this laptop may only read; as it seems, not stop" in hall
-
-
-def test_t2_call_reports_why_no_service_answers(site: Site, join: Join) -> None:
-    def reason(role: str, name: str, robot: str = "001") -> str:
-        with (
-            probe(connecting(site.settings(role, name), secured)) as session,
-            pytest.raises(T2Error) as error,
+        (refused,) = lines("viewer", "hall", "call", "safety/reset")
+        assert "this certificate may not call it" in refused
+        (late,) = lines("driver", "anna", "call", "safety/reset")
+        assert "safety does not answer" in late
+        assert "may not call it" not in late
+        for role, name, text in (
+            ("driver", "planner", "this laptop may read; drive as patrol"),
+            ("device", "lidar", "this laptop may read; limit as lidar"),
+            ("viewer", "hall", "only read; as it seems, not stop: use the vehicle's own switch"),
         ):
-            SafetyClient(session, robot).call(keys.RESET, ResetRequest(), timeout_s=0.3)
-        return str(error.value)
-
-    with site.router(site.settings("robot", "001")) as (secured, onboard):
-        OnBoard(join, onboard)
-        assert "this certificate may not call it" in reason("viewer", "hall")
-        assert "safety does not answer" in reason("driver", "anna")
-        assert "safety does not answer" in reason("viewer", "hall", "009")
+            found = lines(role, name, "doctor", "--duration", "1")
+            (rights,) = (line for line in found if line.startswith("rights"))
+            assert rights.endswith(text)
 
 
 def test_members_reach_their_own_robots_through_the_sites_router(site: Site, join: Join) -> None:

@@ -1,7 +1,6 @@
 """``t2 echo`` on a real router with simulated services."""
 
 import json
-import signal
 import subprocess
 import sys
 from functools import partial
@@ -35,30 +34,24 @@ def test_a_message_and_one_field(bridge: Bus, tool: Tool) -> None:
     assert head.startswith("# tel/bridge/bumper  Bumper  seq ")
     assert fields == ["pressed: true", "---"]
     assert tool("echo", "bumper", "--field", "pressed", "--once").out == "true\n"
-    boot = tool("echo", "bumper", "--field", "boot", "--once", text=True)
-    assert boot.out == f"{bridge.boot}\n"
     result = tool("echo", "bumper", "--field", "presed")
     assert (result.code, result.out) == (1, "")
     assert "no field 'presed'; available: seq" in result.err
 
 
 def test_invalid_messages(buses: BusFixture, tool: Tool) -> None:
-    session = buses.session()
-    payloads = [(b"\xc1", "zenoh/bytes"), (b"\x81\xa1a\x01", codec.encoding(Bumper))]
+    session, key = buses.session(), f"t2/v1/{buses.robot}/tel/x"
 
     def put(_: int) -> None:
-        for payload, encoding in payloads:
-            session.put(f"t2/v1/{buses.robot}/tel/x", payload, encoding=encoding)
-        session.delete(f"t2/v1/{buses.robot}/tel/x")
+        session.put(key, b"\x81\xa1a\x01", encoding=codec.encoding(Bumper))
+        session.delete(key)
 
     buses.loop.post(lambda: buses.loop.every(0.1, put))
     lines = tool("echo", "tel/x", "--duration", "0.5").lines
-    assert {(line["type"], json.dumps(line["message"])) for line in lines} == {
-        ("bytes", '"c1"'), ("Bumper", '{"a": 1}'), ("empty", "null"),
-    }  # fmt: skip
-    complaints = {line["type"]: line.get("complaint", "") for line in lines}
-    assert complaints["bytes"] == "not MessagePack"
-    assert "pressed" in complaints["Bumper"]
+    found = {line["type"]: (line["message"], line.get("complaint", "")) for line in lines}
+    value, complaint = found.pop("Bumper")
+    assert (value, found) == ({"a": 1}, {"empty": (None, "")})
+    assert "pressed" in complaint
     shown = tool("echo", "tel/x", "--duration", "0.5", text=True).out
     assert "# invalid: not a Bumper" in shown
 
@@ -85,8 +78,6 @@ def test_earlier_events_are_shown_in_the_readers_language(
 
     buses.bus(publish)
     assert tool("echo", "evt/**", "--once").lines[0]["message"]["text"] == "Bumper."
-    shown = tool("echo", "evt/**", "--once", text=True).out
-    assert "text: The bumper was hit.\n" in shown
     monkeypatch.setenv("T2_LANG", "zh")
     shown = tool("echo", "evt/**", "--once", text=True).out
     assert "text: 防撞条已触发。\n" in shown
@@ -101,14 +92,11 @@ def test_silence(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
         assert f"no message on t2/v1/{tool.robot}/tel/none within 0.3 s; `t2 ls --set" in result.err
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_ends_it_silently(
-    number: signal.Signals, bridge: Bus, buses: BusFixture, tmp_path: Path
-) -> None:
+def test_a_termination_ends_it_silently(bridge: Bus, buses: BusFixture, tmp_path: Path) -> None:
     where = [*sets(f"bus.connect={buses.endpoint}"), "--robot", buses.robot]
     with running(t2("echo", "bumper", "--json", *where), tmp_path / "log") as process:
         wait_until((tmp_path / "log").read_text, "a message", PATIENCE_S)
-        process.send_signal(number)
+        process.terminate()
         assert process.wait(PATIENCE_S) == 0
     assert all(map(json.loads, (tmp_path / "log").read_text().splitlines()))
 

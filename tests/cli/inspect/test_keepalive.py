@@ -4,8 +4,6 @@ import signal
 import subprocess
 import sys
 
-import pytest
-
 from cli.inspect.estop import described
 from common.bus.bus import Arrival, Bus
 from t2 import keys
@@ -30,12 +28,9 @@ class Safety(FakeSafety):
         bus.subscribe(keys.LIMIT, self.received.append, source="*")
 
 
-@pytest.fixture
-def safety(buses: BusFixture) -> Safety:
-    return Safety(buses)
+def test_signs_of_life_enter_and_the_end(buses: BusFixture) -> None:
+    safety = Safety(buses)
 
-
-def test_signs_of_life_enter_and_the_end(buses: BusFixture, safety: Safety) -> None:
     def more() -> None:
         count = len(safety.received)
         wait_until(lambda: len(safety.received) > count + 3, "more signs of life")
@@ -71,7 +66,8 @@ def test_signs_of_life_enter_and_the_end(buses: BusFixture, safety: Safety) -> N
     assert "within 1 s" in out.splitlines()[-1]
 
 
-def test_an_unexpected_name_ends_at_once(tool: Tool, safety: Safety) -> None:
+def test_an_unexpected_name_ends_at_once(buses: BusFixture, tool: Tool) -> None:
+    Safety(buses)
     for name in ("phone", "lidar"):
         result = tool("estop", "--keepalive", name)
         assert result.code == 1

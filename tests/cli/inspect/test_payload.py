@@ -22,9 +22,7 @@ TYPED = codec.encoding(Bumper)
         (b"{", "application/json", Reading("bytes", b"{", "not JSON")),
         (b"caf\xe9", "text/plain", Reading("text", "caf\ufffd")),
         (b"\x81\xa1a\x01", "zenoh/bytes", Reading("msgpack", {"a": 1})),
-        (b"\xc1", "zenoh/bytes", Reading("bytes", b"\xc1", "not MessagePack")),
         (b"\x01", "image/jpeg", Reading("image/jpeg", b"\x01")),
-        (b"\x01", "", Reading("msgpack", 1)),
         (b"go", "zenoh/string", Reading("text", "go")),
         (b"\xc1", TYPED, Reading("bytes", b"\xc1", "not MessagePack")),
         (
@@ -56,19 +54,13 @@ def test_every_payload_is_decoded(payload: bytes, encoding: str) -> None:
 
 
 def test_a_field_by_its_path() -> None:
-    value = {"causes": [{"name": "contact"}], "x": 1}
+    value = {"causes": [{"name": "contact"}], "x": 1, "none": None}
     assert at(value, "causes.0.name") == "contact"
+    # They change from message to message: that is no mistake of the command.
+    assert at(value, "causes.1.name") is at(value, "none.name") is None
     for path in ("z", "causes.x", "causes.-1", "causes.²", "causes.0.z", "x.y"):
         with pytest.raises(MessageError, match="has no field"):
             at(value, path)
-
-
-@pytest.mark.parametrize(
-    "value", [{"causes": []}, {"causes": [{"name": "a"}]}, {"causes": None}, None]
-)
-def test_a_field_of_a_shorter_list_or_of_nothing_is_none(value: object) -> None:
-    """They change from message to message: that is no mistake of the command."""
-    assert at(value, "causes.1.name") is None
 
 
 # --- as text --------------------------------------------------------------------------------------
@@ -77,12 +69,10 @@ def test_a_field_of_a_shorter_list_or_of_nothing_is_none(value: object) -> None:
 @pytest.mark.parametrize(
     ("value", "shown"),
     [
-        ({"x": 1.23456789, "ok": True, "who": None}, "x: 1.23457\nok: true\nwho: null"),
-        ({"a": [1.0, 2.5], "b": [], "d": {}}, "a: [1, 2.5]\nb: []\nd: {}"),
+        ({"a": [1.0, 1.23456789], "b": [], "d": {}}, "a: [1, 1.23457]\nb: []\nd: {}"),
         ({"a": [{"b": {"c": 1}}]}, "a:\n  -\n    b:\n      c: 1"),
-        ("words\x07", "words\\u0007"),
+        ("words\x07\nx: 1", "words\\u0007\\nx: 1"),
         ("", '""'),
-        (b"\x01\xff", "01ff"),
         (bytes(70), f"{'00' * 64}... (70 bytes)"),
     ],
 )

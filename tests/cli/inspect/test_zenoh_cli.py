@@ -1,4 +1,4 @@
-"""zenoh-cli with T2's codec publishes and queries keys, as ``docs/inspect.md`` shows."""
+"""zenoh-cli with T2's codec publishes on a key, as ``docs/inspect.md`` shows."""
 
 import shlex
 import subprocess
@@ -14,28 +14,22 @@ from verification.harness.waiting import wait_until
 PAGE = Path(__file__).parents[3] / "docs" / "inspect.md"
 
 
-def ran(word: str, buses: BusFixture) -> str:
-    """Run the line ``z WORD`` of the page on this bus; return its output."""
-    lines = PAGE.read_text(encoding="utf-8").splitlines()
-    alias = next(line for line in lines if line.startswith("alias z='zenoh "))
-    line = next(line for line in lines if line.startswith(f"z {word} "))
-    words = shlex.split(alias.partition("'")[2].rstrip("'")) + shlex.split(line)[1:]
-    words = [
-        each.replace("tcp/127.0.0.1:7447", buses.endpoint).replace("/001/", f"/{buses.robot}/")
-        for each in words
-    ]
-    words[0] = str(Path(sys.executable).parent / words[0])
-    done = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    return done.stdout
-
-
 def test_put(buses: BusFixture) -> None:
     received: list[bytes] = []
     subscriber = buses.session().declare_subscriber(
         f"t2/v1/{buses.robot}/tel/mine/*", lambda s: received.append(s.payload.to_bytes())
     )
-    ran("put", buses)
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    alias = next(line for line in lines if line.startswith("alias z='zenoh "))
+    line = next(line for line in lines if line.startswith("z put "))
+    line = line.replace("z", alias.partition("'")[2].rstrip("'"), 1)
+    line = line.replace("tcp/127.0.0.1:7447", buses.endpoint).replace("/001/", f"/{buses.robot}/")
+    name, *words = shlex.split(line)
+    done = subprocess.run(
+        [Path(sys.executable).parent / name, *words],
+        capture_output=True, text=True, timeout=PATIENCE_S, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
     wait_until(lambda: received, "the message")
     message = msgpack.unpackb(received[0])
     assert (message["celsius"], message["seq"]) == (21.5, 1)
