@@ -39,8 +39,8 @@ def test_no_member_may_write_motion_commands() -> None:
 
 @pytest.mark.parametrize(
     ("sources", "resets"),
-    [(("nav",), False), (("nav", "ros2"), False), (("nav", "teleop"), True), (("web",), True),
-     (("checkout",), True), ((), False)],
+    [(("nav", "ros2"), False), (("nav", "teleop"), True), (("web",), True), (("checkout",), True),
+     ((), False)],
 )  # fmt: skip
 def test_a_driver_is_limited_to_its_sources(sources: tuple[str, ...], resets: bool) -> None:
     """Of its robots; only an operator's source may reset, each may stop."""
@@ -57,8 +57,7 @@ def test_a_driver_is_limited_to_its_sources(sources: tuple[str, ...], resets: bo
 
 
 def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> None:
-    given = rights(replace(member("device", "lidar", (MINE,)), sources=("lidar",)), ROUTER)
-    assert given == ROLES["device lidar of 001"]
+    given = ROLES["device lidar of 001"]
     assert may(given, "write", LIMIT.on(MINE, source="lidar"))
     for key in (
         *(LIMIT.on(MINE, source=source) for source in ("person", "*")),
@@ -93,13 +92,13 @@ def test_a_member_publishes_as_its_own_services_only(role: str) -> None:
     assert not may(given, "read", f"{keys.VELOCITY.on(MINE)}/@adv/**"), "events alone are kept"
 
 
-@pytest.mark.parametrize("name", ["*", "**", "a/b", "an$*", "@a", "a#", "a?b", "", " "])
-def test_a_name_in_the_list_cannot_leave_its_prefix(tmp_path: Path, name: str) -> None:
+def test_a_name_in_the_list_cannot_leave_its_prefix(tmp_path: Path) -> None:
     file = tmp_path / "members.json"
-    listed = Members(site="berlin", members=(member("driver", "placeholder", (MINE,)),))
-    file.write_bytes(msgspec.json.encode(listed).replace(b'"placeholder"', f'"{name}"'.encode()))
-    with pytest.raises(ConfigError, match="is no list of members"):
-        read(file)
+    for name in ("*", "**", "a/b", "an$*", "@a", "a#", "a?b", "", " "):
+        listed = Members(site="berlin", members=(member("driver", name, (MINE,)),))
+        file.write_bytes(msgspec.json.encode(listed))
+        with pytest.raises(ConfigError, match="is no list of members"):
+            read(file)
 
 
 @pytest.mark.parametrize("robots", [(MINE,), (OTHER,), (MINE, OTHER), ("*",), ()])
@@ -126,12 +125,10 @@ def test_a_robots_router_writes_only_its_own_keys() -> None:
         assert not may(given, "write", topic.on(MINE, **names))
 
 
-@pytest.mark.parametrize("robots", [(MINE,), ("*",), (OTHER,), ()])
-def test_a_ros_computer_has_rights_at_the_routers_of_its_robots_only(
-    robots: tuple[str, ...],
-) -> None:
-    given = rights(member("ros", "laptop", robots), ROUTER)
-    assert given == (ROLES["ros of 001"] if {MINE, "*"} & {*robots} else {})
+def test_a_ros_computer_has_rights_at_the_routers_of_its_robots_only() -> None:
+    for robots in ((MINE,), ("*",), (OTHER,), ()):
+        given = rights(member("ros", "laptop", robots), ROUTER)
+        assert given == (ROLES["ros of 001"] if {MINE, "*"} & {*robots} else {})
 
 
 def test_a_ros_computer_writes_only_keys_of_fixed_length() -> None:
@@ -157,14 +154,12 @@ def test_the_rights_of_a_ros_computer_follow_domain_and_namespace() -> None:
         assert not may(given, "write", f"{key}/{names.wire_type(twist)}/{HASHES[twist]}")
 
 
-def test_a_member_without_rights_at_a_router_has_no_policy() -> None:
-    """Zenoh refuses the whole configuration for one that is empty."""
-    made: dict[str, Any] = access_control([member("ros", "lab", (OTHER,))], ["lo"], ROUTER)
-    assert [subject["id"] for subject in made["subjects"]] == ["onboard"]
-    assert all(policy["rules"] for policy in made["policies"])
-
-
-def test_without_a_trusted_protocol_there_is_no_on_board_subject() -> None:
-    made: dict[str, Any] = access_control([member("viewer")], [], ROUTER)
-    assert [subject["id"] for subject in made["subjects"]] == ["viewer.anna.1"]
-    assert all(rule["id"].startswith("viewer.anna.1 ") for rule in made["rules"])
+def test_zenohs_configuration_has_no_empty_part() -> None:
+    """Zenoh refuses the whole of it for one: of a trusted protocol, or of a member's rights."""
+    members = [member("ros", "lab", (OTHER,)), member("viewer")]
+    for trusted, ids in (["lo"], ["onboard", "viewer.anna.1"]), ([], ["viewer.anna.1"]):
+        made: dict[str, Any] = access_control(members, trusted, ROUTER)
+        assert [subject["id"] for subject in made["subjects"]] == ids
+        assert [policy["subjects"] for policy in made["policies"]] == [[each] for each in ids]
+        assert all(policy["rules"] for policy in made["policies"])
+        assert {rule["id"].split()[0] for rule in made["rules"]} == {*ids}

@@ -27,6 +27,7 @@ KEYS = tuple(CLASSES.values())
 PLAIN = tuple(key for key in KEYS if "*" not in key)  # usable for a queryable or a token
 BLOCK = zenoh.CongestionControl.BLOCK  # no message may be dropped by congestion
 TIMEOUT_S = 2.0
+Came = list[tuple[str, str]]
 # `**` does not match chunks that begin with @.
 EVERY = ("**", "**/@cmd/**", "**/@adv/**", "@ros2_lv/**")
 
@@ -71,41 +72,49 @@ def granted(role: str, verb: Verb, tried: tuple[str, ...] = KEYS) -> set[str]:
     return {key for key in tried if may(ROLES[role], verb, key)}
 
 
-def covers(came: list[tuple[str, str]], sent: str, allowed: set[str]) -> bool:
-    """Return whether everything that is allowed came."""
-    return {key for key, text in came if text == sent} >= allowed
+@pytest.fixture
+def came(sessions: Mapping[str, zenoh.Session]) -> Iterator[Came]:
+    """What comes on board: keys and payloads."""
+    found: Came = []
+    subscribers = [
+        sessions["on board"].declare_subscriber(
+            key, lambda s: found.append((str(s.key_expr), s.payload.to_string()))
+        )
+        for key in EVERY
+    ]
+    yield found
+    for each in subscribers:
+        each.undeclare()
+
+
+def put_until_it_comes(mine: zenoh.Session, key: str, text: str, came: Came) -> None:
+    """Put on a key that is allowed: what was put before it has come, or was denied."""
+
+    def passed() -> bool:
+        mine.put(key, text, congestion_control=BLOCK)
+        return (key, text) in came
+
+    wait_until(passed, text)
+
+
+def with_text(came: Came, text: str) -> set[str]:
+    return {key for key, each in came if each == text}
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_write(sessions: Mapping[str, zenoh.Session], role: str) -> None:
-    came: list[tuple[str, str]] = []
-
-    def receive(sample: zenoh.Sample) -> None:
-        came.append((str(sample.key_expr), sample.payload.to_string()))
-
-    subscribers = [sessions["on board"].declare_subscriber(key, receive) for key in EVERY]
-    mine, marker = sessions[role], next(iter(sorted(granted(role, "write"))))
-
-    def passed() -> bool:
-        mine.put(marker, "ping", congestion_control=BLOCK)
-        return bool(came)
-
-    wait_until(passed, "the subscribers on board")
-    for kind in ("put", "delete"):
-        came.clear()
-        for key in KEYS:
-            if kind == "put":
-                mine.put(key, role, congestion_control=BLOCK)
-            else:
-                mine.delete(key, congestion_control=BLOCK)
-        mine.put(marker, "end", congestion_control=BLOCK)
-        wait_until(lambda: (marker, "end") in came, "the last put")
-        # Each subscriber has a thread of its own: the last put may overtake the others there.
-        sent = role if kind == "put" else ""
-        wait_until(partial(covers, came, sent, granted(role, "write")), f"each allowed {kind}")
-        assert {key for key, text in came if text == sent} == granted(role, "write"), kind
-    for each in subscribers:
-        each.undeclare()
+def test_write(sessions: Mapping[str, zenoh.Session], came: Came, role: str) -> None:
+    mine, expected = sessions[role], granted(role, "write")
+    put_until_it_comes(mine, min(expected), "begin", came)
+    for key in KEYS:
+        mine.put(key, role, congestion_control=BLOCK)
+    put_until_it_comes(mine, min(expected), "end of puts", came)
+    for key in KEYS:
+        mine.delete(key, congestion_control=BLOCK)
+    put_until_it_comes(mine, min(expected), "end of deletes", came)
+    # Each subscriber has a thread of its own: the last put may overtake the others there.
+    wait_until(lambda: with_text(came, role) >= expected, "each allowed put")
+    wait_until(lambda: with_text(came, "") >= expected, "each allowed deletion")
+    assert with_text(came, role) == with_text(came, "") == expected
 
 
 @pytest.mark.parametrize("role", ROLES)
@@ -141,7 +150,7 @@ def test_read(sessions: Mapping[str, zenoh.Session], role: str) -> None:
 def test_calls(sessions: Mapping[str, zenoh.Session], role: str, verb: Verb) -> None:
     onboard, mine = sessions["on board"], sessions[role]
     client, server = (mine, onboard) if verb == "ask" else (onboard, mine)
-    served = [server.declare_queryable(key, answer) for key in PLAIN]
+    served = [server.declare_queryable(key, partial(answer, key)) for key in PLAIN]
     expected = granted(role, verb, PLAIN)
     wait_until(lambda: asked(client, PLAIN) >= expected, "all that is allowed")
     assert asked(client, PLAIN) == expected
@@ -160,8 +169,8 @@ def test_live(sessions: Mapping[str, zenoh.Session], role: str) -> None:
         token.undeclare()
 
 
-def answer(query: zenoh.Query) -> None:
-    query.reply(query.key_expr, b"yes")
+def answer(key: str, query: zenoh.Query) -> None:
+    query.reply(key, b"yes")
     query.drop()
 
 
@@ -223,13 +232,12 @@ def test_late_subscribers_get_cached_events(
 # --- a member's own keys --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("reader", ["on board", "viewer", "fleet"])
 def test_a_declared_publisher_of_own_keys_is_read_by_all(
-    sessions: Mapping[str, zenoh.Session], reader: str
+    sessions: Mapping[str, zenoh.Session],
 ) -> None:
     key = f"{keys.app_key(MINE, 'nav')}/route/state"
     came: list[str] = []
-    subscribed = sessions[reader].declare_subscriber(
+    subscribed = sessions["viewer"].declare_subscriber(
         f"{keys.ROOT}/{MINE}/**", lambda s: came.append(s.payload.to_string())
     )
     published: Any = sessions["driver of 001 as nav"].declare_publisher(
@@ -247,63 +255,41 @@ def test_a_declared_publisher_of_own_keys_is_read_by_all(
 def test_a_query_of_all_reaches_the_own_keys_of_each(
     sessions: Mapping[str, zenoh.Session],
 ) -> None:
-    at = {f"{keys.app_key(MINE, name)}/plan": name for name in ("nav", "hall")}
-    roles = {"nav": "driver of 001 as nav", "hall": "viewer"}
-    served = [
-        sessions[roles[name]].declare_queryable(key, partial(answer_as, key))
-        for key, name in at.items()
-    ]
-    every = f"{keys.app_key(MINE, '*')}/**"
+    served = {}
+    for name, role in (("nav", "driver of 001 as nav"), ("hall", "viewer")):
+        key = f"{keys.app_key(MINE, name)}/plan"
+        served[key] = sessions[role].declare_queryable(key, partial(answer, key))
+    every = (f"{keys.app_key(MINE, '*')}/**",)
+
+    def both(reader: str) -> bool:
+        return asked(sessions[reader], every) == served.keys()
+
     for reader in ("on board", "driver of 001"):
-        wait_until(partial(answered_by, sessions[reader], every, set(at)), f"both, at {reader}")
-    for each in served:
+        wait_until(partial(both, reader), f"both, at {reader}")
+    for each in served.values():
         each.undeclare()
 
 
-@pytest.mark.parametrize(
-    "key",
-    [
-        "t2/v1/*/app/**",
-        "t2/v1/**",
-        "t2/v1/001/app/**",
-        "t2/v1/001/app/*/route",
-        "t2/v1/001/app/n$*/route",
-        "t2/v1/001/app/nav/**",
-        "t2/v1/*/app/nav/route",
-        "t2/v1/001/app/nav2/route",
-        "t2/v1/001/app/nav/@cmd/route",
-        "t2/v1/001/app/nav/1/2/3/4/5/6/7",
-    ],
+FOREIGN = (
+    "t2/v1/*/app/**",
+    "t2/v1/**",
+    "t2/v1/001/app/**",
+    "t2/v1/001/app/*/route",
+    "t2/v1/001/app/n$*/route",
+    "t2/v1/001/app/nav/**",
+    "t2/v1/*/app/nav/route",
+    "t2/v1/001/app/nav2/route",
+    "t2/v1/001/app/nav/@cmd/route",
+    "t2/v1/001/app/nav/1/2/3/4/5/6/7",
 )
-def test_own_keys_are_no_way_to_other_keys(sessions: Mapping[str, zenoh.Session], key: str) -> None:
-    came: list[tuple[str, str]] = []
-    subscribed = [
-        sessions["on board"].declare_subscriber(
-            each, lambda s: came.append((str(s.key_expr), s.payload.to_string()))
-        )
-        for each in EVERY
-    ]
-    marker = keys.app_key(MINE, "nav")
-    mine = sessions["driver of 001 as nav"]
-
-    def passed() -> bool:
-        mine.put(marker, "ping", congestion_control=BLOCK)
-        return bool(came)
-
-    wait_until(passed, "the subscribers on board")
-    mine.put(key, "foreign", congestion_control=BLOCK)
-    mine.put(marker, "end", congestion_control=BLOCK)
-    wait_until(lambda: (marker, "end") in came, "the last put")
-    assert not [each for each in came if each[1] == "foreign"]
-    for each in subscribed:
-        each.undeclare()
 
 
-def answer_as(key: str, query: zenoh.Query) -> None:
-    query.reply(key, b"yes")
-    query.drop()
-
-
-def answered_by(session: zenoh.Session, selector: str, wanted: set[str]) -> bool:
-    replies = session.get(selector, timeout=TIMEOUT_S)
-    return {str(reply.ok.key_expr) for reply in replies if reply.ok} >= wanted
+def test_own_keys_are_no_way_to_other_keys(
+    sessions: Mapping[str, zenoh.Session], came: Came
+) -> None:
+    mine, own = sessions["driver of 001 as nav"], keys.app_key(MINE, "nav")
+    put_until_it_comes(mine, own, "begin", came)
+    for key in FOREIGN:
+        mine.put(key, "foreign", congestion_control=BLOCK)
+    put_until_it_comes(mine, own, "end", came)
+    assert not with_text(came, "foreign")

@@ -20,10 +20,6 @@ ROBOT = profile("robot", "001")
 DRIVER = profile("driver", "anna", ("001",))
 
 
-def no_passphrase() -> bytes:
-    raise AssertionError("no passphrase expected")
-
-
 @pytest.fixture
 def folder(tmp_path: Path) -> Folder:
     with locked(tmp_path / "keys", create=True) as made:
@@ -34,7 +30,7 @@ def folder(tmp_path: Path) -> Folder:
 
 
 def create_machine(folder: Folder, who: Profile, *, settings: bool = True) -> Path:
-    issued = folder.authority(no_passphrase).issue(who, SPAN)
+    issued = folder.authority(bytes).issue(who, SPAN)
     listed = Members(site="berlin", members=(*folder.read().members, issued.member))
     target = folder.write_machine(issued, listed, settings=settings)
     folder.write(listed)
