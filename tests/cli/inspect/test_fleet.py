@@ -197,6 +197,7 @@ def test_silent_robots_are_listed(join: Join, t2: Tool, monkeypatch: pytest.Monk
     assert result.code == 1
     verdicts = {line["robot"]: line["verdict"] for line in result.lines}
     assert verdicts == {"a": "silent", "b": "no safety", "c": "no safety"}
+    assert t2("robots", robot="b").code == 1
     for command, words in (
         ("robots", ("--site", "nowhere")),
         ("estop", ("--site", "nowhere")),
