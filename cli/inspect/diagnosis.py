@@ -189,6 +189,9 @@ def board(seen: Observation) -> Iterator[Finding]:
     if now.state != "up":
         yield found("streams", "unknown", "streams.no_board")
         return
+    if not now.armed and not _is_unarmed(seen.state):
+        why = Phrase(f"{PREFIX}link.not_armed"), *said(now.waiting_phrases, now.waiting)
+        yield Finding("link", "note", "link.not_armed", why)
     yield from streams(seen)
 
 
@@ -223,9 +226,11 @@ def link(now: Link, before: Link) -> Iterator[Finding]:
         yield found("link", "ok", "link.up", board=now.board)
     else:
         yield found("link", "ok", "link.answers", board=now.board, ms=now.round_trip * 1000)
-    if not now.armed:
-        why = Phrase(f"{PREFIX}link.not_armed"), *said(now.waiting_phrases, now.waiting)
-        yield Finding("link", "note", "link.not_armed", why)
+
+
+def _is_unarmed(state: SafetyState | None) -> bool:
+    """Return whether safety gives the reason why the bridge is not armed."""
+    return state is not None and any(cause.name == "unarmed" for cause in state.causes)
 
 
 def streams(seen: Observation) -> Iterator[Finding]:

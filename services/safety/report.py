@@ -8,9 +8,10 @@ from msgspec import Struct
 from common.freshness import NS_PER_S
 from common.motion import RUN, Twist
 from services.safety.core.causes import BARRING, BY_NAME, GOOD_SAMPLES, latched, ordered
-from services.safety.core.operator_requests import BUMPER_FREE, BY_HAND, room, spent
 from services.safety.core.policy import Policy
-from services.safety.core.sonars import UNSEEN, Sonar
+from services.safety.core.release_requests import BUMPER_FREE, BY_HAND, room, spent
+from services.safety.core.sonar import Sonar
+from services.safety.core.sonars import UNSEEN
 from services.safety.core.state import State
 from t2.messages import (
     SONAR_NAMES,

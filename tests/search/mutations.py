@@ -23,7 +23,7 @@ from services.bridge.core import lease as leases
 from services.bridge.core.lease import Lease
 from services.ros2 import command
 from services.safety.config import LimitSource, Safety, SafetyConfig
-from services.safety.core import arbiter, causes, conditions, operator_requests, planning
+from services.safety.core import arbiter, causes, conditions, planning, release_requests
 from services.safety.core.arbiter import Arbiter
 from services.safety.core.causes import Held, Observation
 from services.safety.core.inputs import Inputs
@@ -409,7 +409,7 @@ MUTATIONS: dict[str, Mutation] = {
         timed(SafetyConfig, max_echo_age=10.0), (*STUCK, late_releases), "no fresh request",
     ),
     "a release needs no neutral request": (
-        (operator_requests, "_not_let_go", lambda *_: ""), (held_before,), "was not neutral",
+        (release_requests, "_not_let_go", lambda *_: ""), (held_before,), "was not neutral",
     ),
     "a program may release": (
         (Safety, "operators", frozenset({"teleop", "nav"})), (*STUCK, program_releases),

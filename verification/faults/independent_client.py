@@ -72,15 +72,9 @@ class Client:
         self.bus.put(f"{ROOT}/{key}", payload)
         return time.monotonic()
 
-    def call(self, name: str, request: Map) -> str:
-        """Make a call; return the refusal, empty when it was done."""
-        payload = msgpack.packb(request)
-        for reply in self.bus.get(f"{ROOT}/srv/{name}", payload=payload, timeout=2.0):
-            if reply.ok is not None:
-                return ""
-            if reply.err is not None:
-                return reply.err.payload.to_bytes().decode()
-        return "no answer"
+    def call(self, name: str, request: Map) -> None:
+        """Make a call, and wait for the end of its answers."""
+        list(self.bus.get(f"{ROOT}/srv/{name}", payload=msgpack.packb(request), timeout=2.0))
 
     def reset_request(self) -> Map:
         """Return a reset of all that is latched now."""

@@ -67,9 +67,9 @@ class Arbiter(Struct, frozen=True):
         The vehicle has come to rest meanwhile, or the program was suspended. A gap in which the
         vehicle never stood changes nothing, or each stall of the host would end a program.
         """
-        if channel.received_ns is None or channel.is_fresh(received_ns, lease_s):
+        if channel.lease_ns is None or channel.is_fresh(received_ns, lease_s):
             return False
-        over_ns = channel.received_ns + lease_s * NS_PER_S
+        over_ns = channel.lease_ns + lease_s * NS_PER_S
         return self.rested_ns > over_ns or not channel.is_fresh(received_ns, lease_s + LAPSE_S)
 
     def at_rest(self, now_ns: int) -> "Arbiter":

@@ -7,7 +7,7 @@ held from the observation that raises it until it clears by its own rule:
 clears     when
 ========== ===================================================================================
 RESET      an operator's reset, once 3 samples do not show the cause, the vehicle stands and no
-           source requests motion; then a neutral request (one exception: ``operator_requests.py``)
+           source requests motion; then a neutral request (one exception: ``release_requests.py``)
 SETTLED    by itself 0.5 s after the last observation; then a neutral request
 NEUTRAL    by itself with the first observation without it; then a neutral request
 AT_ONCE    by itself with the first observation without it (the observer has the hysteresis)

@@ -11,9 +11,10 @@ second_publisher another ``boot`` while the lease of the first one lives; also s
 seq_not_rising   a repeated or an older number, until the last message is older than ``max_age_ns``
 ================ =============================================================================
 
-A lease counts from the reception of a message, so time in the queue is part of it. After
-``max_age_ns`` a number that does not rise belongs to a copy of the publisher, such as a fork or a
-restored snapshot: all earlier messages echo a heartbeat that is too old by then.
+A lease counts from the reception of a message, so time in the queue is part of it; that of a
+keepalive counts from the heartbeat that it echoes. After ``max_age_ns`` a number that does not rise
+belongs to a copy of the publisher, such as a fork or a restored snapshot: all earlier messages echo
+a heartbeat that is too old by then.
 """
 
 from collections.abc import Container
@@ -36,16 +37,16 @@ class Channel(Struct, frozen=True, kw_only=True):
 
     boot: int | None = None
     seq: int = 0
-    received_ns: int | None = None  # of the last accepted message
+    lease_ns: int | None = None  # from when the lease of the last accepted message counts
     conflict_ns: int | None = None  # when a second publisher last sent a message
 
     def is_fresh(self, now_ns: int, lease_s: float) -> bool:
         """Return whether the lease of the last message still lives."""
-        return self.received_ns is not None and now_ns - self.received_ns <= lease_s * NS_PER_S
+        return self.lease_ns is not None and now_ns - self.lease_ns <= lease_s * NS_PER_S
 
     def age_s(self, now_ns: int) -> float | None:
         """Return the age of the last message in seconds; None without one."""
-        return None if self.received_ns is None else (now_ns - self.received_ns) / NS_PER_S
+        return None if self.lease_ns is None else (now_ns - self.lease_ns) / NS_PER_S
 
     def in_conflict(self, now_ns: int, lease_s: float = 0.0) -> bool:
         """Return whether two publishers were active within ``CONFLICT_NS``, or a longer lease."""
@@ -66,7 +67,7 @@ class Channel(Struct, frozen=True, kw_only=True):
         elif not rises and self.is_fresh(received_ns, max_age_ns / NS_PER_S):
             return self, "seq_not_rising"
         channel = self if rises else type(self)(boot=message.boot, conflict_ns=self.conflict_ns)
-        return replace(channel, seq=message.seq, received_ns=received_ns), ""
+        return replace(channel, seq=message.seq, lease_ns=received_ns), ""
 
 
 class Admission(Struct, frozen=True):

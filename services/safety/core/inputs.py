@@ -67,6 +67,11 @@ class Inputs(Struct, frozen=True):
         return self.measured if fresh(self.velocity, now_ns, age_s) else None
 
     @property
+    def is_pressed(self) -> bool:
+        """Whether the newest bumper sample is a pressed one."""
+        return self.bumper is not None and self.bumper.value.pressed
+
+    @property
     def measured(self) -> Latest[Twist] | None:
         """The newest measured velocity of any age."""
         if self.velocity is None:

@@ -7,8 +7,9 @@ with it:
 1. sense     update sonars, runaway, standstill and the travel of a release
 2. observe   observe every cause that does not depend on a request (``conditions.py``); while one
              bars motion, a neutral request is due (``Arbiter.barred``)
-3. handle    carry out a reset (``operator_requests.py``)
+3. handle    carry out a reset (``resets.py``)
 4. arm       note which sources are overruled; begin, continue or end a release
+             (``release_requests.py``)
 5. conclude  plan the requested motion (``planning.py``), then apply the worst action
              (``causes.py``)
 
@@ -40,8 +41,9 @@ from services.safety.core.channel import Admission
 from services.safety.core.conditions import observe_inputs
 from services.safety.core.inputs import DriveRequest, Inputs, SourceRequest
 from services.safety.core.motion_watch import Supervisor
-from services.safety.core.operator_requests import answered, carry_out
 from services.safety.core.planning import Plan, Planner, observations
+from services.safety.core.release_requests import answered
+from services.safety.core.resets import carry_out
 from services.safety.core.sonars import SonarFilter
 from services.safety.core.speed_limits import SpeedLimits
 from services.safety.core.state import State, Verdict
@@ -109,8 +111,7 @@ class Policy:
 
     def brake_for_hit(self, state: State, inputs: Inputs) -> Motion | None:
         """Return BRAKE for a new contact, before the decision that latches it; None without one."""
-        bumper = inputs.bumper
-        if bumper is None or not bumper.value.pressed or "contact" in state.latches:
+        if not inputs.is_pressed or "contact" in state.latches:
             return None
         hit = Verdict(command=BRAKE, judged=_judged(inputs))
         return _motion(hit, inputs, state.estop, is_latched=True)

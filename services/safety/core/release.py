@@ -28,9 +28,8 @@ from common.standstill import comparable
 from services.safety.core.causes import Held
 from t2.messages import Direction, Mileage, Phrases
 
-COAST_NS = (
-    NS_PER_S // 2
-)  # after the last motion; a press and counted travel still belong to the release
+# After the last motion: a press and counted travel still belong to the release.
+COAST_NS = NS_PER_S // 2
 SIGN: dict[Direction, float] = {"forward": 1.0, "backward": -1.0}
 STEP_M = 0.005  # smaller changes are resolution or noise of the counter
 LEG_M = 0.05  # a shorter motion may be a rebound

@@ -81,7 +81,7 @@ class SpeedLimits(Struct, frozen=True):
             if source.latches:
                 if before.boot is not None and not before.is_fresh(now_ns, lease_s):
                     channel = replace(channel, conflict_ns=now_ns)
-                channel = replace(channel, received_ns=admission.sent_ns(limit))
+                channel = replace(channel, lease_ns=admission.sent_ns(limit))
         return replace(self, channels={**self.channels, name: channel}), refused
 
     def limited(self, twist: Twist, now_ns: int) -> tuple[Twist, str | None]:

@@ -131,6 +131,8 @@ REJECTED = [
         ({"links": REJECTED}, [
             ("note", "the bridge rejects frames of the board: 5 bad_crc", remedy("frames")),
             ("wrong", "the system failed to send 3 datagrams to the board", remedy("unsent"))]),
+        ({"links": [link(armed=False)], "state": state("unarmed")},
+         [("wrong", "The bridge is not armed yet. (stop)", of_cause("unarmed"))]),
         ({"links": [relay("never", version="")]},
          [("wrong", "no report of the relay received", remedy("relay"))]),
         ({"links": [relay(braking="silent")]},

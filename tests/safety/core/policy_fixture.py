@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from services.safety.config import SafetyConfig
-from services.safety.core import operator_requests
+from services.safety.core import release_requests
 from services.safety.core.causes import latched
 from services.safety.core.inputs import (
     DriveRequest,
@@ -56,8 +56,8 @@ USED_UP_TEXT = "The distance for moving off is used up. Push the vehicle off by 
 DIRECTIONS: tuple[Direction, ...] = ("forward", "backward")
 NO_ECHO: tuple[RangeStatus, ...] = ("no_echo",) * 8
 
-LET_GO = render(operator_requests.LET_GO)
-BUMPER_FREE = render(operator_requests.BUMPER_FREE)
+LET_GO = render(release_requests.LET_GO)
+BUMPER_FREE = render(release_requests.BUMPER_FREE)
 
 
 class PolicyFixture:

@@ -176,7 +176,7 @@ def stands(**fields: Any) -> dict[str, Any]:
 
 
 LATE = {"phase": Phase.STOPPING, "due_ns": NOW_NS - 1}
-TWICE: dict[str, Any] = {"boot": 1, "seq": 1, "received_ns": NOW_NS, "conflict_ns": NOW_NS}
+TWICE: dict[str, Any] = {"boot": 1, "seq": 1, "lease_ns": NOW_NS, "conflict_ns": NOW_NS}
 STALLED = "Safety was stalled: an emergency stop may have been missed."
 PENDANT = LimitSource(lease=1.0, silence="latch")
 # States that differ from the first one, likewise.

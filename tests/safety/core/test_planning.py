@@ -20,7 +20,8 @@ from services.safety.core.planning import (
     zones,
 )
 from services.safety.core.policy import Policy
-from services.safety.core.sonars import Sonar, SonarArray
+from services.safety.core.sonar import Sonar
+from services.safety.core.sonars import SonarArray
 from services.safety.core.state import State, Verdict
 from t2.messages import SONAR_NAMES
 

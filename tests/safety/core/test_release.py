@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from services.safety.core.causes import latched
-from services.safety.core.operator_requests import room
+from services.safety.core.release_requests import room
 from t2.catalogue import CAUSES
 from t2.messages import Direction, ReleaseRequest
 from t2.words import render

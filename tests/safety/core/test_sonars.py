@@ -9,17 +9,8 @@ from hypothesis import strategies as st
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
 from common.settings import Place, Vehicle
-from services.safety.core.sonars import (
-    SHOWN_NS,
-    Moved,
-    Sonar,
-    SonarArray,
-    SonarFilter,
-    SonarOverrides,
-    axes,
-    trusted,
-    updated,
-)
+from services.safety.core.sonar import Moved, Sonar, trusted, updated
+from services.safety.core.sonars import SHOWN_NS, SonarArray, SonarFilter, SonarOverrides, axes
 from services.safety.report import _doubts
 from t2.messages import SONAR_NAMES, RangeStatus, Ultrasonic
 from t2.words import render

@@ -183,7 +183,7 @@ class Publishers(RuleBasedStateMachine):
     def the_channel_is_that_of_its_owner(self) -> None:
         if self.owner is None:
             return
-        assert (self.channel.boot, self.channel.seq, self.channel.received_ns) == self.owner
+        assert (self.channel.boot, self.channel.seq, self.channel.lease_ns) == self.owner
         is_fresh = self.now_ns - self.owner[2] <= TELEOP_NS
         assert self.channel.is_fresh(self.now_ns, TELEOP_NS / NS_PER_S) is is_fresh
         since_ns = self.conflict_ns
@@ -334,7 +334,7 @@ def test_states_of_limits() -> None:
     assert limit(LIMITS, 0.0)[0].states("lidar", 0)[0].effect == "stop"
     assert SpeedLimits({}).states(None, 0) == ()
     assert LimitChannel() == LimitChannel(linear=math.inf, angular=math.inf, reason="")
-    assert LimitChannel(received_ns=3 * NS_PER_S).age_s(4_500 * MS) == 1.5
+    assert LimitChannel(lease_ns=3 * NS_PER_S).age_s(4_500 * MS) == 1.5
 
 
 CAPS, SPEEDS = st.none() | st.floats(0, 3), st.floats(-2, 2)
