@@ -227,7 +227,7 @@ class Board(Section, frozen=True, kw_only=True):
     any_source_port: Annotated[bool, allowed(safe=(False, False))] = False
     # UDP port at ``address`` that a relay reports from, 4010; 0: no relay (docs/relay.md).
     relay_port: Annotated[int, Meta(ge=0, le=65535)] = 0
-    # it must echo that its own emergency brakes are on, before anything drives
+    # it must confirm that its own emergency brakes are on, before anything drives
     require_switches: Annotated[bool, allowed(safe=(True, True))] = True
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from common.wire.frame import Frame
 from sim.faults import Datagram
 from sim.model import Firmware, Where
 
-ECHOES = (r.UltrasonicBrakeReport, r.BumperBrakeReport)
+CONFIRMATIONS = (r.UltrasonicBrakeReport, r.BumperBrakeReport)
 
 
 class Output:
@@ -36,7 +36,7 @@ class Output:
 
     def answer(self, frame: Frame, asked: int) -> list[Datagram]:
         """Return the datagrams of an answer to a query from this port; none for one held back."""
-        if isinstance(frame, ECHOES) and not self.firmware.echoes:
+        if isinstance(frame, CONFIRMATIONS) and not self.firmware.confirms:
             return []
         where = self.firmware.answers
         if isinstance(frame, r.BumperReport) and frame.on:

@@ -97,7 +97,7 @@ class Firmware(Section, frozen=True, kw_only=True):
 
     answers: Where = "asked"  # where answers go: to the port that asked, by default
     hits: Where | None = None  # where reports of a pressed bumper go; None: as all answers
-    echoes: bool = True  # whether it echoes its emergency brake switches
+    confirms: bool = True  # whether it confirms its emergency brake switches
     ignores: tuple[Command, ...] = ()  # motion commands that it does not obey
     # s without a motion command until the board does STOP by itself; 0: never
     watchdog: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0

@@ -33,7 +33,7 @@ def judge_link(links: Sequence[Link], switches: Switches | None) -> Verdict:
             (f"{name}, Hz", f"{rate:.0f} of {EXPECTED_HZ[name]:.0f}")
             for name, rate in rates.items()
         ),
-        ("switches echoed on", _switches(switches)),
+        ("switches confirmed on", _switches(switches)),
         ("received at port", _listed(links[-1].ports)),
         ("relay", _relay(links[-1].relay)),
         ("rejected", _listed(rejected(links))),

@@ -99,7 +99,7 @@ class BumperReport(Frame, frozen=True):
 
 
 class UltrasonicBrakeReport(Frame, frozen=True):
-    """Board to PC: the echo of ``UltrasonicBrakeSet`` (manual 2.5)."""
+    """Board to PC: the confirmation of ``UltrasonicBrakeSet`` (manual 2.5)."""
 
     ID = 0x7603
     FIELDS = (SWITCH,)
@@ -108,7 +108,7 @@ class UltrasonicBrakeReport(Frame, frozen=True):
 
 
 class BumperBrakeReport(Frame, frozen=True):
-    """Board to PC: the echo of ``BumperBrakeSet`` (manual 2.6)."""
+    """Board to PC: the confirmation of ``BumperBrakeSet`` (manual 2.6)."""
 
     ID = 0x7604
     FIELDS = (SWITCH,)

@@ -149,7 +149,7 @@ class Driver(Message, frozen=True, kw_only=True):
 
 
 class Switches(Message, frozen=True, kw_only=True):
-    """The board's own emergency brakes (manual 2.5 and 2.6); None until it has echoed."""
+    """The board's own emergency brakes (manual 2.5 and 2.6); None until it has confirmed them."""
 
     ultrasonic_brake: bool | None = None
     bumper_brake: bool | None = None

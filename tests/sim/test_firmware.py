@@ -16,7 +16,7 @@ def sim_with(**firmware: object) -> SimFixture:
 
 
 def test_a_request_replaces_the_model_s_firmware() -> None:
-    sim = sim_with(echoes=False)
+    sim = sim_with(confirms=False)
     assert sim.say(c.BumperBrakeSet(True)) == []
     sim.do(q.Firmware())
     assert sim.say(c.BumperBrakeSet(True)) == [r.BumperBrakeReport(True)]

@@ -94,9 +94,9 @@ class Bench:
         )
 
     def arm(self) -> None:
-        """Receive all answers and echoes of the board, then a stop from safety."""
-        echoes = reports.UltrasonicBrakeReport(True), reports.BumperBrakeReport(True)
-        self.answer(VelocityReport(0, 0), BumperReport(False), DistanceReport(1000, 0), *echoes)
+        """Receive all answers and confirmations of the board, then a stop from safety."""
+        switches = reports.UltrasonicBrakeReport(True), reports.BumperBrakeReport(True)
+        self.answer(VelocityReport(0, 0), BumperReport(False), DistanceReport(1000, 0), *switches)
         self.receive(CLEAR, CLEAR, CLEAR)
         self.tick()
         self.move(STOP)

@@ -246,10 +246,10 @@ def test_a_row_of_clear_samples_begins_anew_after_a_gap(
     assert motions(bench.receive(HIT)) == [MotionKind.BREAK]
 
 
-@pytest.mark.parametrize("echoes", [True, False])
-def test_a_board_that_restarts_disarms_at_once(echoes: bool) -> None:
+@pytest.mark.parametrize("confirms", [True, False])
+def test_a_board_that_restarts_disarms_at_once(confirms: bool) -> None:
     unsafe = "board.require_switches=false", "unsafe_overrides=board.require_switches"
-    bench = Bench(*(() if echoes else unsafe))
+    bench = Bench(*(() if confirms else unsafe))
     bench.arm()
     assert motions(bench.move(linear=0.3)) == [MotionKind.RUN]
     board_restarted(bench)
@@ -257,7 +257,9 @@ def test_a_board_that_restarts_disarms_at_once(echoes: bool) -> None:
     assert bench.link().epoch == published(bench.outputs, "mileage")[-1].epoch == 1
 
 
-def test_a_board_that_was_silent_needs_its_brakes_echoed_and_a_neutral_motion(bench: Bench) -> None:
+def test_after_silence_the_brakes_are_confirmed_and_a_neutral_motion_is_due(
+    bench: Bench,
+) -> None:
     bench.arm()
     bench.move(linear=0.3)
     bench.now_ns += 201 * MS
@@ -286,7 +288,7 @@ def test_a_brake_that_is_off_disarms_at_once(bench: Bench, off: Frame, port: int
     assert not bench.link().armed
 
 
-def test_brakes_that_are_no_longer_echoed_inhibit_and_are_published(bench: Bench) -> None:
+def test_brakes_that_are_no_longer_confirmed_inhibit_and_are_published(bench: Bench) -> None:
     bench.arm()
     reported: list[m.Switches] = []
     for _ in range(5):

@@ -74,7 +74,7 @@ def test_silence_loses_the_link(bench: Bench, age: int, state: str) -> None:
 # --- one brake ------------------------------------------------------------------------------------
 
 
-def echoed(on: bool = True) -> Brake:
+def confirmed(on: bool = True) -> Brake:
     brake = Brake(BumperBrakeSet)
     brake.on_confirmation(on)
     return brake
@@ -87,20 +87,20 @@ def sends(brake: Brake, count: int, now_ns: int = NS_PER_S) -> Brake:
     return brake
 
 
-def test_it_is_sent_until_echoed_and_then_again_and_again() -> None:
+def test_it_is_sent_until_confirmed_and_then_again_and_again() -> None:
     brake = Brake(UltrasonicBrakeSet)
     due_ns = NS_PER_S
-    for echo, wait_ns in ((None, ASK_NS), (False, ASK_NS), (True, AGAIN_NS), (None, AGAIN_NS)):
+    for answer, wait_ns in ((None, ASK_NS), (False, ASK_NS), (True, AGAIN_NS), (None, AGAIN_NS)):
         assert brake.due(due_ns) == UltrasonicBrakeSet(True)
-        if echo is not None:
-            brake.on_confirmation(echo)
+        if answer is not None:
+            brake.on_confirmation(answer)
         assert brake.settled is bool(brake.position)
         assert brake.due(due_ns + wait_ns - 1) is None
         due_ns += wait_ns
 
 
 def test_an_operator_may_switch_it_off_until_the_board_returns() -> None:
-    brake = echoed()
+    brake = confirmed()
     brake.want(False, NS_PER_S)
     assert (brake.position, brake.settled, brake.assumed_on) == (None, False, False)
     assert brake.due(NS_PER_S) == BumperBrakeSet(False)
@@ -112,13 +112,13 @@ def test_an_operator_may_switch_it_off_until_the_board_returns() -> None:
 
 
 def test_an_on_counts_for_five_sends_and_an_off_until_an_on() -> None:
-    brake = echoed()
+    brake = confirmed()
     for second in range(1, 9):
         assert sends(brake, UNCONFIRMED, second * NS_PER_S).position is True
         brake.on_confirmation(True)
     assert sends(brake, UNCONFIRMED + 1, 9 * NS_PER_S).position is None
     assert brake.assumed_on, "enough where the settings accept that"
-    assert sends(echoed(False), 3 * UNCONFIRMED).position is False
+    assert sends(confirmed(False), 3 * UNCONFIRMED).position is False
 
 
 # --- both brakes ----------------------------------------------------------------------------------
@@ -157,7 +157,7 @@ def test_without_a_board_no_brake_is_sent(bench: Bench) -> None:
         (None, False, False, False),
     ],
 )
-def test_both_must_be_on_and_echoed_unless_the_settings_accept_a_firmware_without_echoes(
+def test_both_must_be_confirmed_on_unless_the_settings_accept_another_firmware(
     ultrasonic: bool | None, bumper: bool | None, ready: bool, accepted: bool
 ) -> None:
     for bench, expected in ((Bench(), ready), (Bench(*WITHOUT_ECHOES), accepted)):

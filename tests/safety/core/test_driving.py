@@ -1,4 +1,4 @@
-"""Requests, ramps, lost bumper samples and missing echoes, through the whole decision."""
+"""Requests, ramps, lost bumper samples and missing confirmations, through the whole decision."""
 
 import pytest
 
@@ -140,7 +140,7 @@ def test_two_lost_bumper_samples_change_nothing_and_three_stop() -> None:
     assert fixture.drive(0.5).command == "run"
 
 
-# --- a board without echoes -----------------------------------------------------------------
+# --- a board that confirms nothing ----------------------------------------------------------------
 
 
 def test_a_board_without_echoes_can_be_driven_where_that_is_accepted() -> None:
