@@ -13,7 +13,7 @@ from t2.messages import Silence
 
 Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``messages.Text``
 
-# Programs that stop requesting when the operator releases the controls. For any other source,
+# Programs that stop requesting when the operator lets go of the controls. For any other source,
 # ``sources.NAME.operator`` needs an override.
 HELD = ("teleop", "checkout", "web")
 
