@@ -27,7 +27,7 @@ def add_key(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
 
 def parse_key(word: str) -> str:
     """Check a key or key expression; short ones are relative to a robot."""
-    if not word.strip("/") or not valid(expression(word, "001")):
+    if not valid(expression(word, "001")):
         raise argparse.ArgumentTypeError(f"{word!r} is not a key; `t2 ls` lists the active keys")
     return word
 

@@ -72,11 +72,10 @@ def plain(thing: Any) -> Any:
             return str(thing)
 
 
-def padded(text: str, columns: int, *, right: bool = False) -> str:
+def padded(text: str, columns: int) -> str:
     """Return a text in so many columns of a terminal; a Chinese character takes two."""
     wide = sum(unicodedata.east_asian_width(char) in "WF" for char in text)
-    space = " " * (columns - len(text) - wide)
-    return space + text if right else text + space
+    return text + " " * (columns - len(text) - wide)
 
 
 def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
