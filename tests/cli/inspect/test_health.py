@@ -13,7 +13,7 @@ from tests.factories import health
 
 
 def test_health(buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(command, "LISTEN_S", 0.5)
+    monkeypatch.setattr(command, "LISTEN_S", 1.0)
     reactions = {
         "reflex": Durations(bounds=(0.001, 0.01), counts=(98, 1, 1), worst=0.5),
         "judged_stop": Durations(bounds=(0.001, 0.01), counts=(0, 0, 0), worst=0.0),
@@ -28,10 +28,12 @@ def test_health(buses: BusFixture, tool: Tool, monkeypatch: pytest.MonkeyPatch) 
     rows = {line.split()[1]: line.split()[2:] for line in result.out.splitlines()[1:]}
     assert rows["bridge"] == ["ok", "0.1.0", "60", "0", "53", "50000000", "overrun=2", "reflex=0.5"]
     assert rows["odom"] == ["hangs", *"-------"]
+    monkeypatch.setattr(command, "LISTEN_S", 3600.0)  # one service's first message ends it
     result = tool("health", "safety")
     assert (result.code, result.err) == (0, "")
     (line,) = result.lines
     assert (line["service"], line["state"], line["rss"]) == ("safety", "ok", 50_000_000)
+    monkeypatch.setattr(command, "LISTEN_S", 1.0)
     assert [line["robot"] for line in tool("health", "safety", robot="*").lines] == [tool.robot]
     # The recorder publishes as another service.
     for name, state in (("odom", "hangs"), ("recorder", "hangs"), ("teleop", "missing")):
