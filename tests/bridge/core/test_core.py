@@ -164,6 +164,9 @@ def test_each_frame_is_published_with_its_raw_bytes(bench: Bench) -> None:
     assert (bench.link().rates, out) == ({}, [Publish("switches", m.Switches())])
 
 
+LEFT = {"side": "left"}
+
+
 def test_a_driver_fault_counts_from_either_port(bench: Bench) -> None:
     reported, seen = [], []
     for port, bits in ((0, 0), (1, 1), (0, 0), (0, 1), (1, 0), (0, 3), (1, 3)):
@@ -173,10 +176,10 @@ def test_a_driver_fault_counts_from_either_port(bench: Bench) -> None:
     assert reported == [0, 1, 0, 3]
     (right,) = published(bench.answer(DriverReport(Side.RIGHT, 1), port=1), "driver_right")
     assert right.bits == 1
-    assert [(it.level, it.about["bits"], render(it.phrases)) for it in seen] == [
-        ("error", 1, "The left motor driver reports: over current."),
-        ("info", 0, "The left motor driver reports no fault."),
-        ("error", 3, "The left motor driver reports: over current, over voltage."),
+    assert [(it.level, it.about, render(it.phrases)) for it in seen] == [
+        ("error", LEFT | {"bits": 1}, "The left motor driver reports: over current."),
+        ("info", LEFT | {"bits": 0}, "The left motor driver reports no fault."),
+        ("error", LEFT | {"bits": 3}, "The left motor driver reports: over current, over voltage."),
     ]
 
 
