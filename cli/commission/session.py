@@ -13,7 +13,7 @@ from cli.inspect.addressing import decode, topic_of
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import decoded
 from common import clock
-from common.bus.probe import Probe, probe
+from common.bus.inspector import Inspector, inspecting
 from common.config import Setting
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
@@ -40,7 +40,7 @@ M = TypeVar("M", bound=Message)
 class CheckoutSession(SafetyClient):
     """One checkout on a bus."""
 
-    def __init__(self, opened: Probe, robot: str, language: Language = "en") -> None:
+    def __init__(self, opened: Inspector, robot: str, language: Language = "en") -> None:
         """Listen to the robot; ``language`` is that of safety's texts."""
         super().__init__(opened, robot, SOURCE, language)
         self._marked_ns = 0
@@ -78,7 +78,7 @@ class CheckoutSession(SafetyClient):
 
     def settings(self, service: str) -> dict[str, Setting]:
         """Return a service's settings by path; raise ``LinkError`` without an answer."""
-        for answer in self.probe.query(keys.info_key(self.robot, service, "config")):
+        for answer in self.inspector.query(keys.info_key(self.robot, service, "config")):
             if not answer.refusal:
                 return msgspec.json.decode(answer.payload, type=dict[str, Setting])
         raise LinkError(f"cannot read the settings of {service}: it does not answer")
@@ -147,7 +147,7 @@ class CheckoutSession(SafetyClient):
 @contextmanager
 def checkout_session(config: Shared, language: Language = "en") -> Iterator[CheckoutSession]:
     """Open a session for the context; raise ``LinkError`` without a stack."""
-    with probe(config.bus) as opened:
+    with inspecting(config.bus) as opened:
         session = CheckoutSession(opened, config.robot.id, language)
         if not session.until(lambda: session.of(keys.LINK) and session.state, STACK_S):
             raise LinkError(

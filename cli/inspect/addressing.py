@@ -3,7 +3,7 @@
 import argparse
 import re
 
-from common.bus.probe import valid
+from common.bus.inspector import valid
 from t2 import codec, keys
 from t2.codec import Sample
 from t2.errors import MessageError

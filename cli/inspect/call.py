@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         output.warn(f"t2 call: not a {name}: {problem}; its fields: docs/bus.md#{name.lower()}")
         return 2
     with open_session(options) as session:
-        make(SafetyClient(session.probe, session.robot, language=language), call, options)
+        make(SafetyClient(session.inspector, session.robot, language=language), call, options)
     return 0
 
 
@@ -74,7 +74,7 @@ def make(client: SafetyClient, call: Call[Any, Any], options: argparse.Namespace
         output.value(shown, as_json=options.json)
     if seen and call is keys.RESET and not client.is_reset(seen, answers):
         text = "not confirmed: safety's state does not show this reset"
-        raise T2Error(f"{text}; run {client.probe.doctor}")
+        raise T2Error(f"{text}; run {client.inspector.doctor}")
 
 
 def known(word: str) -> Call[Any, Any]:

@@ -1,4 +1,4 @@
-"""Client of safety for a tool: the state machines of ``t2.client`` on a probe.
+"""Client of safety for a tool: the state machines of ``t2.client`` on an inspector.
 
 Everything runs in the tool's own thread: messages are taken and the drive request of each tick is
 sent only inside ``until``. While a tool waits for its user nothing is sent, which is a release, and
@@ -18,7 +18,7 @@ from cli.inspect.addressing import chunks
 from cli.inspect.session import decoded, services
 from common import clock
 from common.bus.bus import no_answer, not_allowed
-from common.bus.probe import Answer, Probe
+from common.bus.inspector import Answer, Inspector
 from common.bus.publisher import host_id
 from common.freshness import NS_PER_S
 from t2 import codec, keys
@@ -37,13 +37,13 @@ class SafetyClient:
     """Client of one robot's safety; a key expression as robot serves ``stop`` only."""
 
     def __init__(
-        self, probe: Probe, robot: str, source: str = "", language: Language = "en"
+        self, inspector: Inspector, robot: str, source: str = "", language: Language = "en"
     ) -> None:
         """Listen to safety; ``source`` is the name in drive requests and keepalives.
 
         ``language`` is that of refusals.
         """
-        self.probe = probe
+        self.inspector = inspector
         self.robot = robot
         self.language = language
         self.states: dict[str, SafetyState] = {}  # the newest by robot
@@ -55,7 +55,7 @@ class SafetyClient:
         self._header = {"boot": secrets.randbits(63), "host": host_id()}
         self._seq = count(1)
         self._due_s = 0.0
-        probe.listen(keys.SAFETY.on(robot))
+        inspector.listen(keys.SAFETY.on(robot))
 
     @property
     def state(self) -> SafetyState | None:
@@ -78,13 +78,13 @@ class SafetyClient:
             if now_s >= self._due_s:
                 self._due_s = now_s + TICK_S
                 self.tick()
-            for queued in self.probe.queued():
+            for queued in self.inspector.queued():
                 self.receive(queued)
             if condition():
                 return True
             if now_s >= end_s:
                 return False
-            if sample := self.probe.take(min(end_s, self._due_s) - now_s):
+            if sample := self.inspector.take(min(end_s, self._due_s) - now_s):
                 self.receive(sample)
 
     def receive(self, sample: Sample) -> None:
@@ -107,7 +107,7 @@ class SafetyClient:
         echo = self.state.heartbeat if self.state else 0
         whole = replace(message, echo=echo, **self._stamp())
         key = topic.on(self.robot, source=self._source)
-        self.probe.put(key, codec.encode(whole), codec.encoding(topic.message), topic.service)
+        self.inspector.put(key, codec.encode(whole), codec.encoding(topic.message), topic.service)
 
     def _stamp(self) -> dict[str, int]:
         now = {"seq": next(self._seq), "t_ns": time.time_ns(), "mono_ns": clock.now_ns()}
@@ -122,11 +122,11 @@ class SafetyClient:
         )  # fmt: skip
         event = replace(event, **stamp)
         key = keys.EVENTS.on(robot, service="estop")
-        self.probe.put(key, codec.encode(event), codec.encoding(Event), keys.EVENTS.service)
+        self.inspector.put(key, codec.encode(event), codec.encoding(Event), keys.EVENTS.service)
 
     def order_stop(self, robot: str) -> None:
         """Publish an emergency stop once."""
-        self.probe.put(keys.estop_key(robot), b"", codec.ENCODING, keys.ESTOP_CLASS)
+        self.inspector.put(keys.estop_key(robot), b"", codec.ENCODING, keys.ESTOP_CLASS)
 
     def stop(self, robots: Iterable[str], seconds: float | None = None) -> set[str]:
         """Repeat an emergency stop until all have latched it; return the robots that have.
@@ -146,7 +146,7 @@ class SafetyClient:
 
     def forget(self) -> None:
         """Discard what has arrived: only states that arrive from now on count."""
-        self.probe.discard()
+        self.inspector.discard()
         self.states.clear()
 
     def fresh_state(self) -> SafetyState:
@@ -155,14 +155,14 @@ class SafetyClient:
         if not self.until(lambda: self.state, STATE_S) or self.state is None:
             raise T2Error(
                 f"no state of safety within {STATE_S:g} s: is safety running? "
-                f"run {self.probe.doctor}"
+                f"run {self.inspector.doctor}"
             )
         return self.state
 
     def call(self, call: Call[Any, Any], request: Struct, timeout_s: float = 2.0) -> list[Answer]:
         """Return the answers to a call; raise ``T2Error`` if it is refused or not answered."""
         key = call.on(self.robot)
-        answers = self.probe.query(key, codec.encode(request), timeout_s)
+        answers = self.inspector.query(key, codec.encode(request), timeout_s)
         if not answers:
             raise T2Error(f"{key}: {self._why_unanswered(call, key)}")
         if refusals := [answer.refusal for answer in answers if answer.refusal]:
@@ -188,7 +188,7 @@ class SafetyClient:
 
         The router announces no queryable to a certificate that may not call it.
         """
-        runs = services(self.probe, self.robot, call.server)
-        barred = runs and not self.probe.has_server(key)
-        why = not_allowed(call.server) if barred else no_answer(call.server, self.probe.doctor)
+        runs = services(self.inspector, self.robot, call.server)
+        barred = runs and not self.inspector.has_server(key)
+        why = not_allowed(call.server) if barred else no_answer(call.server, self.inspector.doctor)
         return render(why.phrases, self.language, why.text)

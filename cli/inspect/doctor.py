@@ -25,7 +25,7 @@ from cli.inspect.estop import is_barred
 from cli.inspect.findings import MARKS, PLACES, PREFIX, Finding, found
 from cli.inspect.output import padded
 from cli.inspect.session import add_duration, add_options, services, settings, until_interrupt
-from common.bus.probe import Probe, probe
+from common.bus.inspector import Inspector, inspecting
 from common.bus.session import common_name
 from common.cli_args import VERSION, reader_language, source_words
 from common.freshness import NS_PER_S
@@ -86,7 +86,7 @@ def findings(config: Shared, seconds: float) -> Iterator[Finding]:
         yield found("router", "unknown", "router.unreachable")
         return
     try:
-        with probe(config.bus) as opened:
+        with inspecting(config.bus) as opened:
             seen = observe(opened, config.bus, config.robot.id, seconds)
     except LinkError:
         yield found("router", "wrong", "router.other", "other_router")
@@ -164,7 +164,7 @@ def handshake(plain: socket.socket, host: str, bus: BusSettings) -> Finding | No
     return problem("closed")
 
 
-def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Observation:
+def observe(opened: Inspector, bus: BusSettings, robot: str, seconds: float) -> Observation:
     """Return the observation of one robot."""
     seen = Observation(t2=VERSION)
     listen(opened, robot, seconds, seen)
@@ -193,7 +193,7 @@ def observe(opened: Probe, bus: BusSettings, robot: str, seconds: float) -> Obse
     return seen
 
 
-def as_source(opened: Probe, robot: str, topic: Topic[Any]) -> list[str]:
+def as_source(opened: Inspector, robot: str, topic: Topic[Any]) -> list[str]:
     """Return the sources of safety's settings as which this certificate may publish."""
     table, usual = SOURCES[topic]
     names = {*usual}
@@ -208,7 +208,7 @@ def as_source(opened: Probe, robot: str, topic: Topic[Any]) -> list[str]:
     return sorted(by_key[key] for key in opened.readers(by_key))
 
 
-def listen(opened: Probe, robot: str, seconds: float, seen: Observation) -> None:
+def listen(opened: Inspector, robot: str, seconds: float, seen: Observation) -> None:
     """Add the messages of one robot to the observation."""
     counts: Counter[str] = Counter()
     for word in EVERYTHING:

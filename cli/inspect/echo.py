@@ -40,9 +40,9 @@ def run(options: argparse.Namespace) -> int:
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
         # Events are rare: those that their publishers have cached are shown first.
-        session.probe.listen(wanted, history=chunks(wanted)[1].startswith("evt/"))
+        session.inspector.listen(wanted, history=chunks(wanted)[1].startswith("evt/"))
         with until_interrupt():
-            for sample in session.probe.samples(duration_s):
+            for sample in session.inspector.samples(duration_s):
                 shown = True
                 show(sample, session.robot, options, language)
                 if options.once:

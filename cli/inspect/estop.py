@@ -21,7 +21,7 @@ from typing import TextIO
 from cli.inspect import output
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import add_options, open_session, services, until_interrupt
-from common.bus.probe import Probe
+from common.bus.inspector import Inspector
 from common.cli_args import hint, reader_language, source_words
 from common.root_cause import WITHOUT_BRIDGE
 from common.text import printable
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
         while True:
             try:
                 with open_session(options) as session:
-                    client = SafetyClient(session.probe, session.robot)
+                    client = SafetyClient(session.inspector, session.robot)
                     return stop(client, session.user, source_words(options), end_s)
             except LinkError as error:
                 if time.monotonic() > end_s:
@@ -81,12 +81,12 @@ def stop(client: SafetyClient, user: str, settings: Sequence[str] = (), end_s: f
     The event names the ``user``. ``settings`` are the options that advised commands repeat. A robot
     that does not confirm soon is reported, and the order is repeated until ``end_s``.
     """
-    probe, robot = client.probe, client.robot
+    inspector, robot = client.inspector, client.robot
     client.order_stop(robot)  # before anything else
     expected = {robot}
     if "*" in robot:
         with suppress(LinkError):  # without the list: until one robot at least has confirmed
-            expected = {name for name, service in services(probe, robot) if service in MOVES}
+            expected = {name for name, service in services(inspector, robot) if service in MOVES}
     for each in expected:
         if "*" not in each:
             client.report_stop(each, user)
@@ -100,7 +100,7 @@ def stop(client: SafetyClient, user: str, settings: Sequence[str] = (), end_s: f
     unreached = {each for each in confirmed if is_unreached(states[each])}
     for each in sorted(confirmed - unreached):
         reset = shlex.join(["t2", "call", "safety/reset", "--robot", each, *settings])
-        may_reset = probe.has_server(keys.RESET.on(each))
+        may_reset = inspector.has_server(keys.RESET.on(each))
         print(f"Robot {each} is stopped. {f'`{reset}` resets it.' if may_reset else BARRED}")
     sys.stdout.flush()
     warn(
@@ -118,7 +118,7 @@ def report_missing(client: SafetyClient, missing: set[str], settings: Sequence[s
     """Warn of robots that do not confirm, with the reason if it is known."""
     if missing == {client.robot}:
         with suppress(LinkError):
-            if is_elsewhere(client.probe, client.robot):
+            if is_elsewhere(client.inspector, client.robot):
                 return
     warn(dict.fromkeys(missing, "does not confirm"), settings)
 
@@ -138,9 +138,9 @@ def insist(client: SafetyClient, missing: set[str], end_s: float) -> set[str]:
     return confirmed
 
 
-def is_elsewhere(probe: Probe, robot: str) -> bool:
+def is_elsewhere(inspector: Inspector, robot: str) -> bool:
     """Return whether the robot is not at this router; warn of it, or of a missing right."""
-    running = services(probe, "*")
+    running = services(inspector, "*")
     present = sorted({name for name, service in running if service in keys.ON_BOARD})
     if present and robot not in present:
         seen = ", ".join(present)
@@ -148,7 +148,7 @@ def is_elsewhere(probe: Probe, robot: str) -> bool:
             f"t2 estop: robot {robot} is not at this router (seen: {seen}). If it moves, {SWITCH}."
         )
         return True
-    if is_barred(probe, robot):
+    if is_barred(inspector, robot):
         output.warn(
             f"t2 estop: not allowed: this certificate has no right to stop robot {robot} "
             "(as it seems: the router drops its commands)"
@@ -168,13 +168,13 @@ def is_unreached(state: SafetyState) -> bool:
     return any(cause.name in WITHOUT_BRIDGE for cause in state.causes)
 
 
-def is_barred(probe: Probe, robot: str) -> bool:
+def is_barred(inspector: Inspector, robot: str) -> bool:
     """Return whether the router drops the commands of this certificate, as it seems."""
-    serves = services(probe, robot, "safety")
+    serves = services(inspector, robot, "safety")
     # Each role that may stop may also do one of these, except fleet.
     topics = (keys.DRIVE, keys.LIMIT)
     commands = (topic.on(robot, source="*") for topic in topics)
-    return bool(serves) and not probe.has_reader(*commands)
+    return bool(serves) and not inspector.has_reader(*commands)
 
 
 def keep_alive(options: argparse.Namespace) -> int:
@@ -184,7 +184,7 @@ def keep_alive(options: argparse.Namespace) -> int:
         if "*" in session.robot:
             raise T2Error("--keepalive works on one robot at a time; name it")
         name, robot = options.keepalive, session.robot
-        client = SafetyClient(session.probe, robot, name, language)
+        client = SafetyClient(session.inspector, robot, name, language)
         ours = kept(client.fresh_state(), name)
         print(f"Keeping the emergency stop of robot {robot} alive as {name}.")
         print("Enter: EMERGENCY STOP. Ctrl-C ends this program: the robot then brakes and latches.")

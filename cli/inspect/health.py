@@ -60,8 +60,8 @@ def shown(row: Row) -> Row:
 def listen(session: BusSession, service: str | None) -> list[Row]:
     """Listen to one or all services, and list those without a health message from their tokens."""
     newest: dict[tuple[str, str], Row] = {}
-    session.probe.listen(keys.HEALTH.on(session.robot, service=service or "*"))
-    for sample in session.probe.samples(LISTEN_S):
+    session.inspector.listen(keys.HEALTH.on(session.robot, service=service or "*"))
+    for sample in session.inspector.samples(LISTEN_S):
         try:
             health = decode(sample, Health)
             newest[chunks(sample.key)[0], health.service] = msgspec.to_builtins(health)
@@ -69,7 +69,7 @@ def listen(session: BusSession, service: str | None) -> list[Row]:
             output.warn(f"t2 health: {sample.key}: {error}")
         if (session.robot, service) in newest:
             break
-    alive = {*services(session.probe, session.robot, service or "*")}
+    alive = {*services(session.inspector, session.robot, service or "*")}
     found = {robot for robot, name in newest.keys() | alive if name in keys.ON_BOARD}
     robots = found or {session.robot}
     needed = {

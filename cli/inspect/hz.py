@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
     streams: defaultdict[str, StreamStats] = defaultdict(StreamStats)
     with open_session(options) as session:
         wanted = expression(options.key, session.robot)
-        session.probe.listen(wanted)
+        session.inspector.listen(wanted)
         with until_interrupt():
             follow(session, options, streams)
     if not streams:
@@ -108,7 +108,7 @@ def follow(
     end_s = time.monotonic() + (options.duration or float("inf"))
     while (left_s := end_s - time.monotonic()) > 0:
         new = False
-        for sample in session.probe.samples(min(REPORT_S, left_s)):
+        for sample in session.inspector.samples(min(REPORT_S, left_s)):
             streams[short(sample.key, session.robot)].add(sample)
             new = True
         if new:

@@ -23,7 +23,7 @@ from cli.inspect.session import (
     open_session,
     until_interrupt,
 )
-from common.bus.probe import Probe, intersects
+from common.bus.inspector import Inspector, intersects
 from t2 import codec
 from t2.errors import T2Error
 
@@ -59,16 +59,16 @@ def active(session: BusSession, options: argparse.Namespace) -> list[dict[str, A
     counts: Counter[str] = Counter()
     kinds: dict[str, str] = {}
     for each in wanted:
-        session.probe.listen(each)
+        session.inspector.listen(each)
     began_s = time.monotonic()
     with until_interrupt():
-        for sample in session.probe.samples(options.duration):
+        for sample in session.inspector.samples(options.duration):
             counts[sample.key] += 1
             kinds[sample.key] = codec.kind_of(sample.encoding) or named(sample.encoding)
     span_s = time.monotonic() - began_s
     if not counts:
-        raise T2Error(f"no active key on {', '.join(wanted)}; try {session.probe.doctor}")
-    found = declarations(session.probe, session.robot)
+        raise T2Error(f"no active key on {', '.join(wanted)}; try {session.inspector.doctor}")
+    found = declarations(session.inspector, session.robot)
     if not found:
         output.warn("t2 ls: the router shows no declarations (its admin space is closed)")
     return [
@@ -90,10 +90,10 @@ def named(encoding: str) -> str:
 
 def declared(session: BusSession) -> list[dict[str, Any]]:
     """Return all declarations except those of this session."""
-    found = declarations(session.probe, session.robot)
+    found = declarations(session.inspector, session.robot)
     if not found:
         text = "no service found, or the router shows none"
-        raise T2Error(f"{text}; try {session.probe.doctor}")
+        raise T2Error(f"{text}; try {session.inspector.doctor}")
     return [
         {"session": each.session, "does": each.does, "key": short(each.key, session.robot)}
         for each in found
@@ -109,17 +109,17 @@ class Declaration:
     key: str  # may have wildcards
 
 
-def declarations(probe: Probe, robot: str) -> list[Declaration]:
+def declarations(inspector: Inspector, robot: str) -> list[Declaration]:
     """Return the declarations of the other sessions.
 
     All sessions are clients; other entries are routers that declare on behalf of their clients.
     """
     entries: list[tuple[str, str, set[str]]] = []  # role, key, sessions
-    for each in probe.query(ADMIN.format(robot=robot)):
+    for each in inspector.query(ADMIN.format(robot=robot)):
         value = read(each.payload, each.encoding).value
         if not each.refusal and isinstance(value, dict):
             _, _, _, role, key = each.key.split("/", 4)
-            entries.append((role, key, {*(value.get("clients") or ())} - {probe.zid}))
+            entries.append((role, key, {*(value.get("clients") or ())} - {inspector.zid}))
     names = {
         zid: chunks(key)[1].removeprefix("live/")
         for role, key, zids in entries

@@ -31,14 +31,14 @@ def run(options: argparse.Namespace) -> int:
     language: Language = "en" if options.json else reader_language()
     running: defaultdict[str, set[str]] = defaultdict(set)
     with open_session(options) as session:
-        client = SafetyClient(session.probe, session.robot)
-        for name, service in services(session.probe, session.robot):
+        client = SafetyClient(session.inspector, session.robot)
+        for name, service in services(session.inspector, session.robot):
             running[name].add(service)
         found = {name: has for name, has in running.items() if not has.isdisjoint(keys.ON_BOARD)}
         supervised = {name for name, has in found.items() if "safety" in has}
         client.until(lambda: client.states.keys() >= supervised, LISTEN_S)
     if not found:
-        raise T2Error(f"no robot found; try {session.probe.doctor}")
+        raise T2Error(f"no robot found; try {session.inspector.doctor}")
     states = client.states
     rows = [row(name, found[name], states.get(name), language) for name in sorted(found)]
     output.rows(rows, as_json=options.json)

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from cli.inspect import output
 from cli.inspect.addressing import EVERY_ROBOT, chunks, parse_site
-from common.bus.probe import Answer, Probe, probe
+from common.bus.inspector import Answer, Inspector, inspecting
 from common.bus.session import operator_name
 from common.cli_args import add_sources, source_words, sources
 from common.config import Sources, load
@@ -24,7 +24,7 @@ from t2.errors import MessageError
 class BusSession:
     """Bus session of a command, and its robot or a key expression for several robots."""
 
-    probe: Probe
+    inspector: Inspector
     robot: str
     user: str  # who uses this command
 
@@ -93,14 +93,14 @@ def open_session(options: argparse.Namespace) -> Iterator[BusSession]:
     """
     config = settings(options)
     several = options.robot and "*" in options.robot
-    with probe(config.bus, source_words(options)) as opened:
+    with inspecting(config.bus, source_words(options)) as opened:
         robot = options.robot if several else config.robot.id
         yield BusSession(opened, robot, operator_name(config.bus))
         if opened.left_out:
             output.warn(f"t2: {opened.left_out} messages dropped, the oldest: read too slowly")
 
 
-def services(opened: Probe, robot: str, service: str = "*") -> list[tuple[str, str]]:
+def services(opened: Inspector, robot: str, service: str = "*") -> list[tuple[str, str]]:
     """Return robot and service of each liveliness token."""
     tokens = map(chunks, opened.alive(keys.live_key(robot, service, "*")))
     return [(name, path.split("/")[1]) for name, path in tokens]

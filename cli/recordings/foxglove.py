@@ -43,11 +43,11 @@ def run(options: argparse.Namespace) -> int:
             raise LinkError(f"cannot listen on {options.host}:{options.port}: {error}") from None
         print(f"connect Foxglove or Lichtblick to ws://{options.host}:{server.port}", flush=True)
         for word in EVERYTHING:
-            session.probe.listen(expression(word, session.robot))
+            session.inspector.listen(expression(word, session.robot))
         channel_of = cache(partial(create_channel, context))
         try:
             with until_interrupt():
-                for sample in session.probe.samples():
+                for sample in session.inspector.samples():
                     for entry in encoder.entries(sample, sample.wall_ns):
                         channel_of(entry.channel).log(entry.data, log_time=entry.log_ns)
         finally:

@@ -21,7 +21,7 @@ from cli.inspect.session import (
     until_interrupt,
 )
 from cli.recordings.info import open_recording
-from common.bus.probe import intersects
+from common.bus.inspector import intersects
 from common.cli_args import file_path
 from common.freshness import NS_PER_S
 from t2 import keys
@@ -71,7 +71,7 @@ class Player:
 
     def __init__(self, session: BusSession, rate: float) -> None:
         """Raise ``T2Error`` if one of them is running."""
-        self._probe, self._robot, self._rate = session.probe, session.robot, rate
+        self._inspector, self._robot, self._rate = session.inspector, session.robot, rate
         self._start: tuple[float, int] | None = None  # our clock, the recording's clock
         self._checked_s = time.monotonic()
         self._alive = self._check()  # at the start
@@ -98,12 +98,12 @@ class Player:
         key = f"{keys.ROOT}/{self._robot}/{path}"
         topic = topic_of(key)
         service = topic.service if topic else keys.SLOW
-        self._probe.put(key, sample.payload, sample.encoding, service, sample.raw)
+        self._inspector.put(key, sample.payload, sample.encoding, service, sample.raw)
         return True
 
     def _check(self) -> set[str]:
         """Return the running services; raise ``T2Error`` if bridge or safety is among them."""
-        alive = {service for _, service in services(self._probe, self._robot)}
+        alive = {service for _, service in services(self._inspector, self._robot)}
         if running := " and ".join(name for name in MOVES if name in alive):
             raise T2Error(
                 f"robot {self._robot} has a running {running}: others would take replayed messages "

@@ -7,7 +7,7 @@ import pytest
 from cli.commission import steps
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import FORWARD, PHRASE, RESET_PHRASE
-from common.bus import probe
+from common.bus import inspector
 from sim.requests import Bumper
 from tests.cli.processes import PATIENCE_S
 from verification.harness.stack import RunningStack, running_stack
@@ -16,9 +16,11 @@ from verification.harness.waiting import wait_until
 
 def nobody_reads(session: CheckoutSession) -> None:
     """Return once the queue has overflowed since now, twice its length."""
-    before = session.probe.left_out
+    before = session.inspector.left_out
     wait_until(
-        lambda: session.probe.left_out > before + 2 * probe.QUEUE_MAX, "a full queue", PATIENCE_S
+        lambda: session.inspector.left_out > before + 2 * inspector.QUEUE_MAX,
+        "a full queue",
+        PATIENCE_S,
     )
 
 
@@ -34,7 +36,7 @@ def test_a_hit_during_a_question_is_seen_and_reset_and_ends_a_motion(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A queue that is full within a second: the real one takes a question of a minute.
-    monkeypatch.setattr(probe, "QUEUE_MAX", 200)
+    monkeypatch.setattr(inspector, "QUEUE_MAX", 200)
     with running_stack(tmp_path) as stack, checkout_session(stack.config) as session:
         wait_until(lambda: not session.fresh_state().latched, "a healthy vehicle", PATIENCE_S)
         nobody_reads(session)

@@ -14,7 +14,7 @@ from cli.__main__ import main
 from cli.inspect import estop
 from cli.inspect.client import SafetyClient
 from common.bus.bus import Arrival, Bus
-from common.bus.probe import probe
+from common.bus.inspector import inspecting
 from common.bus.session import operator_name
 from common.loop import Loop
 from common.settings import BusSettings as Where
@@ -173,7 +173,7 @@ def test_members_reach_their_own_robots_through_the_sites_router(site: Site, joi
 
         wait_until(stopped, "all robots stopped")
         room = connecting(site.settings("fleet", "room"), center)
-        with probe(room) as session:
+        with inspecting(room) as session:
             SafetyClient(session, "001").report_stop("001", operator_name(room))
             wait_until(lambda: first.events, "its event")
         assert first.events[0].message.text.startswith("Emergency stop requested by fleet.room.")

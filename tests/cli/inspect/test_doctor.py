@@ -17,7 +17,7 @@ from cli.inspect.diagnosis import diagnose
 from cli.inspect.doctor import connect, findings
 from cli.inspect.findings import REMEDIES
 from common.bus.bus import Bus
-from common.bus.probe import probe
+from common.bus.inspector import inspecting
 from common.settings import Shared
 from t2 import keys
 from t2.messages import Bumper
@@ -66,7 +66,7 @@ def test_no_router_in_the_readers_language(
 def test_one_reachable_endpoint_is_enough_and_a_slow_router_hides_its_services() -> None:
     reached, absent = (f"tcp/127.0.0.1:{free_port()}" for _ in range(2))
     where = at(absent, reached)
-    with router_process(reached) as router, probe(where) as opened:
+    with router_process(reached) as router, inspecting(where) as opened:
         first, second, *rest = findings(Shared(bus=where), 0.1)
         router.send_signal(signal.SIGSTOP)
         seen = doctor.observe(opened, where, "001", 0.1)

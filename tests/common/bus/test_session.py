@@ -9,7 +9,7 @@ import zenoh
 
 from common import settings
 from common.bus.bus import Arrival, Bus
-from common.bus.probe import probe
+from common.bus.inspector import inspecting
 from common.bus.session import (
     CLIENT_MAX,
     ROUTER_MAX,
@@ -40,7 +40,7 @@ def test_a_router_behind_one_that_is_silent_is_found(buses: BusFixture) -> None:
         bus.open()
         wait_until(lambda: bus.connected, "the second one")
         bus.close()
-        with probe(at(dead, where)) as opened:
+        with inspecting(at(dead, where)) as opened:
             assert opened.zid
 
 

@@ -41,7 +41,7 @@ class Answer:
     refusal: Refusal | None = None
 
 
-class Probe:
+class Inspector:
     """Session of one tool."""
 
     def __init__(self, session: zenoh.Session, words: Sequence[str] = ()) -> None:
@@ -149,7 +149,7 @@ class Probe:
 
 
 @contextmanager
-def probe(where: BusSettings, words: Sequence[str] = ()) -> Iterator[Probe]:
+def inspecting(where: BusSettings, words: Sequence[str] = ()) -> Iterator[Inspector]:
     """Connect to the bus for the context; raise ``LinkError`` when no router answers."""
     check_files(where, where.endpoints)
     for attempt in range(len(where.endpoints)):
@@ -163,7 +163,7 @@ def probe(where: BusSettings, words: Sequence[str] = ()) -> Iterator[Probe]:
             f"{'tls' if where.certificate else 'tcp'}/HOST:7447"
         )
     with session:
-        yield Probe(session, words)
+        yield Inspector(session, words)
 
 
 def _matches(*declared: Any, every: bool = False) -> bool:
