@@ -16,8 +16,6 @@ from verification.harness.ports import free_port
 # On two busy cores, the duration of an example is not meaningful.
 settings.register_profile("t2", deadline=None)
 settings.load_profile("t2")
-# Four tests at a time share the cores: none may go ahead of the board that another one simulates.
-os.environ.setdefault("T2__HOST__REALTIME", "false")
 os.environ["T2_LANG"] = "en"  # whatever the locale of this host
 
 
