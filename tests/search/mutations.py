@@ -13,7 +13,6 @@ from msgspec.structs import replace
 from common import heartbeat
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S
-from common.motion import Twist
 from common.standstill import Displacement
 from common.wire import framing
 from common.wire.frame import Frame, Side
@@ -29,7 +28,7 @@ from services.safety.core.causes import Held, Observation
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import Standstill
 from services.safety.core.release import Release
-from services.safety.core.sonars import Axis, SonarOverrides
+from services.safety.core.sonars import SonarOverrides
 from services.safety.core.state import State
 from services.safety.service import SafetyService
 from sim import requests as q
@@ -292,7 +291,7 @@ SILENT = LimitSource(lease=LEASE_S, silence="ignore")
 SAFETY: Any = CONFIGS["safety"]
 LIMITS: dict[str, LimitSource] = SAFETY.safety.limits
 ON_MOTION, EXPIRE = leases.on_motion, leases.expire
-AFTER, STORE = Release.after, SafetyService._store
+AFTER, STORE, ZONES = Release.after, SafetyService._store, planning.zones
 
 
 def never(*_: Any) -> bool:
@@ -333,14 +332,13 @@ def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False)
     return STORE(ports, field)
 
 
-def as_straight(zones: planning.Zones, axis: Axis, twist: Twist) -> tuple[float, float]:
-    speed = max(0.0, sum(axis.approach(twist)))
-    return speed, speed * speed / (2 * zones.deceleration)
+def turning_stops_at_once(settings: SafetyConfig) -> planning.Zones:
+    return replace(ZONES(settings), angular_deceleration=1e3)
 
 
-def only_if_down(inputs: Inputs, state: State, now_ns: int) -> Observation:
+def only_if_down(inputs: Inputs, state: State, _: int) -> Observation | None:
     lost = state.estop_connection > 0 and not inputs.estop_connection
-    return Observation("estop_reader", lost, (0, now_ns))
+    return Observation("estop_reader") if lost else None
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -385,7 +383,7 @@ MUTATIONS: dict[str, Mutation] = {
         "bridge knows of estop",
     ),
     "the age of the bumper's samples does not matter": (
-        (conditions, "_bumper", lambda *_: Observation("bumper", False)), (tap_in_a_gap,),
+        (conditions, "_bumper", lambda *_: None), (tap_in_a_gap,),
         "a press of 60 ms was missed",
     ),
     "a hit needs no judgement": (
@@ -463,8 +461,8 @@ MUTATIONS: dict[str, Mutation] = {
         (Arbiter, "at_rest", unchanged),
         (*CRAWL, lambda s: s.silence("teleop", 900), *CRAWL), "was not neutral",
     ),
-    "a turn is judged by the linear deceleration": (
-        (planning.Zones, "_stopping", as_straight),
+    "a turn is judged as if it stopped at once": (
+        (planning, "zones", turning_stops_at_once),
         (lambda s: s.request(0.0, 400), lambda s: s.sonars(600, numbers=LEFT),
          lambda s: s.request(0.0, 1500, angular=1.0)), "toward sonar 0",
     ),

@@ -79,7 +79,9 @@ class Arbiter(Struct, frozen=True):
     def in_control(self, now_ns: int) -> str | None:
         """Return the fresh source of the highest priority."""
         fresh = self._fresh(now_ns)
-        return max(fresh, key=lambda name: self.sources[name].priority, default=None)
+        if len(fresh) < 2:
+            return fresh[0] if fresh else None
+        return max(fresh, key=lambda name: self.sources[name].priority)
 
     def requests_motion(self, now_ns: int) -> bool:
         """Return whether any source requests motion."""

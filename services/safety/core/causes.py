@@ -1,7 +1,7 @@
 """Table of causes that stop or slow the vehicle; this table is the specification.
 
 Every decision observes every cause again. The worst action of the held causes applies. A cause is
-held from the observation that raises it until it clears by its own rule:
+held from the observation that shows it until it clears by its own rule:
 
 ========== ===================================================================================
 clears     when
@@ -16,8 +16,8 @@ AT_ONCE    by itself with the first observation without it (the observer has the
 Two things are not causes. A refused request is counted and changes nothing. Limits of speed and
 acceleration change a request without being reported.
 
-**Held causes.** A cause is observed with a *token*, the identity of the sample that shows it. Good
-samples are counted by token, so one sample counts once.
+**Held causes.** Some causes are shown by a sample of one stream. Its *token*, the identity of the
+sample, is kept, so that one good sample counts once. All others are observed anew in each decision.
 
 Each occurrence of a cause has an *identity*, made of the decision in which it began and the cause's
 row. A cause that returns after ``GOOD_SAMPLES`` samples without it is a new occurrence. An
@@ -102,6 +102,14 @@ def clears(name: CauseName) -> Clears:
 
 # Causes that forbid every motion; once all have cleared, a neutral request is due.
 BARRING = frozenset(rule.name for rule in RULES if rule.clears is not Clears.AT_ONCE)
+# Causes that depend on what a source requests.
+OF_REQUESTS = BY_NAME.keys() - BARRING
+FLAPPING: frozenset[CauseName] = frozenset({"flapping"})  # depends on the other causes of inputs
+OF_INPUTS = BARRING - FLAPPING
+LATCHING = frozenset(rule.name for rule in RULES if rule.clears is Clears.RESET)
+SETTLING = frozenset(rule.name for rule in RULES if rule.clears is Clears.SETTLED)
+# An input fails; a vehicle that rolls down a slope is not an input.
+FAILING = SETTLING - {"not_stopping"}
 
 
 Token = tuple[int, int]  # boot and seq of a sample; (0, time) without a sample
@@ -112,11 +120,9 @@ REFILL_PER_S = 0.1  # ten good seconds refill one failure
 
 
 class Observation(Struct, frozen=True):
-    """Whether a sample shows a cause; ``phrases`` describe it, without any its name does."""
+    """A cause that is shown; ``phrases`` describe it, without any its name does."""
 
     name: CauseName
-    present: bool
-    token: Token | None = None  # None: this decision, without a sample
     phrases: Phrases = ()
 
 
@@ -135,27 +141,38 @@ Latches = Mapping[CauseName, Held]
 
 
 def observe(
-    held: Latches, seen: Iterable[Observation], now_ns: int, settle_ns: int = 0, decision: int = 0
+    held: Latches,
+    seen: Iterable[Observation],
+    among: Container[CauseName],
+    now_ns: int,
+    *,
+    samples: Mapping[CauseName, Token] = {},
+    settle_ns: int = 0,
+    decision: int = 0,
 ) -> dict[CauseName, Held]:
-    """Return the held causes after these observations; unobserved causes stay held.
+    """Return the held causes after an observation of those ``among`` all; the others stay held.
 
-    ``settle_ns`` applies to causes that clear by ``SETTLED``. ``decision`` is the number of this
-    decision. A decision observes each cause once, so identities are unique.
+    ``samples`` are the tokens of causes that a sample shows, ``settle_ns`` applies to causes that
+    clear by ``SETTLED``, ``decision`` is the number of this decision. A decision observes each
+    cause once, so identities are unique.
     """
+    shown = {one.name: one.phrases or (Phrase(one.name),) for one in seen}
     result = dict(held)
-    for one in seen:
-        old, token = held.get(one.name), one.token or (0, now_ns)
-        if one.present:
-            phrases = one.phrases or (Phrase(one.name),)
-            since_ns, id_ = now_ns, decision * len(RULES) + _ROW[one.name]
-            if old and old.good < GOOD_SAMPLES:
-                since_ns, id_ = old.since_ns, old.id
-            result[one.name] = Held(since_ns, now_ns, 0, token, phrases, id_)
-        elif old and _is_over(one.name, old, now_ns, settle_ns):
-            del result[one.name]
-        elif old:
-            good = old.good + (token != old.token)
-            result[one.name] = replace(old, good=good, token=token)
+    for name, old in held.items():
+        if name not in among or name in shown:
+            continue
+        if _is_over(name, old, now_ns, settle_ns):
+            del result[name]
+        else:
+            token = samples.get(name, (0, now_ns))
+            result[name] = replace(old, good=old.good + (token != old.token), token=token)
+    for name, phrases in shown.items():
+        since_ns, id_ = now_ns, decision * len(RULES) + _ROW[name]
+        before = held.get(name)
+        if before and before.good < GOOD_SAMPLES:
+            since_ns, id_ = before.since_ns, before.id
+        token = samples.get(name, (0, now_ns))
+        result[name] = Held(since_ns, now_ns, 0, token, phrases, id_)
     return result
 
 
@@ -168,7 +185,12 @@ def _is_over(name: CauseName, old: Held, now_ns: int, settle_ns: int) -> bool:
 
 def latched(held: Latches) -> tuple[CauseName, ...]:
     """Return the names of the causes that require a reset, worst first."""
-    return ordered(name for name in held if clears(name) is Clears.RESET)
+    return ordered(LATCHING & held.keys())
+
+
+def needs_reset(held: Latches) -> bool:
+    """Return whether any cause requires a reset."""
+    return not LATCHING.isdisjoint(held)
 
 
 def ordered(names: Iterable[CauseName]) -> tuple[CauseName, ...]:

@@ -1,17 +1,15 @@
-"""Conditions: the causes that the inputs raise, independent of any request."""
+"""Conditions: the causes that the inputs show, independent of any request."""
 
 from collections.abc import Iterator
-from typing import Any, TypeVar
+from typing import Any
 
 from common.freshness import NS_PER_S, Latest, fresh
-from services.safety.config import SafetyConfig
+from services.safety.config import SafetyConfig, TimeLimits
 from services.safety.core.causes import Observation, Token
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch
 from services.safety.core.state import State
-from t2.messages import CauseName, Driver, Field, Phrase
-
-T = TypeVar("T")
+from t2.messages import Bumper, CauseName, Driver, Field, Phrase
 
 # The bridge ends a hit after three clear samples, so a hit is at least three samples long. Fewer
 # lost samples cannot hide it.
@@ -22,33 +20,41 @@ STALL_S = 1.0
 
 def observe_inputs(
     inputs: Inputs, settings: SafetyConfig, state: State, now_ns: int
-) -> Iterator[Observation]:
-    """Yield each cause that depends on inputs and state, present or not."""
+) -> list[Observation]:
+    """Return the causes that inputs and state show."""
+    times = settings.times
     judged = state.verdict.judged if state.verdict.judged != (0, 0) else None
-    yield _contact(inputs)
-    yield Observation("estop", _estop_received(inputs, state))
-    yield _estop_reader(inputs, state, now_ns)
-    yield _driver("driver_left", "left", inputs.left)
-    yield _driver("driver_right", "right", inputs.right)
-    yield Observation("leaving", inputs.leaving)
-    yield _starting(inputs, settings, state.speed_limits.missing)
-    yield from _link(inputs)
-    yield _switches(inputs, settings)
-    yield _bumper(inputs, settings, judged, now_ns)
-    yield _silent(inputs, settings, state, now_ns)
-    yield from _motion(state.motion, now_ns)
-    yield from state.speed_limits.observations(now_ns)
-    conflicts = (*state.arbiter.conflict(now_ns), *state.speed_limits.conflicts(now_ns))
-    phrases = (Phrase("two_publishers.of", {"sources": conflicts}),)
-    yield Observation("two_publishers", bool(conflicts), phrases=phrases)
+    shown = (
+        _if(inputs.is_pressed, "contact"),
+        _if(_estop_received(inputs, state), "estop"),
+        _estop_reader(inputs, state, now_ns),
+        _driver("driver_left", "left", inputs.left),
+        _driver("driver_right", "right", inputs.right),
+        _if(inputs.leaving, "leaving"),
+        _starting(inputs, settings, state.speed_limits.missing),
+        *_link(inputs),
+        _switches(inputs, settings),
+        _bumper(inputs, times, judged, now_ns),
+        _silent(inputs, settings, state, now_ns),
+        *_motion(state.motion, now_ns),
+        *state.speed_limits.observations(now_ns),
+        _two_publishers(state, now_ns),
+    )
+    return [one for one in shown if one]
 
 
-def _contact(inputs: Inputs) -> Observation:
-    bumper = inputs.bumper
-    if bumper is None:
-        return Observation("contact", False)
-    sample = bumper.value
-    return Observation("contact", sample.pressed, (sample.boot, sample.seq))
+def samples(inputs: Inputs) -> dict[CauseName, Token]:
+    """Return the tokens of the samples that show a cause or not."""
+    streams: dict[CauseName, Latest[Bumper] | Latest[Driver] | None] = {
+        "contact": inputs.bumper,
+        "driver_left": inputs.left,
+        "driver_right": inputs.right,
+    }
+    return {name: (it.value.boot, it.value.seq) for name, it in streams.items() if it}
+
+
+def _if(shown: bool, name: CauseName, *phrases: Phrase) -> Observation | None:
+    return Observation(name, phrases) if shown else None
 
 
 def _estop_received(inputs: Inputs, state: State) -> bool:
@@ -57,29 +63,25 @@ def _estop_received(inputs: Inputs, state: State) -> bool:
     return waiting not in (None, state.estop) or inputs.estop
 
 
-def _estop_reader(inputs: Inputs, state: State, now_ns: int) -> Observation:
+def _estop_reader(inputs: Inputs, state: State, now_ns: int) -> Observation | None:
     """Observe whether an emergency stop may have been missed."""
     if _stalled(state, STALL_S, now_ns):
-        return Observation("estop_reader", True, phrases=(Phrase("estop_reader.stalled"),))
-    lost = state.estop_connection not in (0, inputs.estop_connection)
-    return Observation("estop_reader", lost)
+        return Observation("estop_reader", (Phrase("estop_reader.stalled"),))
+    return _if(state.estop_connection not in (0, inputs.estop_connection), "estop_reader")
 
 
 def _stalled(state: State, age_s: float, now_ns: int) -> bool:
     return state.decided_ns is not None and now_ns - state.decided_ns > age_s * NS_PER_S
 
 
-def _driver(name: CauseName, side: str, latest: Latest[Driver] | None) -> Observation:
-    if latest is None:
-        return Observation(name, False)
-    sample = latest.value
-    faulty = bool(sample.bits or sample.faults)
-    faults = sample.faults or (f"bits {sample.bits:#x}",)
-    phrases = (Phrase("driver.faults", {"side": side, "faults": faults}),)
-    return Observation(name, faulty, (sample.boot, sample.seq), phrases)
+def _driver(name: CauseName, side: str, latest: Latest[Driver] | None) -> Observation | None:
+    if latest is None or not (latest.value.bits or latest.value.faults):
+        return None
+    faults = latest.value.faults or (f"bits {latest.value.bits:#x}",)
+    return Observation(name, (Phrase("driver.faults", {"side": side, "faults": faults}),))
 
 
-def _starting(inputs: Inputs, settings: SafetyConfig, keepalives: list[str]) -> Observation:
+def _starting(inputs: Inputs, settings: SafetyConfig, keepalives: list[str]) -> Observation | None:
     needed: dict[str, Latest[Any] | None] = {
         "velocity": inputs.velocity,
         "ultrasonic": inputs.ultrasonic,
@@ -100,75 +102,82 @@ def _starting(inputs: Inputs, settings: SafetyConfig, keepalives: list[str]) -> 
         phrases.append(Phrase("starting.missing", {"inputs": tuple(missing)}))
     if keepalives:
         phrases.append(Phrase("starting.keepalives", {"names": tuple(keepalives)}))
-    return Observation("starting", bool(phrases), phrases=tuple(phrases))
+    return _if(bool(phrases), "starting", *phrases)
 
 
 def _link(inputs: Inputs) -> Iterator[Observation]:
     if inputs.link is None:
         return
     link = inputs.link.value
-    yield Observation("link", link.state != "up", phrases=(Phrase(f"link.{link.state}"),))
-    phrases = (Phrase("unarmed"), *link.waiting_phrases)
-    yield Observation("unarmed", link.state == "up" and not link.armed, phrases=phrases)
+    if link.state != "up":
+        yield Observation("link", (Phrase(f"link.{link.state}"),))
+    elif not link.armed:
+        yield Observation("unarmed", (Phrase("unarmed"), *link.waiting_phrases))
     # The bridge stores a latch until safety confirms it, so that a latch survives a restart of
     # safety. The bridge's own boot means a motion that it braked without a safety service.
-    due = link.latched_by not in (None, inputs.boot)
-    moved = due and link.latched_by == link.boot
-    phrases = (Phrase("predecessor.moved"),) if moved else ()
-    yield Observation("predecessor", due, phrases=phrases)
+    if link.latched_by not in (None, inputs.boot):
+        moved = link.latched_by == link.boot
+        yield Observation("predecessor", (Phrase("predecessor.moved"),) if moved else ())
 
 
-def _switches(inputs: Inputs, settings: SafetyConfig) -> Observation:
+def _switches(inputs: Inputs, settings: SafetyConfig) -> Observation | None:
     if inputs.switches is None or not settings.board.require_switches:
-        return Observation("switches", False)
+        return None
     switches = inputs.switches.value
     verified = switches.ultrasonic_brake is True and switches.bumper_brake is True
-    return Observation("switches", not verified)
+    return _if(not verified, "switches")
 
 
 def _bumper(
-    inputs: Inputs, settings: SafetyConfig, judged: Token | None, now_ns: int
-) -> Observation:
+    inputs: Inputs, times: TimeLimits, judged: Token | None, now_ns: int
+) -> Observation | None:
     if inputs.bumper is None:
-        return Observation("bumper", False)
-    if not fresh(inputs.bumper, now_ns, settings.times.bumper_age):
-        return Observation("bumper", True)
+        return None
+    if not fresh(inputs.bumper, now_ns, times.bumper_age):
+        return Observation("bumper")
     boot, seq = inputs.bumper.value.boot, inputs.bumper.value.seq
     if judged is not None and boot != judged[0]:
-        return Observation("bumper", True, phrases=(Phrase("bumper.restarted"),))
+        return Observation("bumper", (Phrase("bumper.restarted"),))
     lost = judged is not None and seq - judged[1] > LOST_SAMPLES
-    return Observation("bumper", lost, phrases=(Phrase("bumper.samples"),))
+    return _if(lost, "bumper", Phrase("bumper.samples"))
 
 
-def _silent(inputs: Inputs, settings: SafetyConfig, state: State, now_ns: int) -> Observation:
+def _silent(
+    inputs: Inputs, settings: SafetyConfig, state: State, now_ns: int
+) -> Observation | None:
+    times, needs_switches = settings.times, settings.board.require_switches
     # A sample counts from its reception; samples queued during a stall seem new afterwards.
-    if _stalled(state, settings.times.bumper_age, now_ns):
-        return Observation("silent", True, phrases=(Phrase("silent.stalled"),))
-    too_old = {
-        "velocity": _is_old(inputs.velocity, settings.times.velocity_age, now_ns),
-        "link": _is_old(inputs.link, settings.times.link_age, now_ns),
-        "switches": settings.board.require_switches
-        and _is_old(inputs.switches, settings.times.switches_age, now_ns),
-        "driver_left": _is_old(inputs.left, settings.times.driver_age, now_ns),
-        "driver_right": _is_old(inputs.right, settings.times.driver_age, now_ns),
-        "estop_path": _is_old(inputs.estop_path, settings.times.estop_path_age, now_ns),
-    }
-    old = tuple(name for name, is_old in too_old.items() if is_old)
-    return Observation("silent", bool(old), phrases=(Phrase("silent.old", {"inputs": old}),))
+    if _stalled(state, times.bumper_age, now_ns):
+        return Observation("silent", (Phrase("silent.stalled"),))
+    limits: tuple[tuple[str, Latest[Any] | None, float], ...] = (
+        ("velocity", inputs.velocity, times.velocity_age),
+        ("link", inputs.link, times.link_age),
+        ("switches", inputs.switches if needs_switches else None, times.switches_age),
+        ("driver_left", inputs.left, times.driver_age),
+        ("driver_right", inputs.right, times.driver_age),
+        ("estop_path", inputs.estop_path, times.estop_path_age),
+    )
+    old = [name for name, latest, age_s in limits if latest and not fresh(latest, now_ns, age_s)]
+    return _if(bool(old), "silent", Phrase("silent.old", {"inputs": tuple(old)}))
 
 
 def _motion(motion: MotionWatch, now_ns: int) -> Iterator[Observation]:
     standstill = motion.standstill
-    twist = standstill.displacement.steady
-    phrase = Phrase("standstill.unknown")
-    if twist is not None:
-        fields: dict[str, Field] = {"linear": twist.linear, "angular": twist.angular}
-        phrase = Phrase("not_stopping.speed", fields)
-    yield Observation("runaway", motion.runs_away)
-    yield Observation("uncommanded_motion", standstill.has_left)
-    yield Observation("not_stopping", standstill.is_late(now_ns), phrases=(phrase,))
+    if motion.runs_away:
+        yield Observation("runaway")
+    if standstill.has_left:
+        yield Observation("uncommanded_motion")
+    if standstill.is_late(now_ns):
+        twist = standstill.displacement.steady
+        phrase = Phrase("standstill.unknown")
+        if twist is not None:
+            fields: dict[str, Field] = {"linear": twist.linear, "angular": twist.angular}
+            phrase = Phrase("not_stopping.speed", fields)
+        yield Observation("not_stopping", (phrase,))
 
 
-def _is_old(latest: Latest[T] | None, age_s: float, now_ns: int) -> bool:
-    """Return whether a stream that had samples has none within ``age_s``."""
-    return latest is not None and not fresh(latest, now_ns, age_s)
+def _two_publishers(state: State, now_ns: int) -> Observation | None:
+    conflicts = (*state.arbiter.conflict(now_ns), *state.speed_limits.conflicts(now_ns))
+    return _if(
+        bool(conflicts), "two_publishers", Phrase("two_publishers.of", {"sources": conflicts})
+    )

@@ -52,10 +52,7 @@ class Zones(Struct, frozen=True):
     def limit(self, twist: Twist, distances: Sequence[float]) -> SonarLimit:
         """Return the limit on a twist; a factor of 0 means blocked."""
         tightest = SonarLimit(1.0)
-        for sonar, axis in enumerate(self.axes):
-            speed, way = self._stopping(axis, twist)
-            if max(speed, way) <= GRAZING:
-                continue
+        for sonar, speed, way in self._approached(twist, distances):
             factor = self._factor(speed, way, distances[sonar])
             if factor < tightest.factor:
                 tightest = SonarLimit(factor, sonar)
@@ -63,8 +60,7 @@ class Zones(Struct, frozen=True):
 
     def too_fast(self, measured: Twist, distances: Sequence[float]) -> int | None:
         """Return the sonar toward which the measured speed is too high, if any."""
-        for sonar, axis in enumerate(self.axes):
-            speed, way = self._stopping(axis, measured)
+        for sonar, speed, way in self._approached(measured, distances):
             if speed <= MEASURED_CREEP_MPS:
                 continue
             allowed = speed * self._factor(speed, way, distances[sonar])
@@ -72,14 +68,25 @@ class Zones(Struct, frozen=True):
                 return sonar
         return None
 
-    def _stopping(self, axis: Axis, twist: Twist) -> tuple[float, float]:
-        """Return the speed of approach (m/s), and the way of stopping toward the sonar's sector."""
-        driving, turning = axis.approach(twist)
+    def _approached(
+        self, twist: Twist, distances: Sequence[float]
+    ) -> Iterator[tuple[int, float, float]]:
+        """Yield each sonar with an echo that a twist approaches.
+
+        With the speed of approach (m/s), and the way of stopping (m) toward the sonar's sector.
+        """
         linear_s = abs(twist.linear) / self.deceleration
         angular_s = abs(twist.angular) / self.angular_deceleration
-        together = (driving + turning) * max(linear_s, angular_s)
-        apart = driving * linear_s + turning * angular_s
-        return max(0.0, driving + turning), max(together, apart) / 2
+        longer_s = max(linear_s, angular_s)
+        for sonar, axis in enumerate(self.axes):
+            if distances[sonar] == math.inf:
+                continue
+            driving, turning = axis.approach(twist)
+            speed = driving + turning
+            apart = driving * linear_s + turning * angular_s
+            way = max(speed * longer_s, apart) / 2
+            if speed > GRAZING or way > GRAZING:
+                yield sonar, max(0.0, speed), way
 
     def _factor(self, speed: float, way: float, distance: float) -> float:
         """Return the factor for a twist to stop before the margin; above 1 it may go faster.
@@ -87,9 +94,9 @@ class Zones(Struct, frozen=True):
         With the factor the speed shrinks, and the way of stopping with its square:
         f * speed * react + f^2 * way is the room.
         """
-        room = max(0.0, distance - self.margin)
-        if room in (0.0, math.inf):
-            return room
+        room = distance - self.margin
+        if room <= 0.0:
+            return 0.0
         reacting = speed * self.react
         return 2 * room / (reacting + math.sqrt(reacting * reacting + 4 * way * room))
 
@@ -152,14 +159,15 @@ class Planner:
 
     def cautious(self, state: State, source: str | None) -> tuple[float, ...]:
         """Return the distances that a source plans with."""
-        distances = state.sonar_array.cautious(self.creep_room)
-        return self._with_overrides(distances, state, source)
+        return self._with_overrides(state.sonar_array.cautious, state, source)
 
     def _with_overrides(
         self, distances: tuple[float, ...], state: State, source: str | None
     ) -> tuple[float, ...]:
         """Return the distances, with creep room toward faulty sonars that the source overrides."""
         overridden = state.overrides.acknowledged_by(source)
+        if not overridden:
+            return distances
         return tuple(
             self.creep_room if n in overridden else distance for n, distance in enumerate(distances)
         )
@@ -173,7 +181,8 @@ class Planner:
         sent = state.verdict
         current = sent.twist if sent.command is RUN else ramp_start(measured, target)
         ramped = ramp(current, target, self._up, self._down, step_s)
-        here = self.zones.limit(ramped, distances)  # the curve on the ramp is another one
+        # On the ramp the curve is another one.
+        here = SonarLimit(1.0) if ramped == target else self.zones.limit(ramped, distances)
         for tightest in (limit, here):
             if tightest.factor == 0:
                 return Plan(blocked_by=tightest.sonar)
@@ -219,8 +228,8 @@ def _overlap(measured: float, target: float) -> float:
 def observations(
     state: State, requested: RequestedTwist | None, plan: Plan
 ) -> Iterator[Observation]:
-    """Yield the causes that depend on a request, present or not."""
-    present: dict[CauseName, bool] = {
+    """Yield the causes that a request shows."""
+    shown: dict[CauseName, bool] = {
         "no_request": requested is None,
         "neutral": _neutral_is_due(state, requested),
         "release": requested is not None and requested.is_release,
@@ -229,8 +238,9 @@ def observations(
         "obstacle": plan.slowed_by is not None,
         "sonar": state.sonar_array.is_doubted,
     }
-    for name, is_present in present.items():
-        yield Observation(name, is_present)
+    for name, is_shown in shown.items():
+        if is_shown:
+            yield Observation(name)
 
 
 def _neutral_is_due(state: State, requested: RequestedTwist | None) -> bool:

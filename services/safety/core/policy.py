@@ -29,16 +29,19 @@ from services.safety.core.arbiter import Arbiter
 from services.safety.core.causes import (
     BARRING,
     BY_NAME,
-    Clears,
+    FAILING,
+    FLAPPING,
+    OF_INPUTS,
+    OF_REQUESTS,
+    SETTLING,
     Latches,
     Observation,
-    clears,
-    latched,
+    needs_reset,
     observe,
     ordered,
 )
 from services.safety.core.channel import Admission
-from services.safety.core.conditions import observe_inputs
+from services.safety.core.conditions import observe_inputs, samples
 from services.safety.core.inputs import DriveRequest, Inputs, SourceRequest
 from services.safety.core.motion_watch import Supervisor
 from services.safety.core.planning import Plan, Planner, observations
@@ -69,7 +72,9 @@ class Policy:
     def __init__(self, settings: SafetyConfig) -> None:
         self.settings = settings
         self.planner = Planner(settings)
-        self._sonar_filter = SonarFilter(self.planner.zones.axes, settings.times.ultrasonic_age)
+        self._sonar_filter = SonarFilter(
+            self.planner.zones.axes, settings.times.ultrasonic_age, self.planner.creep_room
+        )
         self._supervisor = Supervisor(settings)
 
     def start(self) -> State:
@@ -135,8 +140,8 @@ class Policy:
             estop_connection=inputs.estop_connection or state.estop_connection,
             estop=inputs.link.value.estop if inputs.link else None,
         )
-        is_latched = bool(latched(state.latches))
-        return Decision(state, _motion(verdict, inputs, state.estop, is_latched=is_latched))
+        motion = _motion(verdict, inputs, state.estop, is_latched=needs_reset(state.latches))
+        return Decision(state, motion)
 
     def _sense(self, state: State, inputs: Inputs, step_s: float, now_ns: int) -> State:
         sent, counters = state.verdict, inputs.mileage
@@ -166,11 +171,19 @@ class Policy:
 
     def _observe(self, state: State, inputs: Inputs, now_ns: int) -> State:
         seen = observe_inputs(inputs, self.settings, state, now_ns)
-        held = observe(state.latches, seen, now_ns, SETTLE_NS, state.decision)
-        was_good, is_good = not _failing(state.latches), not _failing(held)
+        held = observe(
+            state.latches,
+            seen,
+            OF_INPUTS,
+            now_ns,
+            samples=samples(inputs),
+            settle_ns=SETTLE_NS,
+            decision=state.decision,
+        )
+        was_good, is_good = FAILING.isdisjoint(state.latches), FAILING.isdisjoint(held)
         budget = state.fault_budget.updated(now_ns, was_good and not is_good, is_good)
-        flapping = Observation("flapping", budget.is_spent)
-        held = observe(held, [flapping], now_ns, decision=state.decision)
+        flapping = [Observation("flapping")] if budget.is_spent else []
+        held = observe(held, flapping, FLAPPING, now_ns, decision=state.decision)
         release = state.release
         if "contact" in held:
             release = release.after(
@@ -202,7 +215,7 @@ class Policy:
             measured = known.value if known else STILL
             plan = self.planner.plan(state, measured, requested, step_s)
         seen = observations(state, requested, plan)
-        held = observe(state.latches, seen, now_ns, decision=state.decision)
+        held = observe(state.latches, seen, OF_REQUESTS, now_ns, decision=state.decision)
         worst = _worst(held.keys() - ignored)
         command = COMMANDS[worst]
         # The verdict's name stays "stop": the cause of it only stops, and the vehicle rolls.
@@ -239,24 +252,15 @@ def _motion(verdict: Verdict, inputs: Inputs, estop: int | None, *, is_latched: 
 
 def _worst(names: Iterable[CauseName]) -> VerdictName:
     """Return the worst action of these causes; "run" without any."""
-    first = next(iter(ordered(names)), None)
-    return BY_NAME[first].action if first else "run"
+    held = ordered(names)
+    return BY_NAME[held[0]].action if held else "run"
 
 
 def _name(worst: VerdictName, held: Latches) -> VerdictName:
     """Return the verdict's name: "inhibited" while inputs or a neutral request are due."""
-    if worst != "stop" or latched(held):
+    if worst != "stop" or needs_reset(held):
         return worst
-    return "inhibited" if _settling(held) or "neutral" in held else "stop"
-
-
-def _settling(held: Iterable[CauseName]) -> bool:
-    return any(clears(name) is Clears.SETTLED for name in held)
-
-
-def _failing(held: Latches) -> bool:
-    """Return whether an input fails; a vehicle that rolls down a slope is not an input."""
-    return _settling(name for name in held if name != "not_stopping")
+    return "inhibited" if "neutral" in held or not SETTLING.isdisjoint(held) else "stop"
 
 
 def _judged(inputs: Inputs) -> tuple[int, int]:

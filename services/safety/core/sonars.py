@@ -101,26 +101,30 @@ class SonarOverrides(Struct, frozen=True):
 
 
 class SonarArray(Struct, frozen=True):
-    """The sonars in the manual's order, and the newest sample processed."""
+    """The sonars in the manual's order, after the newest sample."""
 
     sonars: tuple[Sonar, ...] = SILENT
+    distances: tuple[float, ...] = (0.0,) * len(SONAR_NAMES)  # m, shown to be free
+    cautious: tuple[float, ...] = (0.0,) * len(SONAR_NAMES)  # m, less where a sonar is in doubt
+    is_doubted: bool = True  # whether a sonar is not trusted
     token: Token | None = None
     at_ns: int = 0
     unseen: frozenset[int] = frozenset()  # sonars without a reading while samples are fresh
 
-    @property
-    def distances(self) -> tuple[float, ...]:
-        """The distances that are shown to be free, in metres."""
-        return tuple(sonar.distance for sonar in self.sonars)
-
-    def cautious(self, creep_room: float) -> tuple[float, ...]:
-        """Return the distances to plan with: less where a sonar is in doubt."""
-        return tuple(sonar.cautious(creep_room) for sonar in self.sonars)
-
-    @property
-    def is_doubted(self) -> bool:
-        """Whether a sonar is not trusted."""
-        return any(sonar.fault or sonar.suspect for sonar in self.sonars)
+    @classmethod
+    def of(
+        cls, sonars: tuple[Sonar, ...], creep_room: float, token: Token, at_ns: int
+    ) -> "SonarArray":
+        """Return the array of these sonars; ``creep_room`` is the distance for the creep speed."""
+        return cls(
+            sonars,
+            distances=tuple(one.distance for one in sonars),
+            cautious=tuple(one.cautious(creep_room) for one in sonars),
+            is_doubted=any(one.fault or one.suspect for one in sonars),
+            token=token,
+            at_ns=at_ns,
+            unseen=frozenset(n for n, one in enumerate(sonars) if one.fault in UNSEEN),
+        )
 
 
 class SonarFilter(Struct, frozen=True):
@@ -128,6 +132,7 @@ class SonarFilter(Struct, frozen=True):
 
     axes: tuple[Axis, ...]
     age_s: float  # limit of a sample's age
+    creep_room: float  # m, at which the creep speed is allowed
 
     def update(
         self,
@@ -160,8 +165,7 @@ class SonarFilter(Struct, frozen=True):
             )
             for n, sonar in enumerate(array.sonars)
         )
-        unseen = frozenset(n for n, sonar in enumerate(sonars) if sonar.fault in UNSEEN)
-        return SonarArray(sonars, token, latest.received_ns, unseen)
+        return SonarArray.of(sonars, self.creep_room, token, latest.received_ns)
 
 
 def _is_alongside(sonar: int, rooms: Sequence[float]) -> bool:

@@ -94,18 +94,17 @@ class SpeedLimits(Struct, frozen=True):
         return twist, tightest
 
     def observations(self, now_ns: int) -> Iterator[Observation]:
-        """Yield the causes that forbid motion, present or not; none without sources."""
-        if not self.sources:
-            return
-        stopping = tuple(f"{name}{one.because}" for name, one in self._valid(now_ns) if one.stops)
-        by = (Phrase("limit_stop.by", {"sources": stopping}),)
-        yield Observation("limit_stop", bool(stopping), phrases=by)
-        silent = tuple(self._silent(now_ns))
-        of = (Phrase("limit_silent.of", {"sources": silent}),)
-        yield Observation("limit_silent", bool(silent), phrases=of)
-        lost = tuple(self._lost(now_ns))
-        kept = (Phrase("estop_keepalive.lost", {"names": lost}),)
-        yield Observation("estop_keepalive", bool(lost), phrases=kept)
+        """Yield the causes that forbid motion."""
+        stopping = [f"{name}{one.because}" for name, one in self._valid(now_ns) if one.stops]
+        if stopping:
+            by = Phrase("limit_stop.by", {"sources": tuple(stopping)})
+            yield Observation("limit_stop", (by,))
+        if silent := self._silent(now_ns):
+            of = Phrase("limit_silent.of", {"sources": tuple(silent)})
+            yield Observation("limit_silent", (of,))
+        if lost := self._lost(now_ns):
+            kept = Phrase("estop_keepalive.lost", {"names": tuple(lost)})
+            yield Observation("estop_keepalive", (kept,))
 
     @property
     def missing(self) -> list[str]:

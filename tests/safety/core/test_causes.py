@@ -69,8 +69,21 @@ def test_order_and_groups_of_the_table() -> None:
 # --- held causes ----------------------------------------------------------------------------
 
 
-def see(held: Latches, name: Any, present: bool, now_ns: int, seq: int = 0) -> Latches:
-    return observe(held, [Observation(name, present, (1, seq))], now_ns, SETTLE_NS)
+def see(
+    held: Latches,
+    name: Any,
+    present: bool,
+    now_ns: int,
+    *,
+    seq: int | None = None,
+    decision: int = 0,
+) -> Latches:
+    """Observe one cause, by a sample with this number, or without one."""
+    seen = [Observation(name)] if present else []
+    samples = {} if seq is None else {name: (1, seq)}
+    return observe(
+        held, seen, {name}, now_ns, samples=samples, settle_ns=SETTLE_NS, decision=decision
+    )
 
 
 @pytest.mark.parametrize(
@@ -91,11 +104,12 @@ def test_each_way_to_clear(name: Any, now_ns: int, stays: bool) -> None:
 
 @pytest.mark.parametrize(("goods", "same"), [(0, True), (2, True), (3, False), (4, False)])
 def test_a_cause_that_comes_back_after_three_good_samples_is_new(goods: int, same: bool) -> None:
-    held = observe({}, [Observation("contact", True, (1, 1))], 5, decision=100)
+    held = see({}, "contact", True, 5, seq=1, decision=100)
     before = held["contact"]
     for seq in range(2, 2 + goods):
-        held = observe(held, [Observation("contact", False, (1, seq))], seq, decision=100 + seq)
-    after = observe(held, [Observation("contact", True, (1, 50))], 50, decision=150)["contact"]
+        for now_ns in (10 * seq, 10 * seq + 1):  # one good sample counts once
+            held = see(held, "contact", False, now_ns, seq=seq, decision=100 + seq)
+    after = see(held, "contact", True, 50, seq=50, decision=150)["contact"]
     expected = (before.id, 5) if same else (before.id + 50 * len(RULES), 50)
     assert (after.id, after.since_ns, after.bad_ns) == (*expected, 50)
 
@@ -112,13 +126,23 @@ def test_the_fault_budget_drains_faster_than_it_refills() -> None:
 
 
 def test_a_cause_that_began_in_this_decision() -> None:
-    held = observe({}, [Observation("estop", True)], 5)
+    held = see({}, "estop", True, 5)
     assert held["estop"].id == [rule.name for rule in RULES].index("estop")
-    assert observe({}, [Observation("link", True)], 5, decision=2).keys() == {"link"}
-    both = observe(held, [Observation("driver_left", True)], 6, decision=2)
+    assert see({}, "link", True, 5, decision=2).keys() == {"link"}
+    both = see(held, "driver_left", True, 6, decision=2)
     assert (begun(both, 0), begun(both, 1), begun(both, 2)) == (("estop",), (), ("driver_left",))
 
 
 def test_without_a_time_to_settle_a_cause_clears_at_once() -> None:
-    held = observe({}, [Observation("link", True)], 5)
-    assert observe(held, [Observation("link", False)], 5) == {}
+    held = see({}, "link", True, 5)
+    assert observe(held, [], {"link"}, 5) == {}
+    assert observe(held, [], {"bumper"}, 5) == held  # nobody looked
+
+
+def test_without_a_sample_each_decision_counts() -> None:
+    held = see({}, "estop", True, 5)
+    assert [(held := see(held, "estop", False, 6 + n))["estop"].good for n in (0, 0, 1)] == [
+        1,
+        1,
+        2,
+    ]

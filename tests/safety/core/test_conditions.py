@@ -11,8 +11,7 @@ from common.settings import Board
 from common.standstill import Displacement
 from services.safety.config import LimitSource, SafetyConfig
 from services.safety.core.arbiter import Arbiter, DriveChannel
-from services.safety.core.causes import Observation
-from services.safety.core.conditions import observe_inputs
+from services.safety.core.conditions import observe_inputs, samples
 from services.safety.core.inputs import Inputs
 from services.safety.core.motion_watch import MotionWatch, Phase, Standstill
 from services.safety.core.policy import Policy
@@ -50,46 +49,26 @@ STATE = Policy(SETTINGS).start()
 
 def observed(
     inputs: Inputs, state: State = STATE, settings: SafetyConfig = SETTINGS
-) -> list[Observation]:
-    """Return the observations, absent ones without their text, which nobody reads."""
-    return [
-        one if one.present is True else replace(one, phrases=())
-        for one in observe_inputs(inputs, settings, state, NOW_NS)
-    ]
+) -> dict[str, str]:
+    """Return the texts of the causes that are shown, by name."""
+    seen = observe_inputs(inputs, settings, state, NOW_NS)
+    texts: dict[str, str] = {one.name: render(one.phrases) for one in seen}
+    assert len(texts) == len(seen), "each cause is observed once"
+    return texts
 
 
-def test_good_inputs_raise_nothing() -> None:
+def test_good_inputs_show_nothing() -> None:
+    assert observed(GOOD) == {}
     sample = (BOOT, SEQ)
-    assert observed(GOOD) == [
-        Observation("contact", False, sample),
-        Observation("estop", False),
-        Observation("estop_reader", False),
-        Observation("driver_left", False, sample),
-        Observation("driver_right", False, sample),
-        *(Observation(name, False) for name in (
-            "leaving", "starting", "link", "unarmed", "predecessor", "switches", "bumper",
-            "silent", "runaway", "uncommanded_motion", "not_stopping", "two_publishers",
-        )),
-    ]  # fmt: skip
+    assert samples(GOOD) == {"contact": sample, "driver_left": sample, "driver_right": sample}
 
 
 def test_without_inputs_the_first_samples_are_due() -> None:
-    found = observed(Inputs())
-    assert [(each.name, each.present) for each in found] == [
-        (name, name == "starting")
-        for name in (
-            "contact", "estop", "estop_reader", "driver_left", "driver_right", "leaving",
-            "starting", "switches", "bumper", "silent", "runaway", "uncommanded_motion",
-            "not_stopping", "two_publishers",
-        )
-    ]  # fmt: skip
-    (starting,) = (each for each in found if each.present)
-    assert starting.phrases == (
-        Phrase("starting.missing", {"inputs": (
-            "velocity", "ultrasonic", "bumper", "driver_left", "driver_right", "link", "switches",
-            "estop",
-        )}),
-    )  # fmt: skip
+    assert observed(Inputs()) == {
+        "starting": "Waiting for the first sample of: velocity, ultrasonic, bumper, left driver, "
+        "right driver, link, switches, emergency stop.",
+    }
+    assert samples(Inputs()) == {}
 
 
 def bumper(age_s: float = 0.0, **fields: Any) -> dict[str, Any]:
@@ -149,8 +128,7 @@ BY_INPUTS: list[tuple[dict[str, Any], str, str | None]] = [
 
 
 def check(name: str, text: str | None, *given: Any) -> None:
-    (one,) = [each for each in observed(*given) if each.name == name]
-    assert (one.present, render(one.phrases)) == (text is not None, text or "")
+    assert observed(*given).get(name) == text
 
 
 @pytest.mark.parametrize(("changes", "name", "text"), BY_INPUTS)

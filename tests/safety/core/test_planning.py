@@ -254,7 +254,8 @@ def under_way(sent: Twist, seen: tuple[float, ...]) -> State:
     sonars = tuple(Sonar(distance=one, fault="") for one in seen)
     state = Policy(SafetyConfig()).start()
     verdict = Verdict(command=RUN, twist=sent)
-    return replace(state, verdict=verdict, sonar_array=SonarArray(sonars))
+    array = SonarArray.of(sonars, planner().creep_room, (1, 1), 0)
+    return replace(state, verdict=verdict, sonar_array=array)
 
 
 @pytest.mark.parametrize(

@@ -173,7 +173,7 @@ def test_it_never_believes_more_than_the_newest_sample_shows(
         assert sonar.cautious(ROOM_M) <= sonar.distance
 
 
-FILTER = SonarFilter(axes(Vehicle()), age_s=0.3)
+FILTER = SonarFilter(axes(Vehicle()), 0.3, ROOM_M)
 STEP_NS = NS_PER_S // 20
 
 
@@ -205,7 +205,7 @@ def doubts(array: SonarArray) -> str:
 @pytest.mark.parametrize(("reading", "room"), [(1.0, 0.9), (0.08, 0.0), (math.inf, math.inf)])
 def test_a_reading_is_no_room_up_to_the_hull(reading: float, room: float) -> None:
     deep = Vehicle(sonars={"front": Place(x=0.45, y=0.0, yaw=0.0)})
-    made, array = SonarFilter(axes(deep), age_s=0.3), SonarArray()
+    made, array = SonarFilter(axes(deep), 0.3, ROOM_M), SonarArray()
     read = {} if math.isinf(reading) else {"front": reading, "rear": reading}
     for seq in range(1, 4):
         array = made.update(array, sample(seq, **read), Twist(), seq * STEP_NS)

@@ -15,7 +15,6 @@ from common.heartbeat import Heartbeat
 from common.motion import ROUNDED_MPS, ROUNDED_RADPS, STILL, Twist
 from services.safety.config import LimitSource, Safety
 from services.safety.core.arbiter import Arbiter, DriveChannel
-from services.safety.core.causes import Observation
 from services.safety.core.channel import CONFLICT_NS, Admission
 from services.safety.core.inputs import DriveRequest, LimitRequest
 from services.safety.core.speed_limits import LimitChannel, SpeedLimits
@@ -283,6 +282,11 @@ def test_a_reason_shows_no_control_characters() -> None:
     assert limit(LIMITS, 0.2, reason="a\x07b.")[0].channels["lidar"].reason == r"a\u0007b."
 
 
+def shown(limits: SpeedLimits, now_ns: int) -> dict[str, str]:
+    """Return the texts of the causes that forbid motion, by name."""
+    return {one.name: render(one.phrases) for one in limits.observations(now_ns)}
+
+
 @pytest.mark.parametrize(
     ("linear", "angular", "stops"),
     [
@@ -295,23 +299,18 @@ def test_zero_is_a_protective_stop(
     linear: float | None, angular: float | None, stops: bool
 ) -> None:
     limits, _ = limit(LIMITS, linear, angular=angular, reason="PERSON.")
-    stop, silent, _ = limits.observations(0)
-    assert (stop.name, stop.present) == ("limit_stop", stops)
-    assert not silent.present
+    assert shown(limits, 0) == ({"limit_stop": "Stopped by lidar: PERSON."} if stops else {})
     if stops:
-        assert render(stop.phrases) == "Stopped by lidar: PERSON."
         assert limits.limited(Twist(1.0, 1.0), 0) == (STILL, "lidar")
-    assert not next(limits.observations(LEASE_NS + 1)).present
+    assert shown(limits, LEASE_NS + 1).keys() == {"limit_silent"}
     both, _ = limit(limit(LIMITS, 0.0, reason="dog")[0], 0.0, source="fleet")
-    assert render(next(both.observations(0)).phrases) == "Stopped by lidar: dog, fleet."
+    assert shown(both, 0) == {"limit_stop": "Stopped by lidar: dog, fleet."}
 
 
 def test_all_silent_sources_are_named() -> None:
     needed = LimitSource(lease=LEASE_S, silence="stop")
-    _, silent, _ = SpeedLimits({"lidar": needed, "person": needed}).observations(0)
-    assert (silent.name, render(silent.phrases)) == (
-        "limit_silent", "No speed limit arrives from lidar, person.",
-    )  # fmt: skip
+    both = SpeedLimits({"lidar": needed, "person": needed})
+    assert shown(both, 0) == {"limit_silent": "No speed limit arrives from lidar, person."}
 
 
 def test_states_of_limits() -> None:
@@ -369,13 +368,11 @@ def test_no_limit_raises_any_speed_or_bends_the_curve(
 # --- keepalives -----------------------------------------------------------------------------
 
 
+LOST = {"estop_keepalive": "The emergency stop is no longer kept alive by pendant."}
+
+
 def alive(keepalives: SpeedLimits, now_ns: int) -> bool:
     return not keepalives.states(None, now_ns)[0].silent
-
-
-def lost(keepalives: SpeedLimits, now_ns: int) -> Observation:
-    """Return the cause of emergency stops that are no longer kept alive, present or not."""
-    return [*keepalives.observations(now_ns)][-1]
 
 
 def test_a_keepalive_counts_from_the_echoed_heartbeat() -> None:
@@ -390,9 +387,7 @@ def test_a_keepalive_counts_from_the_echoed_heartbeat() -> None:
 def test_another_program_under_the_name_is_a_loss_at_any_time(now_ns: int) -> None:
     other, refused = keep(keep(KEPT)[0], now_ns, boot=2, echo=42)
     assert refused == ("second_publisher" if now_ns <= TIMEOUT_NS else "")
-    seen = lost(other, now_ns)
-    assert (seen.name, seen.present) == ("estop_keepalive", True)
-    assert render(seen.phrases) == "The emergency stop is no longer kept alive by pendant."
+    assert shown(other, now_ns) == LOST
     assert other.channels["pendant"].in_conflict(now_ns + CONFLICT_NS - 1)
     assert other.conflicts(now_ns) == []  # the cause that latches says it
     assert other.states(None, now_ns)[0].effect == "brake"
@@ -402,28 +397,28 @@ def test_another_program_under_the_name_is_a_loss_at_any_time(now_ns: int) -> No
 def test_a_gap_is_a_loss_although_the_program_is_the_same(now_ns: int, is_lost: bool) -> None:
     later, refused = keep(keep(KEPT)[0], now_ns, echo=42, seq=2)
     assert refused == ""
-    assert lost(later, now_ns).present is is_lost
+    assert shown(later, now_ns) == (LOST if is_lost else {})
     assert alive(later, now_ns) is not is_lost
 
 
 def test_a_name_that_was_never_received_is_missing_and_not_lost() -> None:
     assert KEPT.missing == ["pendant", "web"]
-    assert not lost(KEPT, 0).present
+    assert shown(KEPT, 0) == {}
     keepalives, _ = keep(KEPT)
     assert keepalives.missing == ["web"]
-    assert not lost(keepalives, 0).present
+    assert shown(keepalives, 0) == {}
     pendant, web = keepalives.states(None, 500 * MS)
     assert (pendant.age, pendant.silent, pendant.effect) == (0.5, False, "none")
     assert (web.age, web.silent, web.effect) == (None, True, "stop")
     assert (web.lease, web.silence) == (TIMEOUT_S, "latch")
-    cause = lost(keep(keepalives, source="web")[0], 2 * TIMEOUT_NS)
-    assert render(cause.phrases) == "The emergency stop is no longer kept alive by pendant, web."
-    others = [one.present for one in [*keepalives.observations(2 * TIMEOUT_NS)][:-1]]
-    assert others == [False, False]  # neither a protective stop nor a silent limit
+    both, _ = keep(keepalives, source="web")
+    assert shown(both, 2 * TIMEOUT_NS) == {  # neither a protective stop nor a silent limit
+        "estop_keepalive": "The emergency stop is no longer kept alive by pendant, web.",
+    }
 
 
 def test_a_sign_of_life_may_have_a_cap_that_holds_as_long() -> None:
     keepalives, _ = keep(KEPT, linear=0.2)
     assert keepalives.limited(Twist(1.0), TIMEOUT_NS) == (Twist(0.2), "pendant")
     assert keepalives.limited(Twist(1.0), TIMEOUT_NS + 1) == (Twist(1.0), None)
-    assert lost(keepalives, TIMEOUT_NS + 1).present
+    assert shown(keepalives, TIMEOUT_NS + 1) == LOST
