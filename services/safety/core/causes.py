@@ -146,9 +146,9 @@ def observe(
     among: Container[CauseName],
     now_ns: int,
     *,
+    decision: int,
     samples: Mapping[CauseName, Token] = {},
     settle_ns: int = 0,
-    decision: int = 0,
 ) -> dict[CauseName, Held]:
     """Return the held causes after an observation of those ``among`` all; the others stay held.
 

@@ -135,12 +135,18 @@ def test_a_cause_that_began_in_this_decision() -> None:
 
 def test_without_a_time_to_settle_a_cause_clears_at_once() -> None:
     held = see({}, "link", True, 5)
-    assert observe(held, [], {"link"}, 5) == {}
-    assert observe(held, [], {"bumper"}, 5) == held  # nobody looked
+    assert observe(held, [], {"link"}, 5, decision=0) == {}
+    assert observe(held, [], {"bumper"}, 5, decision=0) == held  # nobody looked
+
+
+def test_the_sample_that_shows_a_cause_is_no_good_one() -> None:
+    held = see({}, "contact", True, 5, seq=1)
+    assert see(held, "contact", False, 6, seq=1)["contact"].good == 0
 
 
 def test_without_a_sample_each_decision_counts() -> None:
     held = see({}, "estop", True, 5)
+    assert see(held, "estop", False, 5)["estop"].good == 0
     assert [(held := see(held, "estop", False, 6 + n))["estop"].good for n in (0, 0, 1)] == [
         1,
         1,
