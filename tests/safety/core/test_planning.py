@@ -242,11 +242,21 @@ def test_a_ramp_begins_with_what_is_wanted_of_the_motion(
     assert ramp_start(Twist(measured, measured), Twist(target, target)) == Twist(begin, begin)
 
 
+def test_a_sonar_that_is_grazed_hides_no_other_one(field: Zones) -> None:
+    near = [2.0] * 8
+    near[SONAR_NAMES.index("front")] = 0.25
+    assert field.too_fast(Twist(1.0, 0.01), near) == SONAR_NAMES.index("front")
+
+
 # --- a plan ---------------------------------------------------------------------------------
 
 
 def planner() -> Planner:
     return Planner(SafetyConfig())
+
+
+def test_it_reaches_from_the_middle_to_the_corners() -> None:
+    assert Planner(SafetyConfig(vehicle=Vehicle(length=0.8, width=0.6))).reach == 0.5
 
 
 def under_way(sent: Twist, seen: tuple[float, ...]) -> State:
