@@ -1,16 +1,18 @@
-"""The client library on the simulated stack, in simulated time: no router, no thread, no sleep.
+"""The client library on the simulated stack, in simulated time: no router, no sleep.
 
-``session`` stands for Zenoh, ``SimulatedTime`` for the clock. Whatever waits turns the stack, so a
-lap takes some seconds and is the same each time.
+``SimulatedSession`` stands for Zenoh, ``SimulatedTime`` for ``time`` and ``threading``. Threads run
+one at a time, and time passes only when all of them wait: a lap takes some seconds and is the same
+each time.
 """
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import msgspec
-import pytest
 
 import cli.demo.lap
 import t2
@@ -18,15 +20,24 @@ import t2.drive
 import t2.publisher
 import t2.robot
 import t2.stream
+import t2.third_party
+import verification.harness.waiting
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from sim.config import load_plan
+from t2 import keys
 from t2 import messages as m
-from verification.search.bus import MS, Envelope, Subscription
-from verification.search.stack import ASK_NS, Stack
+from t2.robot import CALL_S
+from verification.search.bus import MS, ROBOT, Caller, Envelope, Subscription, matches
+from verification.search.stack import Stack
 
 ENCODE = msgspec.msgpack.encode
 TICK_MS = 10
+CALLS = {call.on(ROBOT): call for call in (keys.RESET, keys.SET_POSE, keys.SET_LED)}
+MODULES = (
+    cli.demo.lap, t2.drive, t2.publisher, t2.robot, t2.stream, t2.third_party,
+    verification.harness.waiting,
+)  # fmt: skip
 
 
 def raw(payload: bytes) -> SimpleNamespace:
@@ -34,30 +45,24 @@ def raw(payload: bytes) -> SimpleNamespace:
     return SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: payload))
 
 
-class SimulatedStack(Stack):
-    """The stack in a world, with the shipped settings of the vehicle.
+class Turn:
+    """A thread that waits for its turn."""
 
-    The calls of ``each_beat`` are made 20 times a second.
-    """
-
-    def __init__(self, world: str = "office") -> None:
-        super().__init__(plan=load_plan(world, Vehicle()), step_ns=TICK_MS * MS)
-        self.each_beat: list[Callable[[], object]] = []
-        self.answers: list[bool] = []  # to resets
-
-    def advance(self) -> None:
-        """Turn for one tick."""
-        self.run(TICK_MS)
-        if self.net.now_ns % ASK_NS == 0:
-            for call in self.each_beat.copy():
-                call()
+    def __init__(self, true: Callable[[], object], end_s: float) -> None:
+        self.true, self.end_s = true, end_s
+        self.granted = threading.Event()
 
 
 class SimulatedTime:
-    """The functions of ``time``; sleeping turns the stack."""
+    """The functions of ``time``, and the scheduler of the threads.
 
-    def __init__(self, stack: SimulatedStack) -> None:
+    A thread that waits grants the turn to the first one that has waited long enough. When there is
+    none, the stack advances.
+    """
+
+    def __init__(self, stack: Stack) -> None:
         self._stack = stack
+        self._turns: list[Turn] = []
 
     def monotonic(self) -> float:
         return self._stack.net.now_ns / NS_PER_S
@@ -70,15 +75,75 @@ class SimulatedTime:
     def sleep(self, seconds: float) -> None:
         self.wait_for(lambda: False, seconds)
 
-    def wait_for(self, true: Callable[[], object], timeout: float) -> None:
-        """Turn the stack until a condition is true, or for some seconds."""
-        end_s = self.monotonic() + timeout
-        while not true() and self.monotonic() < end_s:
-            self._stack.advance()
+    def wait_for(self, true: Callable[[], object], timeout: float = float("inf")) -> object:
+        """Wait until a condition is true, or for some seconds; return the condition."""
+        if not (found := true()):
+            turn = self.queue(true, self.monotonic() + timeout)
+            self.grant()
+            turn.granted.wait()
+            found = true()
+        return found
+
+    def queue(self, true: Callable[[], object], end_s: float) -> Turn:
+        """Append a turn for this time or condition."""
+        turn = Turn(true, end_s)
+        self._turns.append(turn)
+        return turn
+
+    def grant(self) -> None:
+        """Grant the next turn."""
+        while True:
+            for turn in self._turns:
+                if self.monotonic() >= turn.end_s or turn.true():
+                    self._turns.remove(turn)
+                    turn.granted.set()
+                    return
+            self._stack.run(TICK_MS)
+
+
+class SimulatedThread:
+    """``threading.Thread``."""
+
+    def __init__(self, time: SimulatedTime, target: Callable[[], object]) -> None:
+        self.ident: int | None = None
+        self._time, self._target = time, target
+        self._alive = False
+
+    def start(self) -> None:
+        self.ident, self._alive = 1, True
+        turn = self._time.queue(lambda: True, 0.0)
+
+        def run() -> None:
+            turn.granted.wait()
+            try:
+                self._target()
+            finally:
+                self._alive = False
+                self._time.grant()
+
+        threading.Thread(target=run, daemon=True).start()
+
+    def is_alive(self) -> bool:
+        return self._alive
+
+    def join(self) -> None:
+        self._time.wait_for(lambda: not self._alive)
+
+
+class SimulatedEvent(threading.Event):
+    """``threading.Event``."""
+
+    def __init__(self, time: SimulatedTime) -> None:
+        super().__init__()
+        self._time = time
+
+    def wait(self, timeout: float | None = None) -> bool:
+        self._time.wait_for(self.is_set, float("inf") if timeout is None else timeout)
+        return self.is_set()
 
 
 class SimulatedCondition:
-    """``threading.Condition`` of a program with one thread."""
+    """``threading.Condition``; it excludes nobody: one thread runs at a time."""
 
     def __init__(self, time: SimulatedTime) -> None:
         self.wait_for = time.wait_for
@@ -90,22 +155,32 @@ class SimulatedCondition:
     def notify_all(self) -> None: ...
 
 
-class SimulatedThread:
-    """The thread of a drive: its ticks are made by the stack, its end by ``join``."""
+class SimulatedStack(Stack):
+    """The stack in a world, with the shipped settings of the vehicle."""
 
-    def __init__(self, stack: SimulatedStack, target: Any) -> None:
-        self._beats, self._end = stack.each_beat, target
-        self._tick: Callable[[], None] = target.__self__._tick
+    def __init__(self, world: str = "office") -> None:
+        super().__init__(plan=load_plan(world, Vehicle()), step_ns=TICK_MS * MS)
+        self.clock = SimulatedTime(self)
+        self.answers: list[bool] = []  # to resets
 
-    def start(self) -> None:
-        self._beats.append(self._tick)
+    def start(self, target: Callable[[], object]) -> SimulatedThread:
+        """Start a thread."""
+        thread = SimulatedThread(self.clock, target)
+        thread.start()
+        return thread
 
-    def is_alive(self) -> bool:
-        return self._tick in self._beats
-
-    def join(self) -> None:
-        self._beats.remove(self._tick)
-        self._end()
+    def answer(self, key: str, payload: bytes) -> Caller:
+        """Call a service; return its answer."""
+        call = CALLS[key]
+        request = msgspec.msgpack.decode(payload, type=call.request)
+        if isinstance(request, m.ResetRequest):
+            caller = self.call_reset(request)
+            self.answers.append(bool(caller.done))
+            return caller
+        with self.time():
+            caller = self.processes[call.server].call(call, request)
+        self.clock.wait_for(lambda: caller.done is not None, CALL_S)
+        return caller
 
 
 class SimulatedSession:
@@ -125,16 +200,25 @@ class SimulatedSession:
         return object()
 
     def declare_publisher(self, key: str, **_: object) -> object:
+        (topic,) = (it for it in (keys.DRIVE, keys.LIMIT) if matches(it.on(ROBOT, source="*"), key))
+
         def put(payload: bytes) -> None:
-            self._process.post(key, msgspec.msgpack.decode(payload, type=m.Drive))
+            self._process.post(key, msgspec.msgpack.decode(payload, type=topic.message))
 
         matching = SimpleNamespace(matching=True)
         return SimpleNamespace(put=put, matching_status=matching, undeclare=lambda: None)
 
-    def get(self, key: str, payload: bytes, **_: object) -> list[SimpleNamespace]:
-        """Reset."""
-        caller = self._stack.call_reset(msgspec.msgpack.decode(payload, type=m.ResetRequest))
-        self._stack.answers.append(bool(caller.done))
+    def put(self, key: str, _: bytes, **__: object) -> None:
+        """Send the emergency stop."""
+        self._process.post(key, m.Message())
+
+    def get(self, key: str, payload: bytes = b"", **_: object) -> list[SimpleNamespace]:
+        """Call a service, or ask safety for its settings."""
+        if key not in CALLS:
+            sources = self._stack.processes["safety"].config.safety.sources
+            settings: dict[str, Any] = {f"safety.sources.{name}.priority": {} for name in sources}
+            return [SimpleNamespace(ok=raw(msgspec.json.encode(settings)), err=None)]
+        caller = self._stack.answer(key, payload)
         if not caller.done:
             return [SimpleNamespace(ok=None, err=raw(caller.text.encode()))]
         return [SimpleNamespace(ok=raw(ENCODE(caller.answer)), err=None)]
@@ -142,20 +226,22 @@ class SimulatedSession:
     def close(self) -> None: ...
 
 
-def simulated_robot(stack: SimulatedStack, patch: pytest.MonkeyPatch) -> t2.Robot:
-    """Return the robot of a stack; the library and the demo run in its time."""
-    time = SimulatedTime(stack)
-    modules = (t2.drive, t2.publisher, t2.robot, t2.stream, cli.demo.lap)
-    for module in modules:
-        patch.setattr(module, "time", time)
-    patch.setattr(
-        t2.stream, "threading", SimpleNamespace(Condition=lambda: SimulatedCondition(time))
-    )
-    thread = SimpleNamespace(
-        Event=threading.Event,
+@contextmanager
+def simulated_robot(stack: SimulatedStack) -> Iterator[t2.Robot]:
+    """Yield the robot of a stack; the library, the demo and the tests' waits run in its time."""
+    time = stack.clock
+    threads = SimpleNamespace(
+        Condition=lambda: SimulatedCondition(time),
+        Event=lambda: SimulatedEvent(time),
         Lock=threading.Lock,
-        Thread=lambda target, **_: SimulatedThread(stack, target),
+        Thread=lambda target, **_: SimulatedThread(time, target),
+        current_thread=threading.current_thread,
     )
-    patch.setattr(t2.drive, "threading", thread)
     session: Any = SimulatedSession(stack)
-    return t2.Robot(session, "001", "simulated")
+    with ExitStack() as patches:
+        for module in MODULES:
+            patches.enter_context(patch.object(module, "time", time))
+        for module in (t2.drive, t2.stream, t2.third_party):
+            patches.enter_context(patch.object(module, "threading", threads))
+        with t2.Robot(session, ROBOT, "simulated") as robot:
+            yield robot

@@ -3,8 +3,6 @@
 from dataclasses import replace
 from functools import cache
 
-import pytest
-
 from cli.demo.lap import Lap
 from cli.demo.score import Trace, good, results, stops
 from sim import trace as t
@@ -15,7 +13,7 @@ from tests.simulated_robot import SimulatedStack, simulated_robot
 def driven() -> tuple[SimulatedStack, list[str]]:
     """Drive a lap; return the stack and what it prints."""
     stack, shown = SimulatedStack(), list[str]()
-    with pytest.MonkeyPatch.context() as patch, simulated_robot(stack, patch) as robot:
+    with simulated_robot(stack) as robot:
         Lap(robot, 1.0, check=lambda: None, show=shown.append).drive()
     return stack, shown
 

@@ -10,7 +10,6 @@ import pytest
 import t2
 import t2.drive
 from sim.requests import Bumper
-from t2.stream import now_s
 from verification.harness.stack import RunningStack
 from verification.harness.waiting import wait_until
 
@@ -92,19 +91,6 @@ def test_the_end_of_the_main_thread_stops_and_exits(
 def await_request(robot: t2.Robot, *, moves: bool) -> None:
     """Wait until the vehicle drives, or stands."""
     wait_until(lambda: (abs(robot.velocity.latest().linear) > 0.02) == moves, "the motion")
-
-
-def test_a_velocity_that_nobody_renews_ends_while_the_drive_stays_open(robot: t2.Robot) -> None:
-    with robot.drive("nav") as drive:
-        drive.velocity(0.1)
-        end_s = drive._target.end_s
-        assert 0.0 < end_s - now_s() <= 0.5
-        await_request(robot, moves=True)
-        await_request(robot, moves=False)  # the program waits for something
-        assert now_s() >= end_s
-        assert drive.is_open
-        drive.velocity(0.1, seconds=10)
-        await_request(robot, moves=True)
 
 
 def test_a_blocked_event_loop_stops_its_motion(robot: t2.Robot, stack: RunningStack) -> None:

@@ -11,7 +11,7 @@ from common.freshness import NS_PER_S
 from t2.messages import Drive, Limit, Motion, ReleaseRequest, SourceMessage, Velocity
 
 LEASE_S, ECHO_AGE_S, RIVAL_S = 0.5, 0.4, 0.5
-NEEDED, IGNORED = "lidar", "fleet"  # whose silence stops; whose silence has no effect
+NEEDED, IGNORED = "lidar", "detector"  # whose silence stops; whose silence has no effect
 SLOWING = (0.6, 1.0)  # m/s^2, rad/s^2
 STEP_S = 0.1  # a decision after a longer pause slows as if it came after this one
 ROUNDING = 2e-3
