@@ -12,6 +12,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from itertools import count
 from pathlib import Path
 from types import FrameType
 from typing import Generic, TypeVar
@@ -250,18 +251,18 @@ def resident_bytes() -> int:
 
 def stop_on_signals(node: Node[C]) -> None:
     """Stop the loop at the first SIGINT or SIGTERM; at the second one run the actions and exit."""
+    signals = count(1)
 
-    def leave(number: int, _: FrameType | None) -> None:
+    def handle(number: int, _: FrameType | None) -> None:
+        if next(signals) == 1:  # the second one may arrive while this handler runs
+            node.loop.stop()
+            return
         try:
             run_exit_actions(node)
         finally:
             os._exit(128 + number)
 
-    def stop(_: int, __: FrameType | None) -> None:
-        _on_signals(leave)
-        node.loop.stop()
-
-    _on_signals(stop)
+    _on_signals(handle)
 
 
 def run_exit_actions(node: Node[C]) -> None:

@@ -1,7 +1,7 @@
 """Client of safety for a tool: the state machines of ``t2.client`` on an inspector.
 
 Everything runs in the tool's own thread: messages are taken and the drive request of each tick is
-sent only inside ``until``. While a tool waits for its user nothing is sent, which is a release, and
+sent only inside ``until``. While a tool waits for its user nothing is sent, which lets go, and
 messages queue up: ``until`` takes all of them before it judges, and ``fresh_state`` none.
 """
 

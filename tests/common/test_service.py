@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import msgspec
@@ -209,6 +209,32 @@ def test_signals_while_it_leaves_do_not_begin_its_exit_anew(
         serve(node)
     assert said == ["begun", "over"]
     assert ended == []
+
+
+def test_a_second_signal_that_arrives_while_the_first_one_is_handled_ends_it(
+    node: Node[Shared], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The guard sends two at once, for BRAKE instead of STOP."""
+    ended: list[int] = []
+    monkeypatch.setattr(os, "_exit", ended.append)
+    stop, install, second = node.loop.stop, signal.signal, iter([signal.SIGTERM])
+
+    def before(call: Callable[..., object]) -> Callable[..., object]:
+        def called(*arguments: object) -> object:
+            for number in second:
+                signal.raise_signal(number)
+            return call(*arguments)
+
+        return called
+
+    def begin(_: int) -> None:
+        monkeypatch.setattr(signal, "signal", before(install))
+        monkeypatch.setattr(node.loop, "stop", before(stop))
+        signal.raise_signal(signal.SIGINT)
+
+    node.loop.every(1.0, begin)
+    serve(node)
+    assert ended == [128 + signal.SIGTERM]
 
 
 def test_systemd_learns_that_it_is_ready_and_lives_from_its_loop_and_that_it_stops(
