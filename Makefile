@@ -52,20 +52,16 @@ FEW = -n 2 --dist worksteal
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/search
 
-# Failed tests run a second time, alone: docs/decisions.md#second-run.
-TESTS = $(BIN)/python -m tools.run_tests
-SECOND_RUN = out/second-run.txt
 # Each worker imports each file that it is given: the timed tests get theirs only.
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
 # The other tests mostly wait. Meanwhile those of the cores take the rest of the CPU.
 test: $(STAMP) ## all tests except search and campaigns, with the coverage of the cores
-	@rm -f $(SECOND_RUN)
-	$(TESTS) $(TIMED) -m "timed and not campaign"
+	$(BIN)/pytest $(TIMED) -m "timed and not campaign"
 	@$(MAKE) --no-print-directory -j2 --output-sync=line others cover
 
 others: $(STAMP)
-	$(TESTS) --ignore=$(SEARCH) $$($(CORE_TESTS) | sed 's/[^ ]*/--ignore=&/g') $(MANY) \
+	$(BIN)/pytest --ignore=$(SEARCH) $$($(CORE_TESTS) | sed 's/[^ ]*/--ignore=&/g') $(MANY) \
 	  -m "not timed and not campaign"
 
 campaigns: $(STAMP) ## short runs of all campaigns and benchmarks, the tour, the programs of docs/integrate.md
@@ -98,13 +94,10 @@ vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews doc
 ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz (with cargo) and older versions of Zenoh
 	$(BIN)/python -m verification.ros2
 
-# The tests that needed a second run are named last, also when a check fails.
 check: $(STAMP) ## what CI runs: lint, types, test, search, mutants of changed cores
-	@rm -f $(SECOND_RUN)
 	@$(MAKE) --no-print-directory -j2 --output-sync lint types
-	@$(MAKE) --no-print-directory test && \
-	  $(MAKE) --no-print-directory search mutants CHANGED=1; code=$$?; \
-	  cat $(SECOND_RUN) 2> /dev/null; exit $$code
+	@$(MAKE) --no-print-directory test
+	@$(MAKE) --no-print-directory search mutants CHANGED=1
 
 lint: $(STAMP)
 	$(BIN)/ruff format --check .
@@ -122,7 +115,7 @@ CORE_TESTS = $(BIN)/python -m verification.mutation --tests
 # Not a branch of a core is untested. These tests yield to the others: they measure no times.
 cover: $(STAMP)
 	$(BIN)/coverage erase
-	nice -n 19 $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
+	nice -n 5 $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
 	$(BIN)/coverage report
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
