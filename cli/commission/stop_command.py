@@ -12,7 +12,7 @@ from cli.recordings.info import open_recording
 from cli.settings import Everything, safety_config
 from common.errors import ConfigError
 from common.standstill import stopping_s
-from services.safety.config import SafetyConfig
+from services.safety.config import DECISION_PERIOD_S, SafetyConfig
 from t2 import keys
 from t2.errors import T2Error
 
@@ -92,7 +92,7 @@ def counted(reasons: Counter[str]) -> str:
 
 def needed(stop: Stop) -> float:
     """Return the distance (m or rad) from the reading to standstill."""
-    return stop.distance + stop.speed * SENSING_S
+    return stop.distance + stop.speed * (SENSING_S + DECISION_PERIOD_S)
 
 
 def reckoned(stop: Stop, settings: SafetyConfig) -> float:
@@ -140,7 +140,7 @@ def verdict(stops: Sequence[Stop], settings: SafetyConfig) -> tuple[bool, Iterat
         )
         yield (
             f"The slowest reaction is {max(each.reaction for each in stops) + SENSING_S:.2f} s "
-            f"from the reading (safety.react is {settings.reaction:g} s)."
+            f"from the reading (safety.react is {settings.reaction - DECISION_PERIOD_S:g} s)."
         )
         body = settings.vehicle
         yield from of_axis(stops, DRIVING, "deceleration", body.deceleration, body.max_linear)

@@ -147,6 +147,11 @@ class Driver(Message, frozen=True, kw_only=True):
     faults: Annotated[tuple[Name, ...], Few]  # names of the known bits, "bit_N" for reserved ones
     bits: int  # all 32, as the board sent them
 
+    @property
+    def has_fault(self) -> bool:
+        """Whether the driver reports any fault."""
+        return bool(self.bits or self.faults)
+
 
 class Switches(Message, frozen=True, kw_only=True):
     """The board's own emergency brakes (manual 2.5 and 2.6); None until it has confirmed them."""

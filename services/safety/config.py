@@ -11,6 +11,8 @@ from common import settings
 from common.settings import Safe, SourceName, allowed
 from t2.messages import Silence
 
+DECISION_PERIOD_S = 1 / 50  # a sample or request waits at most this long
+
 Sources = Meta(max_length=16)  # of a kind: their names are parts of texts, see ``messages.Text``
 
 # Programs that stop requesting when the operator lets go of the controls. For any other source,
@@ -84,7 +86,7 @@ class Safety(settings.Section, frozen=True, kw_only=True):
     )
     # kept free around the vehicle
     margin: Annotated[float, allowed("m", ge=0.0, le=2.0, safe=(0.05, 2.0))] = 0.20
-    # from reading to slowing down
+    # from reading to slowing down, without the wait for a decision
     react: Annotated[float, allowed("s", ge=0.0, le=2.0, safe=(0.1, 2.0))] = 0.25
     # while a sonar is doubtful
     creep_speed: Annotated[float, allowed("m/s", gt=0.0, le=10.0, safe=(0.0, 0.25))] = 0.15
@@ -132,7 +134,7 @@ class SafetyConfig(settings.Shared, frozen=True, kw_only=True):
     @property
     def reaction(self) -> float:
         """Time from a reading to slowing down, on this computer, s."""
-        return self.safety.react + 2 * self.host.stall
+        return self.safety.react + DECISION_PERIOD_S + 2 * self.host.stall
 
     @property
     def leased(self) -> dict[str, Source]:

@@ -1,10 +1,10 @@
 """Bus shell of the safety service: subscribes to inputs and publishes verdicts.
 
-All decisions are made by ``Policy``, 50 times a second. What cannot wait is decided at once: a new
-contact, a driver fault, new ranges, an emergency stop, a reset. A motion leaves at each of the 50
-decisions, and at once if its command is more severe than the last one, or if it acknowledges a new
-hit; such a motion takes the place of the next regular one. So no member of the bus can raise the
-rate of decisions or of frames to the board.
+All decisions are made by ``Policy``, 50 times a second, on the newest samples and requests. What
+cannot wait is decided at once: a new contact, a driver fault, an emergency stop, a reset. A motion
+leaves at each of the 50 decisions, and at once if its command is more severe than the last one;
+then it takes the place of the next regular one. So no member of the bus can raise the rate of
+decisions or of frames to the board.
 """
 
 from collections.abc import Callable, Collection
@@ -18,7 +18,7 @@ from common.freshness import NS_PER_S, Latest, fresh
 from common.heartbeat import Heartbeat
 from common.motion import BRAKE, RUN, STOP
 from common.service import Node
-from services.safety.config import SafetyConfig
+from services.safety.config import DECISION_PERIOD_S, SafetyConfig
 from services.safety.core.conditions import LOST_SAMPLES
 from services.safety.core.inputs import (
     DriveRequest,
@@ -33,6 +33,7 @@ from t2 import keys
 from t2.keys import Topic
 from t2.messages import (
     Bumper,
+    Driver,
     Message,
     Motion,
     Phrase,
@@ -44,7 +45,6 @@ from t2.words import render
 
 M = TypeVar("M", bound=Message)
 
-DECISION_PERIOD_S = 1 / 50
 SEVERITY = {RUN: 0, STOP: 1, BRAKE: 2}
 STATE_PERIOD_S = 1 / 20
 # A single sample latches a hit or a driver fault, and the next one may already be clear. So no
@@ -54,7 +54,7 @@ DRIVE_DEPTH = 64
 
 
 class SafetyService:
-    """Stores the newest samples, decides on each event, and publishes the results."""
+    """Stores the newest samples, decides, and publishes the results."""
 
     def __init__(self, node: Node[SafetyConfig], estop_bus: Bus) -> None:
         self._node = node
@@ -70,7 +70,6 @@ class SafetyService:
         node.is_stopped = self._is_stopped
         self._sent = STOP  # command of the newest motion
         self._has_turn = True  # False while a motion has left in the place of the next regular one
-        self._hit_due = False  # a new hit, for whose acknowledgement the bridge waits
         self._estop_due = False  # another emergency stop while one is latched
         self._may_reset = True  # one reset a period
         self._refused_ns = 0  # when a refused reset was last reported
@@ -119,25 +118,32 @@ class SafetyService:
         drive = self._node.drive
         drive.subscribe(keys.VELOCITY, self._store("velocity"))
         drive.subscribe(keys.MILEAGE, self._store("mileage"))
-        drive.subscribe(keys.ULTRASONIC, self._store("ultrasonic", at_once=True))
+        drive.subscribe(keys.ULTRASONIC, self._store("ultrasonic"))
         drive.subscribe(keys.BUMPER, self._on_bumper, depth=LATCHING_DEPTH)
         for side in ("left", "right"):
-            drive.subscribe(
-                keys.DRIVER, self._store(side, at_once=True), depth=LATCHING_DEPTH, side=side
-            )
+            drive.subscribe(keys.DRIVER, self._store_driver(side), depth=LATCHING_DEPTH, side=side)
         drive.subscribe(keys.SWITCHES, self._store("switches"))
         drive.subscribe(keys.LINK, self._store("link"))
 
-    def _store(self, field: str, *, at_once: bool = False) -> Callable[[Arrival[M]], None]:
+    def _store(self, field: str) -> Callable[[Arrival[M]], None]:
         """Return a handler that stores the newest sample in this field of the inputs."""
 
         def store(arrival: Arrival[M]) -> None:
             latest = Latest(arrival.message, arrival.received_ns)
             self._inputs = replace(self._inputs, **{field: latest})
-            if at_once:
-                self._decide()
 
         return store
+
+    def _store_driver(self, side: str) -> Callable[[Arrival[Driver]], None]:
+        """Return a handler that stores a sample, and decides on a fault at once."""
+        store = self._store(side)
+
+        def on_driver(arrival: Arrival[Driver]) -> None:
+            store(arrival)
+            if arrival.message.has_fault:
+                self._decide()
+
+        return on_driver
 
     def _on_estop_path(self, arrival: Arrival[SafetyState]) -> None:
         if arrival.message.boot == self._node.bus.boot:  # not of a second safety
@@ -148,12 +154,10 @@ class SafetyService:
         age_s = self._node.config.times.bumper_age
         if before is not None and not fresh(before, arrival.received_ns, age_s):
             self._decide()  # no decision may have fallen into the gap that this sample ends
-        self._inputs = replace(self._inputs, bumper=Latest(bumper, arrival.received_ns))
-        self._hit_due |= bumper.pressed and (before is None or not before.value.pressed)
-        # Most samples repeat that the bumper is free, and change no verdict. But a decision counts
-        # the samples since the last one: too many would look like lost ones.
-        due = bumper.seq - self._state.verdict.judged[1] >= LOST_SAMPLES
-        if due or bumper.pressed or before is None or _content(bumper) != _content(before.value):
+        self._store("bumper")(arrival)
+        is_new = bumper.pressed and "contact" not in self._state.latches
+        # A decision counts the samples since the last one: too many would look like lost ones.
+        if is_new or bumper.seq - self._state.verdict.judged[1] >= LOST_SAMPLES:
             self._decide()
 
     def _accept(self, request: SourceRequest) -> None:
@@ -210,8 +214,6 @@ class SafetyService:
             reset=reset,
         )
         self._estop_due = False
-        if hit := self._policy.brake_for_hit(before, inputs):
-            self._send(hit, is_tick=is_tick)
         decision = self._policy.decide(before, inputs, now_ns)
         self._state = decision.state
         self._send(decision.motion, is_tick=is_tick)
@@ -221,11 +223,9 @@ class SafetyService:
         """Publish a motion in its turn, or at once if it may not wait."""
         is_severe = SEVERITY[motion.command] > SEVERITY[self._sent]
         has_turn, self._has_turn = self._has_turn, self._has_turn or is_tick
-        if not (is_severe or (has_turn and (is_tick or self._hit_due))):
-            return
-        self._has_turn = is_tick
-        self._sent, self._hit_due = motion.command, False
-        self._motion_publisher.put(motion)
+        if is_severe or (is_tick and has_turn):
+            self._has_turn, self._sent = is_tick, motion.command
+            self._motion_publisher.put(motion)
 
     def _report(self, before: State, answer: Callable[[Reply], None] | None, now_ns: int) -> None:
         verdict = self._state.verdict
@@ -254,10 +254,6 @@ class SafetyService:
             self._decide()
         measured = self._inputs.measured
         return measured is None or measured.value.is_standing
-
-
-def _content(bumper: Bumper) -> tuple[bool, int]:
-    return bumper.pressed, bumper.boot
 
 
 def source_of(key: str) -> str:

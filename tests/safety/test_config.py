@@ -78,7 +78,7 @@ def test_priorities_are_unique() -> None:
 
 
 def test_it_must_see_as_far_as_it_takes_to_stop() -> None:
-    with pytest.raises(ConfigError, match=r"sonar_max 1.2 m is too near: .* in 1.28 m"):
+    with pytest.raises(ConfigError, match=r"sonar_max 1.2 m is too near: .* in 1.30 m"):
         read("vehicle.sonar_max=1.2")
     assert configured("vehicle.sonar_max=1.2", "vehicle.max_linear=0.9").vehicle.max_linear == 0.9
 

@@ -328,10 +328,6 @@ def knows_at_once(overrides: SonarOverrides, unseen: Any, _: Any, now_ns: int) -
     return SonarOverrides(dict.fromkeys(unseen, now_ns), {"teleop": frozenset(unseen)})
 
 
-def at_the_next_tick(ports: SafetyService, field: str, *, at_once: bool = False) -> Any:
-    return STORE(ports, field)
-
-
 def turning_stops_at_once(settings: SafetyConfig) -> planning.Zones:
     return replace(ZONES(settings), angular_deceleration=1e3)
 
@@ -454,8 +450,9 @@ MUTATIONS: dict[str, Mutation] = {
          lambda s: s.velocities(True, 1000), *GO),
         "safety knows of estop",
     ),
-    "samples are not decided upon one by one": (
-        (SafetyService, "_store", at_the_next_tick), (driver_blinks,), "safety knows of driver",
+    "driver faults are not decided on at once": (
+        (SafetyService, "_store_driver", SafetyService._store), (driver_blinks,),
+        "safety knows of driver",
     ),
     "a source drives on from a standstill": (
         (Arbiter, "at_rest", unchanged),

@@ -75,7 +75,7 @@ def _stalled(state: State, age_s: float, now_ns: int) -> bool:
 
 
 def _driver(name: CauseName, side: str, latest: Latest[Driver] | None) -> Observation | None:
-    if latest is None or not (latest.value.bits or latest.value.faults):
+    if latest is None or not latest.value.has_fault:
         return None
     faults = latest.value.faults or (f"bits {latest.value.bits:#x}",)
     return Observation(name, (Phrase("driver.faults", {"side": side, "faults": faults}),))

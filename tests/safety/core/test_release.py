@@ -356,7 +356,7 @@ def test_a_reset_and_a_new_contact_have_the_way_anew() -> None:
     feed(pressed=True)(fixture)
     release = fixture.release()
     assert release.forbidden == ()
-    assert release.left == pytest.approx(0.15 - 0.025 - 0.1**2 / 1.2)
+    assert release.left == pytest.approx(0.15 - 0.027 - 0.1**2 / 1.2)
     fixture.let_go(2)
     assert fixture.hold() == ""
 
