@@ -55,6 +55,10 @@ BENCHMARKS: Mapping[str, Benchmark] = {
         "What does the chain cost on board?",
         load.cpu, ["", "process"], load.CPU_COLUMNS, load.CPU_LIMITS,
     ),
+    "decision": Benchmark(
+        "How long does safety decide?",
+        load.decisions, [""], load.DECISION_COLUMNS, load.DECISION_LIMITS,
+    ),
     "consumers": Benchmark(
         "What do consumers on board cost?",
         load.consumers, ["consumers"], load.CONSUMER_COLUMNS, load.CONSUMER_LIMITS,

@@ -20,6 +20,7 @@ from t2 import messages as m
 from t2.client import reset_request
 
 SLOW_MPS, STEP_MPS, STEPS = 0.3, 0.001, 20
+TURN_RADPS = 0.4
 PERIOD_S, RESET_TICKS = 0.05, 10
 
 
@@ -54,7 +55,7 @@ class Driver:
         self._source = DriveSource(bus, "teleop")
         self._state: m.SafetyState | None = None
         self._number = self._refusals = 0
-        self._stops = False
+        self._stops = self._turns = False
         self.begin()
         bus.subscribe(keys.SAFETY, self._on_safety)
         loop.every(PERIOD_S, self._request)
@@ -64,8 +65,8 @@ class Driver:
         self.requests: list[tuple[int, float]] = []
 
     def execute(self, word: str) -> None:
-        """Execute ``estop``, which is repeated, or ``go``."""
-        self._stops = word == "estop"
+        """Execute ``estop``, which is repeated, ``turn`` on the spot, or ``go``."""
+        self._stops, self._turns = word == "estop", word == "turn"
         if self._stops:
             self._bus.estop()
 
@@ -79,6 +80,9 @@ class Driver:
             elif state and state.latched and self._refusals % RESET_TICKS == 0:
                 request = reset_request(state)
                 self._bus.call(keys.RESET, request, lambda _: None, lambda _: None)
+            return
+        if self._turns:
+            self._source.request(0.0, TURN_RADPS)
             return
         self._number += 1
         linear = round(SLOW_MPS + STEP_MPS * (self._number % STEPS), 3)

@@ -1,12 +1,14 @@
-"""CPU of the chain beside two bare processes, and of router and bridge for N consumers."""
+"""CPU of the chain beside two bare processes, of N consumers, and the time of a decision."""
 
 import contextlib
 import random
+import signal
 import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ from bench.child_process import ChildProcess
 from bench.figures import CPU, ONE, US, Column, Figures, Limits, Unit
 from bench.processes import cpu_shares, module, one_pool, running
 from bench.reaction import SEED
+from services.safety.config import DECISION_PERIOD_S
 from t2 import keys
 from verification.harness.bus import router_process, set_options
 from verification.harness.ports import free_port, udp_ports
@@ -26,9 +29,11 @@ from verification.harness.waiting import wait_until
 Pids = Mapping[str, int]
 TURNS, TURN_S = 3, 5.0
 CONSUMERS, SETTLE_S, WATCHED_S, AT_ONCE = (1, 5, 20, 50), 1.0, 3.0, 8
+DECISIONS, ALLOWED_NS = 10_000, 100_000
 CONSUME = "bench.zenoh_programs", "consume"
 EVERYTHING = f"{keys.ROOT}/001/tel/**"
 STEADY_S, PATIENCE_S = 1.0, 60.0
+DECISION, ALLOWED = "a decision", "allowed"
 T2, PAIR, TOGETHER = "T2", "two processes, Zenoh, a router", "together"
 # Growth of the cost beyond the number that still counts as proportional: CPU time has a resolution
 # of 10 ms, and other processes use the host.
@@ -87,6 +92,24 @@ def cpu(turns: int = TURNS, seconds: float = TURN_S) -> Figures:
     return samples
 
 
+def decisions(count: int = DECISIONS) -> Figures:
+    """Return the durations of safety's decisions, in ns, while the vehicle turns between walls."""
+    with tempfile.TemporaryDirectory() as name, ExitStack() as held:
+        file = Path(name) / "durations"
+        it = held.enter_context(running_stack(Path(name), "office", shipped=True))
+        it.kill("safety")
+        place = it.commands["safety"].index("services.safety")
+        it.commands["safety"][place : place + 1] = ["bench.timed_safety", str(file)]
+        it.start("safety")
+        held.enter_context(ChildProcess("bench.client", it.endpoint, "drive", "001")).send("turn")
+        wait_until(lambda: abs(it.control.truth().angular) > 0.0, "a motion", PATIENCE_S)
+        time.sleep(STEADY_S + count * DECISION_PERIOD_S)
+        it.processes["safety"].send_signal(signal.SIGTERM)
+        it.processes["safety"].wait(PATIENCE_S)
+        made = list(map(int, file.read_text(encoding="ascii").split()))[-count:]
+    return {(DECISION, "time"): made, (ALLOWED, "time"): [ALLOWED_NS]}
+
+
 def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> Figures:
     """Return CPU, delay and loss with more and more consumers of everything on board."""
     made: dict[tuple[str, ...], Sequence[float]] = {}
@@ -94,7 +117,7 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
         tempfile.TemporaryDirectory() as folder,
         running_stack(Path(folder), shipped=True) as it,
         ThreadPoolExecutor(AT_ONCE) as pool,
-        contextlib.ExitStack() as held,
+        ExitStack() as held,
     ):
         some: list[ChildProcess] = []
         for count in counts:
@@ -118,6 +141,8 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
 SHARE = Column("share", "cpu", CPU)
 CPU_COLUMNS = (SHARE, Column("of the pair's", "cpu", ONE, of=(PAIR, TOGETHER)))
 CPU_LIMITS: Limits = [((T2, TOGETHER), (PAIR, TOGETHER), SHARE, 2.0)]
+DECISION_COLUMNS = Column("p50", "time", US), Column("p99", "time", US, "p99")
+DECISION_LIMITS: Limits = [((DECISION,), (ALLOWED,), DECISION_COLUMNS[0], 1.0)]
 CONSUMER_COLUMNS = (
     Column("router", "router", CPU), Column("bridge", "bridge", CPU),
     Column("delay p50", "delay", US), Column("p99", "delay", US, "p99"),
