@@ -72,6 +72,10 @@ class Loop:
             self._sleeps = False  # one wake-up is enough for all calls until it sleeps again
             self._wake()
 
+    def defer(self, call: Call) -> None:
+        """Queue a call from any thread for when the loop wakes up next; never waits."""
+        self._posted.append(call)
+
     def stop(self) -> None:
         """Make ``run`` return after the current call; safe in a signal handler."""
         self._stopped = True

@@ -155,11 +155,13 @@ class Bus:
         depth: int = 1,
         refused: Callable[[str, MessageError], None] | None = None,
         session: Session | None = None,
+        post: Post | None = None,
         **names: str,
     ) -> None:
         """Call the handler for each message, with a queue of ``depth``.
 
-        When the queue is full, the oldest message is dropped. ``refused`` gets key and error of an
+        When the queue is full, the oldest message is dropped. ``post`` may be ``Loop.defer``, for
+        messages that wait until the owner wakes up. ``refused`` gets key and error of an
         undecodable message; it is counted in any case. Where a name is ``*``, all keys are counted
         together, because any client can invent names.
         """
@@ -180,7 +182,8 @@ class Bus:
             raw = sample.attachment.to_bytes() if sample.attachment else None
             handler(Arrival(message, key, received_ns, raw))
 
-        self._subscribe(expression, take, depth, topic.service.history, session)
+        history = topic.service.history
+        self._subscribe(expression, take, depth, history=history, session=session, post=post)
 
     def tap(self, expression: str, handler: Callable[[Sample], None], *, depth: int) -> None:
         """Call the handler with each raw sample on these keys; see ``subscribe``.
@@ -309,14 +312,16 @@ class Bus:
         key: str,
         take: Callable[[Stamped], None],
         depth: int,
+        *,
         history: int = 0,
         session: Session | None = None,
+        post: Post | None = None,
     ) -> None:
         def take_if_open(stamped: Stamped) -> None:
             if not self._closed:
                 take(stamped)
 
-        items = OverwritingQueue(depth, take_if_open, self.post, self.counters)
+        items = OverwritingQueue(depth, take_if_open, post or self.post, self.counters)
 
         def queue(sample: zenoh.Sample) -> None:
             items.put((sample, clock.now_ns()))

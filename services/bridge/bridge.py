@@ -106,7 +106,7 @@ class Bridge:
         self._core.motions.lease = replace(self._core.motions.lease, braked=braked)
         self._send(self._core.motions.order(BRAKE))  # as the guard did last
         drive.subscribe(keys.MOTION, self._on_motion, depth=MOTIONS)
-        node.bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
+        node.bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES, post=node.loop.defer)
         # Safety receives it, too, unless it hangs, restarts or is cut off.
         estop_key = keys.estop_key(node.config.robot.id)
         node.bus.on_any(

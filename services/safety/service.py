@@ -107,6 +107,7 @@ class SafetyService:
             topic,
             accept,
             depth=DRIVE_DEPTH,
+            post=self._node.loop.defer,
             refused=lambda key, _: self._accept(request(source_of(key), None, 0)),
             source="*",
         )
@@ -115,15 +116,15 @@ class SafetyService:
 
     def _subscribe_measurements(self) -> None:
         """Subscribe to the bridge's measurements, on the drive link only."""
-        drive = self._node.drive
-        drive.subscribe(keys.VELOCITY, self._store("velocity"))
-        drive.subscribe(keys.MILEAGE, self._store("mileage"))
-        drive.subscribe(keys.ULTRASONIC, self._store("ultrasonic"))
+        drive, defer = self._node.drive, self._node.loop.defer
+        drive.subscribe(keys.VELOCITY, self._store("velocity"), post=defer)
+        drive.subscribe(keys.MILEAGE, self._store("mileage"), post=defer)
+        drive.subscribe(keys.ULTRASONIC, self._store("ultrasonic"), post=defer)
+        drive.subscribe(keys.SWITCHES, self._store("switches"), post=defer)
+        drive.subscribe(keys.LINK, self._store("link"), post=defer)
         drive.subscribe(keys.BUMPER, self._on_bumper, depth=LATCHING_DEPTH)
         for side in ("left", "right"):
             drive.subscribe(keys.DRIVER, self._store_driver(side), depth=LATCHING_DEPTH, side=side)
-        drive.subscribe(keys.SWITCHES, self._store("switches"))
-        drive.subscribe(keys.LINK, self._store("link"))
 
     def _store(self, field: str) -> Callable[[Arrival[M]], None]:
         """Return a handler that stores the newest sample in this field of the inputs."""

@@ -3,7 +3,7 @@
 import contextlib
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 import pytest
@@ -82,12 +82,15 @@ def test_lateness_is_the_worst_since_the_last_report(loop: Loop, clock: Clock) -
     assert loop.take_lateness_s() == 0.0
 
 
-def test_posted_calls_are_made_before_timers_judge_their_age(loop: Loop, clock: Clock) -> None:
+@pytest.mark.parametrize("queue", [Loop.post, Loop.defer])
+def test_queued_calls_are_made_before_timers_judge_their_age(
+    loop: Loop, clock: Clock, queue: Callable[[Loop, Callable[[], None]], None]
+) -> None:
     order: list[str] = []
     loop.every(1.0, lambda _: order.append("timer"))
-    loop.post(lambda: order.append("posted"))
+    queue(loop, lambda: order.append("queued"))
     turn(loop)
-    assert order == ["posted", "timer"]
+    assert order == ["queued", "timer"]
 
 
 def test_a_call_that_posts_again_does_not_starve_timers(loop: Loop) -> None:
@@ -112,6 +115,17 @@ def test_a_stop_before_run_is_kept_and_it_runs_again_after_that(loop: Loop) -> N
 
 
 # --- other threads, sockets ---------------------------------------------------------------------
+
+
+def test_a_deferred_call_waits_until_something_wakes_the_loop() -> None:
+    called: list[str] = []
+    with running(Loop()) as idle:
+        wait_until(lambda: idle._sleeps, "its sleep")
+        idle.defer(lambda: called.append("deferred"))
+        assert idle._sleeps
+        idle.post(lambda: called.append("posted"))
+        wait_until(lambda: len(called) == 2, "both calls")
+    assert called == ["deferred", "posted"]
 
 
 def test_posts_of_many_threads_arrive_all_and_in_order_in_one_thread() -> None:

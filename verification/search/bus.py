@@ -206,7 +206,15 @@ class DriveEnd:
         """Return a publisher for the link and the bus."""
         return Publisher(self._process, topic.on(ROBOT, **names), private=True)
 
-    def subscribe(self, topic: Topic[Any], handler: Any, *, depth: int = 1, **names: str) -> None:
+    def subscribe(
+        self,
+        topic: Topic[Any],
+        handler: Any,
+        *,
+        depth: int = 1,
+        post: object = None,
+        **names: str,
+    ) -> None:
         """Call the handler for each message of the other end."""
         self._process.subscribe(topic, handler, depth=depth, private=True, **names)
 
@@ -218,6 +226,9 @@ class Loop:
         self._net = net
         self._timers: list[Timer] = []
         self._sockets: list[Callable[[int], None]] = []
+
+    def defer(self, call: Callable[[], object]) -> None:
+        """Do nothing: a simulated process takes what it is sent."""
 
     def every(self, period_s: float, handler: Callable[[int], None]) -> Timer:
         """Call the handler every period, the first time at once."""
@@ -305,7 +316,7 @@ class Process:
         *,
         depth: int = 1,
         refused: object = None,
-        known: object = (),
+        post: object = None,
         private: bool = False,
         **names: str,
     ) -> None:
