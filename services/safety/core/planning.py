@@ -40,6 +40,7 @@ class Zones(Struct, frozen=True):
     """Zones of one vehicle; distances are in the manual's order of sonars."""
 
     axes: tuple[Axis, ...]
+    arm: float  # m, the longest lever at which turning approaches what a sonar sees
     margin: float  # m
     react: float  # s
     deceleration: float  # m/s^2
@@ -71,15 +72,17 @@ class Zones(Struct, frozen=True):
     def _approached(
         self, twist: Twist, distances: Sequence[float]
     ) -> Iterator[tuple[int, float, float]]:
-        """Yield each sonar with an echo that a twist approaches.
+        """Yield each sonar that a twist approaches, unless it sees farther than any stop needs.
 
         With the speed of approach (m/s), and the way of stopping (m) toward the sonar's sector.
         """
-        linear_s = abs(twist.linear) / self.deceleration
+        linear, angular = abs(twist.linear), abs(twist.angular) * self.arm
+        linear_s = linear / self.deceleration
         angular_s = abs(twist.angular) / self.angular_deceleration
         longer_s = max(linear_s, angular_s)
+        needed = self.margin + (linear + angular) * (self.react + longer_s / 2)
         for sonar, axis in enumerate(self.axes):
-            if distances[sonar] == math.inf:
+            if distances[sonar] >= needed:
                 continue
             driving, turning = axis.approach(twist)
             speed = driving + turning
@@ -103,8 +106,10 @@ class Zones(Struct, frozen=True):
 
 def zones(settings: SafetyConfig) -> Zones:
     """Return the zones of the vehicle with these settings."""
+    mounted = axes(settings.vehicle)
     return Zones(
-        axes(settings.vehicle),
+        mounted,
+        max(max(abs(axis.angular), axis.swing) for axis in mounted),
         settings.safety.margin,
         settings.reaction,
         settings.vehicle.deceleration,
