@@ -207,7 +207,8 @@ class Bridge:
         sent = self._sockets.send(send.datagram, send.port, BRAKE_ATTEMPTS if is_brake else 1)
         if send.order is not None:
             self._unsent = is_brake and not sent
-            self._beat()  # the guard learns of a BRAKE at once
+        if is_brake:
+            self._beat()  # the guard learns of it at once
 
     def _beat(self) -> None:
         if self._pulse is not None:

@@ -1,10 +1,10 @@
 """Bus shell of the safety service: subscribes to inputs and publishes verdicts.
 
 All decisions are made by ``Policy``, 50 times a second, on the newest samples and requests. What
-cannot wait is decided at once: a new contact, a driver fault, an emergency stop, a reset. A motion
-leaves at each of the 50 decisions, and at once if its command is more severe than the last one;
-then it takes the place of the next regular one. So no member of the bus can raise the rate of
-decisions or of frames to the board.
+cannot wait is decided at once: a hit, a driver fault, an emergency stop, a reset. A motion leaves
+at each of the 50 decisions, and at once if its command is more severe than the last one, or if it
+acknowledges a hit; then it takes the place of the next regular one. So no member of the bus can
+raise the rate of decisions or of frames to the board.
 """
 
 from collections.abc import Callable, Collection
@@ -70,6 +70,7 @@ class SafetyService:
         node.is_stopped = self._is_stopped
         self._sent = STOP  # command of the newest motion
         self._has_turn = True  # False while a motion has left in the place of the next regular one
+        self._hit_due = False  # a hit, for whose acknowledgement the bridge waits
         self._estop_due = False  # another emergency stop while one is latched
         self._may_reset = True  # one reset a period
         self._refused_ns = 0  # when a refused reset was last reported
@@ -156,9 +157,10 @@ class SafetyService:
         if before is not None and not fresh(before, arrival.received_ns, age_s):
             self._decide()  # no decision may have fallen into the gap that this sample ends
         self._store("bumper")(arrival)
-        is_new = bumper.pressed and "contact" not in self._state.latches
+        is_hit = bumper.pressed and not (before and before.value.pressed)
+        self._hit_due |= is_hit
         # A decision counts the samples since the last one: too many would look like lost ones.
-        if is_new or bumper.seq - self._state.verdict.judged[1] >= LOST_SAMPLES:
+        if is_hit or bumper.seq - self._state.verdict.judged[1] >= LOST_SAMPLES:
             self._decide()
 
     def _accept(self, request: SourceRequest) -> None:
@@ -224,8 +226,9 @@ class SafetyService:
         """Publish a motion in its turn, or at once if it may not wait."""
         is_severe = SEVERITY[motion.command] > SEVERITY[self._sent]
         has_turn, self._has_turn = self._has_turn, self._has_turn or is_tick
-        if is_severe or (is_tick and has_turn):
-            self._has_turn, self._sent = is_tick, motion.command
+        if is_severe or (has_turn and (is_tick or self._hit_due)):
+            self._has_turn = is_tick
+            self._sent, self._hit_due = motion.command, False
             self._motion_publisher.put(motion)
 
     def _report(self, before: State, answer: Callable[[Reply], None] | None, now_ns: int) -> None:

@@ -305,6 +305,20 @@ def test_a_more_severe_motion_leaves_at_once_and_takes_the_next_turn(
         assert sent[before:] == [motion] * leaves
 
 
+def test_a_new_hit_under_a_brake_is_acknowledged_at_once(
+    service: SafetyService, sent: list[Motion]
+) -> None:
+    """The bridge waits for it; a hit that is held is no new one."""
+    for seq, (pressed, leave) in enumerate(
+        [(True, 1), (True, 0), (False, 0), (True, 1), (True, 0)], 1
+    ):
+        before = len(sent)
+        bumper = Bumper(pressed=pressed, seq=seq, boot=5)
+        service._on_bumper(Arrival(bumper, "", clock.now_ns(), None))
+        assert [motion.judged for motion in sent[before:]] == [seq] * leave
+        service._on_tick(0)  # takes the turn back
+
+
 def test_a_contact_that_chatters_neither_adds_motions_nor_silences_safety(
     service: SafetyService, sent: list[Motion]
 ) -> None:

@@ -481,7 +481,7 @@ MUTATIONS: dict[str, Mutation] = {
     ),
     "a protective stop does not stop": (
         received(m.Limit, lambda it: replace(it, linear=0.05 if it.linear == 0 else it.linear)),
-        PROTECTIVE_STOP, "protective stop of fleet",
+        PROTECTIVE_STOP, "protective stop of detector",
     ),
     "a protective stop wants no neutral": (
         (Arbiter, "barred", unchanged), PROTECTIVE_STOP, "was not neutral",
