@@ -92,6 +92,7 @@ class Bridge:
         self._core = Core(node.config, node.bus.boot, node.counters, clock.now_ns())
         self._ticked_ns = clock.now_ns()
         self._unheard_s = 0  # without a first frame of the board
+        self._braking = False  # as the guard knows
         self._unsent = False  # whether the system did not send the last order, a BRAKE
         self._publishers: dict[str, Publisher[Any]] = {
             "velocity": drive.publisher(keys.VELOCITY),
@@ -207,13 +208,14 @@ class Bridge:
         sent = self._sockets.send(send.datagram, send.port, BRAKE_ATTEMPTS if is_brake else 1)
         if send.order is not None:
             self._unsent = is_brake and not sent
-        if is_brake:
+        if self._core.motions.lease.braking is not self._braking:
             self._beat()  # the guard learns of it at once
 
     def _beat(self) -> None:
         if self._pulse is not None:
             motions = self._core.motions
-            self._pulse.beat(motions.port, brakes=motions.lease.braking)
+            self._braking = motions.lease.braking
+            self._pulse.beat(motions.port, brakes=self._braking)
 
     # --- the end ------------------------------------------------------------------------------
 
