@@ -29,8 +29,8 @@ class FakeBus(Bus):
         super().__init__(at("tcp/127.0.0.1:1"), "001", lambda call: call())
 
     def subscribe(self, topic: Topic[Any], handler: Any, **names: Any) -> None:
-        """Store the handler for ``deliver``; the depth is ignored."""
-        names.pop("depth", None)
+        """Store the handler for ``deliver``; the queue is ignored."""
+        names = {name: one for name, one in names.items() if name not in {"depth", "post"}}
         self.handlers.setdefault(topic.on(self.robot, **names), []).append(handler)
 
     def serve(self, call: Call[Any, Any], handler: Any) -> None:

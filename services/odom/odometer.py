@@ -1,7 +1,7 @@
 """Odometry on the bus: counters and velocities in, pose and twist out.
 
-An estimate follows each counter sample, or each velocity while counters are missing.
-Zenoh sends nothing to the router without a subscriber.
+An estimate follows each counter sample; while counters are missing, each check. Velocities wait
+until then. Zenoh sends nothing to the router without a subscriber.
 """
 
 from common import clock
@@ -17,8 +17,9 @@ from t2 import messages as m
 from t2.words import done
 
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
-CHECK_S = 0.25  # between two checks for that
-NO_COUNTERS_NS = NS_PER_S // 10  # until velocities are followed by an estimate
+CHECK_S = 0.1  # between two checks for that, and for counters
+NO_COUNTERS_NS = NS_PER_S // 10  # until an estimate follows each check
+VELOCITIES = 16  # queued until a counter sample, or a check
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 
@@ -35,16 +36,15 @@ class Odometer:
         self._echoes = Echoes()
         bus = node.bus
         self._to_odometry = bus.publisher(keys.ODOMETRY)
-        bus.subscribe(keys.VELOCITY, self._on_velocity)
+        defer = node.loop.defer
+        bus.subscribe(keys.VELOCITY, self._on_velocity, depth=VELOCITIES, post=defer)
         bus.subscribe(keys.MILEAGE, self._on_mileage)
-        bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
+        bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES, post=defer)
         bus.serve(keys.SET_POSE, self._on_set_pose)
-        node.loop.every(CHECK_S, self._check_silence)
+        node.loop.every(CHECK_S, self._check)
 
     def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
         self._estimator.on_velocity(arrival.message, arrival.received_ns)
-        if arrival.received_ns - self._counted_ns > NO_COUNTERS_NS:
-            self._estimate()
 
     def _on_mileage(self, arrival: Arrival[m.Mileage]) -> None:
         self._counted_ns = arrival.received_ns
@@ -79,7 +79,9 @@ class Odometer:
             self._node.event("velocity_back", "info")
         self._report_slip(odometry)
 
-    def _check_silence(self, now_ns: int) -> None:
+    def _check(self, now_ns: int) -> None:
+        if now_ns - self._counted_ns > NO_COUNTERS_NS:
+            self._estimate()
         if self._silent or now_ns - self._estimated_ns < SILENT_NS:
             return
         self._silent = True

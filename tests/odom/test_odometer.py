@@ -57,26 +57,30 @@ def odometry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Odometry]:
     odometry.node.loop.close()
 
 
-def test_an_estimate_follows_each_counter_sample_or_each_velocity_without(
+def test_an_estimate_follows_each_counter_sample_or_each_check_without(
     odometry: Odometry,
 ) -> None:
     for _ in range(5):
         odometry.samples()
+        odometry.odometer._check(odometry.now_ns)
     count, _ = odometry.node.sent(keys.ODOMETRY)
-    assert count == 6  # the first velocity has no counters yet
+    assert count == 5
     for _ in range(10):
         odometry.samples(counters=False)
+        odometry.odometer._check(odometry.now_ns)
     count, last = odometry.node.sent(keys.ODOMETRY)
-    assert count == 6 + 5  # from 0.1 s after the last counters on
+    assert count == 5 + 5  # from 0.1 s after the last counters on
     assert last is not None
     assert last.x == pytest.approx(SPEED / 50 * 14, abs=1e-3)
 
 
 def test_silence_is_reported_once_and_ends(odometry: Odometry) -> None:
-    odometry.odometer._check_silence(odometry.now_ns + 9 * NS_PER_S)
+    odometry.now_ns += 9 * NS_PER_S
+    odometry.odometer._check(odometry.now_ns)
     odometry.samples()
-    for after_s in (0.4, 0.6, 0.9):
-        odometry.odometer._check_silence(odometry.now_ns + round(after_s * NS_PER_S))
+    for _ in range(3):
+        odometry.now_ns += round(0.3 * NS_PER_S)
+        odometry.odometer._check(odometry.now_ns)
     odometry.samples()
     assert odometry.node.events == ["velocity_back", "silent", "velocity_back"]
 
