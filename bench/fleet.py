@@ -93,7 +93,7 @@ def window(
         time.sleep(ANSWER_S)
     took: Sequence[int | None] = answers_ns(asked, frames.follow().commands)
     return {(*name, what): samples for what, samples in {
-        "site": [shares["site"]],
+        "site": [shares["site"].total],
         "memory": [stat(pid).rss], "arrived": [came["hz"]],
         "bytes": [came["bytes_per_s"] / int(name[0])], "age": came["ages_ns"],
         "request": [ns for ns in took if ns is not None], "unanswered": [took.count(None)],

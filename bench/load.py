@@ -15,7 +15,7 @@ from typing import Any
 
 from bench.child_process import ChildProcess
 from bench.figures import CPU, ONE, US, Column, Figures, Limits, Unit
-from bench.processes import cpu_shares, module, one_pool, running
+from bench.processes import Share, cpu_shares, module, one_pool, running
 from bench.reaction import SEED
 from services.safety.config import DECISION_PERIOD_S
 from t2 import keys
@@ -82,13 +82,15 @@ def wait_until_it_drives(trace: Path) -> None:
 
 def cpu(turns: int = TURNS, seconds: float = TURN_S) -> Figures:
     """Return the CPU of each process, in ns/s; the candidates take turns in random order."""
-    samples, shuffler = defaultdict[tuple[str, ...], list[int]](list), random.Random(SEED)
+    samples, shuffler = defaultdict[tuple[str, ...], list[float]](list), random.Random(SEED)
     for _ in range(turns):
         for name, run in shuffler.sample([(T2, chain_of_t2), (PAIR, bare_pair)], 2):
             with tempfile.TemporaryDirectory() as folder, run(Path(folder)) as pids:
                 shares = cpu_shares(pids, seconds)
-            for process, ns in {**shares, TOGETHER: sum(shares.values())}.items():
-                samples[name, process, "cpu"].append(ns)
+            together = Share(*map(sum, zip(*shares.values(), strict=True)))
+            for process, share in {**shares, TOGETHER: together}.items():
+                samples[name, process, "cpu"].append(share.total)
+                samples[name, process, "main"].append(share.main)
     return samples
 
 
@@ -130,7 +132,7 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
             shares = cpu_shares(pids_of(it), seconds)
             results: list[Any] = [each.end() for each in some]
             figures: dict[str, Sequence[float]] = {
-                "router": [shares["router"]], "bridge": [shares["bridge"]],
+                "router": [shares["router"].total], "bridge": [shares["bridge"].total],
                 "delay": list(chain.from_iterable(each["ages_ns"] for each in results)),
                 "lost": [max(each["lost"] for each in results)],
             }  # fmt: skip
@@ -139,7 +141,10 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
 
 
 SHARE = Column("share", "cpu", CPU)
-CPU_COLUMNS = (SHARE, Column("of the pair's", "cpu", ONE, of=(PAIR, TOGETHER)))
+CPU_COLUMNS = (
+    SHARE, Column("of the pair's", "cpu", ONE, of=(PAIR, TOGETHER)),
+    Column("main thread", "main", CPU),
+)  # fmt: skip
 CPU_LIMITS: Limits = [((T2, TOGETHER), (PAIR, TOGETHER), SHARE, 2.0)]
 DECISION_COLUMNS = Column("p50", "time", US), Column("p99", "time", US, "p99")
 DECISION_LIMITS: Limits = [((DECISION,), (ALLOWED,), DECISION_COLUMNS[0], 1.0)]

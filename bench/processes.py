@@ -7,10 +7,11 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.freshness import NS_PER_S
-from verification.harness.process_stats import GONE, stat
+from verification.harness.process_stats import GONE, main_thread_s, stat
 
 Command = Sequence[str]
 
@@ -53,19 +54,28 @@ def compiled(name: str, folder: Path) -> str:
     return made
 
 
-def cpu_shares(pids: Mapping[str, int], seconds: float) -> dict[str, int]:
-    """Return the CPU share of processes, all threads, in ns/s; without those that end meanwhile."""
-    before, since_s = _cpu_s(pids), time.monotonic()
+class Share(NamedTuple):
+    """CPU of a process, in ns/s or ns: of all threads, and of its main thread alone."""
+
+    total: float
+    main: float
+
+
+def cpu_shares(pids: Mapping[str, int], seconds: float) -> dict[str, Share]:
+    """Return the CPU shares of processes in ns/s; without those that end meanwhile."""
+    before, since_s = _used(pids), time.monotonic()
     time.sleep(seconds)
     past_s = time.monotonic() - since_s
     return {
-        name: round((now - before[name]) * NS_PER_S / past_s) for name, now in _cpu_s(pids).items()
+        name: Share((now.total - old.total) / past_s, (now.main - old.main) / past_s)
+        for name, now in _used(pids).items()
+        if (old := before.get(name))
     }
 
 
-def _cpu_s(pids: Mapping[str, int]) -> dict[str, float]:
-    found: dict[str, float] = {}
+def _used(pids: Mapping[str, int]) -> dict[str, Share]:
+    found: dict[str, Share] = {}
     for name, pid in pids.items():
         with contextlib.suppress(*GONE):
-            found[name] = stat(pid).cpu_s
+            found[name] = Share(stat(pid).cpu_s * NS_PER_S, main_thread_s(pid) * NS_PER_S)
     return found

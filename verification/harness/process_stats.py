@@ -30,6 +30,12 @@ def stat(pid: int) -> Stat:
     return Stat(rest[0], cpu_s, int(rest[17]), int(rest[21]) * PAGE)
 
 
+def main_thread_s(pid: int) -> float:
+    """Return the CPU time of the main thread, in s; raise one of ``GONE`` without the process."""
+    text = (PROC / str(pid) / "task" / str(pid) / "schedstat").read_text(encoding="ascii")
+    return int(text.split()[0]) / 1e9
+
+
 def children(pid: int) -> list[int]:
     """Return the living child processes; empty when the process does not exist."""
     # A child belongs to the thread that started it.
