@@ -208,8 +208,8 @@ class Bridge:
         sent = self._sockets.send(send.datagram, send.port, BRAKE_ATTEMPTS if is_brake else 1)
         if send.order is not None:
             self._unsent = is_brake and not sent
-        if self._core.motions.lease.braking is not self._braking:
-            self._beat()  # the guard learns of it at once
+            if self._core.motions.lease.braking is not self._braking:
+                self._beat()  # the guard learns of it at once
 
     def _beat(self) -> None:
         if self._pulse is not None:
