@@ -55,9 +55,9 @@ BENCHMARKS: Mapping[str, Benchmark] = {
         "What does the chain cost on board?",
         load.cpu, ["", "process"], load.CPU_COLUMNS, load.CPU_LIMITS,
     ),
-    "decision": Benchmark(
+    "functions": Benchmark(
         "How long does safety decide?",
-        load.decisions, [""], load.DECISION_COLUMNS, load.DECISION_LIMITS,
+        load.functions, ["", "function"], load.FUNCTION_COLUMNS, load.FUNCTION_LIMITS,
     ),
     "consumers": Benchmark(
         "What do consumers on board cost?",

@@ -1,8 +1,9 @@
-"""CPU of the chain beside two bare processes, of N consumers, and the time of a decision."""
+"""CPU of the chain beside two bare processes, by function, and with N consumers."""
 
 import contextlib
 import random
 import signal
+import subprocess
 import tempfile
 import time
 from collections import defaultdict
@@ -13,10 +14,13 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from bench.child_process import ChildProcess
 from bench.figures import CPU, ONE, US, Column, Figures, Limits, Unit
 from bench.processes import Share, cpu_shares, module, one_pool, running
 from bench.reaction import SEED
+from bench.timed import TIMED, Timing
 from services.safety.config import DECISION_PERIOD_S
 from t2 import keys
 from verification.harness.bus import router_process, set_options
@@ -33,7 +37,7 @@ DECISIONS, ALLOWED_NS = 10_000, 100_000
 CONSUME = "bench.zenoh_programs", "consume"
 EVERYTHING = f"{keys.ROOT}/001/tel/**"
 STEADY_S, PATIENCE_S = 1.0, 60.0
-DECISION, ALLOWED = "a decision", "allowed"
+DECISION, ALLOWED = ("safety", "Policy.decide"), ("allowed", "Policy.decide")
 T2, PAIR, TOGETHER = "T2", "two processes, Zenoh, a router", "together"
 # Growth of the cost beyond the number that still counts as proportional: CPU time has a resolution
 # of 10 ms, and other processes use the host.
@@ -94,22 +98,42 @@ def cpu(turns: int = TURNS, seconds: float = TURN_S) -> Figures:
     return samples
 
 
-def decisions(count: int = DECISIONS) -> Figures:
-    """Return the durations of safety's decisions, in ns, while the vehicle turns between walls."""
-    with tempfile.TemporaryDirectory() as name, ExitStack() as held:
-        file = Path(name) / "durations"
-        it = held.enter_context(running_stack(Path(name), "office", shipped=True))
-        it.kill("safety")
-        place = it.commands["safety"].index("services.safety")
-        it.commands["safety"][place : place + 1] = ["bench.timed_safety", str(file)]
-        it.start("safety")
-        held.enter_context(ChildProcess("bench.client", it.endpoint, "drive", "001")).send("turn")
-        wait_until(lambda: abs(it.control.truth().angular) > 0.0, "a motion", PATIENCE_S)
-        time.sleep(STEADY_S + count * DECISION_PERIOD_S)
-        it.processes["safety"].send_signal(signal.SIGTERM)
-        it.processes["safety"].wait(PATIENCE_S)
-        made = list(map(int, file.read_text(encoding="ascii").split()))[-count:]
-    return {(DECISION, "time"): made, (ALLOWED, "time"): [ALLOWED_NS]}
+def stop(process: "subprocess.Popen[bytes]") -> None:
+    """Stop a process in order."""
+    process.send_signal(signal.SIGTERM)
+    process.wait(PATIENCE_S)
+
+
+@contextlib.contextmanager
+def timed_chain(folder: Path) -> Iterator[dict[str, Timing]]:
+    """Run the chain with timed functions, turning between walls; yield what the end fills."""
+    found: dict[str, Timing] = {}
+    with running_stack(folder, "office", shipped=True) as it:
+        for name in TIMED:
+            stop(it.processes[name])
+            place = it.commands[name].index(f"services.{name}")
+            it.commands[name][place : place + 1] = ["bench.timed", name, str(folder / name)]
+            it.start(name)
+        with ChildProcess("bench.client", it.endpoint, "drive", "001") as driver:
+            driver.send("turn")
+            wait_until(lambda: abs(it.control.truth().angular) > 0.0, "a motion", PATIENCE_S)
+            yield found
+        for name in TIMED:
+            stop(it.processes[name])
+            found[name] = msgspec.json.decode((folder / name).read_bytes(), type=Timing)
+
+
+def functions(seconds: float = DECISIONS * DECISION_PERIOD_S) -> Figures:
+    """Return the durations of functions in ns, their calls, and their share of a core in ns/s."""
+    with tempfile.TemporaryDirectory() as folder, timed_chain(Path(folder)) as found:
+        time.sleep(STEADY_S + seconds)
+    made: dict[tuple[str, ...], Sequence[float]] = {}
+    for service, timing in found.items():
+        for name, all_ns in timing.functions.items():
+            made[service, name, "time"] = all_ns
+            made[service, name, "calls"] = [len(all_ns) / timing.span_s]
+            made[service, name, "cpu"] = [sum(all_ns) / timing.span_s]
+    return {**made, (*ALLOWED, "time"): [ALLOWED_NS]}
 
 
 def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> Figures:
@@ -146,8 +170,11 @@ CPU_COLUMNS = (
     Column("main thread", "main", CPU),
 )  # fmt: skip
 CPU_LIMITS: Limits = [((T2, TOGETHER), (PAIR, TOGETHER), SHARE, 2.0)]
-DECISION_COLUMNS = Column("p50", "time", US), Column("p99", "time", US, "p99")
-DECISION_LIMITS: Limits = [((DECISION,), (ALLOWED,), DECISION_COLUMNS[0], 1.0)]
+FUNCTION_COLUMNS = (
+    Column("calls", "calls", Unit("/s", 1.0)), Column("p50", "time", US),
+    Column("p99", "time", US, "p99"), Column("share", "cpu", Unit("CPU %", 1e7, 2)),
+)  # fmt: skip
+FUNCTION_LIMITS: Limits = [(DECISION, ALLOWED, FUNCTION_COLUMNS[1], 1.0)]
 CONSUMER_COLUMNS = (
     Column("router", "router", CPU), Column("bridge", "bridge", CPU),
     Column("delay p50", "delay", US), Column("p99", "delay", US, "p99"),

@@ -11,6 +11,7 @@ from bench.figures import Figures, compared
 from bench.fleet import answers_ns
 from bench.processes import MissingError
 from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, ZENOH
+from bench.timed import TIMED
 from common.freshness import NS_PER_S
 from sim.trace import Command
 from t2 import messages
@@ -101,3 +102,12 @@ def test_consumers_receive_everything() -> None:
     for count in ("1", "2"):
         assert figures[count, "delay"]
         assert figures[count, "lost"] == [0.0]
+
+
+@pytest.mark.campaign
+@pytest.mark.timed
+def test_each_function_of_the_chain_is_timed() -> None:
+    figures = load.functions(1.0)
+    for service, functions in TIMED.items():
+        for owner, name in functions:
+            assert figures[service, f"{owner.__name__}.{name}", "time"], name
