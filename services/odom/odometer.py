@@ -1,7 +1,7 @@
 """Odometry on the bus: counters and velocities in, pose and twist out.
 
-An estimate follows each counter sample; while counters are missing, each check. Velocities wait
-until then. Zenoh sends nothing to the router without a subscriber.
+An estimate follows each counter sample; while counters are missing, each check.
+Zenoh sends nothing to the router without a subscriber.
 """
 
 from common import clock
@@ -19,7 +19,7 @@ from t2.words import done
 SILENT_NS = NS_PER_S // 2  # without input, until the event; shorter gaps show as missing samples
 CHECK_S = 0.1  # between two checks for that, and for counters
 NO_COUNTERS_NS = NS_PER_S // 10  # until an estimate follows each check
-VELOCITIES = 16  # queued until a counter sample, or a check
+VELOCITIES = 16  # queued until the loop wakes up
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 

@@ -1,13 +1,14 @@
 """Bus shell of the safety service: subscribes to inputs and publishes verdicts.
 
 All decisions are made by ``Policy``, 50 times a second, on the newest samples and requests. What
-cannot wait is decided at once: a hit, a driver fault, an emergency stop, a reset. A motion leaves
-at each of the 50 decisions, and at once if its command is more severe than the last one, or if it
-acknowledges a hit; then it takes the place of the next regular one. So no member of the bus can
-raise the rate of decisions or of frames to the board.
+cannot wait is decided at once: a bumper that is hit or free again, a driver fault, an emergency
+stop, a reset. A motion leaves at each of the 50 decisions, and at once if its command is more
+severe than the last one, or if it acknowledges a hit; then it takes the place of the next regular
+one. So no member of the bus can raise the rate of decisions or of frames to the board.
 """
 
 from collections.abc import Callable, Collection
+from functools import partial
 from typing import TypeVar
 
 from msgspec.structs import replace
@@ -51,6 +52,7 @@ STATE_PERIOD_S = 1 / 20
 # sample may be dropped or skipped, even after a stall of a second.
 LATCHING_DEPTH = 64
 DRIVE_DEPTH = 64
+STREAM_DEPTH = 4  # samples that come between two decisions
 
 
 class SafetyService:
@@ -108,7 +110,6 @@ class SafetyService:
             topic,
             accept,
             depth=DRIVE_DEPTH,
-            post=self._node.loop.defer,
             refused=lambda key, _: self._accept(request(source_of(key), None, 0)),
             source="*",
         )
@@ -117,12 +118,13 @@ class SafetyService:
 
     def _subscribe_measurements(self) -> None:
         """Subscribe to the bridge's measurements, on the drive link only."""
-        drive, defer = self._node.drive, self._node.loop.defer
-        drive.subscribe(keys.VELOCITY, self._store("velocity"), post=defer)
-        drive.subscribe(keys.MILEAGE, self._store("mileage"), post=defer)
-        drive.subscribe(keys.ULTRASONIC, self._store("ultrasonic"), post=defer)
-        drive.subscribe(keys.SWITCHES, self._store("switches"), post=defer)
-        drive.subscribe(keys.LINK, self._store("link"), post=defer)
+        drive = self._node.drive
+        waiting = partial(drive.subscribe, depth=STREAM_DEPTH, post=self._node.loop.defer)
+        waiting(keys.VELOCITY, self._store("velocity"))
+        waiting(keys.MILEAGE, self._store("mileage"))
+        waiting(keys.ULTRASONIC, self._store("ultrasonic"))
+        waiting(keys.SWITCHES, self._store("switches"))
+        waiting(keys.LINK, self._store("link"))
         drive.subscribe(keys.BUMPER, self._on_bumper, depth=LATCHING_DEPTH)
         for side in ("left", "right"):
             drive.subscribe(keys.DRIVER, self._store_driver(side), depth=LATCHING_DEPTH, side=side)
@@ -157,10 +159,12 @@ class SafetyService:
         if before is not None and not fresh(before, arrival.received_ns, age_s):
             self._decide()  # no decision may have fallen into the gap that this sample ends
         self._store("bumper")(arrival)
-        is_hit = bumper.pressed and not (before and before.value.pressed)
-        self._hit_due |= is_hit
-        # A decision counts the samples since the last one: too many would look like lost ones.
-        if is_hit or bumper.seq - self._state.verdict.judged[1] >= LOST_SAMPLES:
+        was_pressed = before is not None and before.value.pressed
+        self._hit_due |= bumper.pressed and not was_pressed
+        # A clear sample between two hits ends a release. A decision counts the samples since the
+        # last one: too many would look like lost ones.
+        unjudged = bumper.seq - self._state.verdict.judged[1]
+        if bumper.pressed != was_pressed or unjudged >= LOST_SAMPLES:
             self._decide()
 
     def _accept(self, request: SourceRequest) -> None:

@@ -342,7 +342,7 @@ def test_bumper_samples_without_news_are_decided_on_in_time_and_not_one_by_one(
 
     assert [decisions(seq) for seq in range(1, 9)] == [0, 0, 1, 0, 0, 1, 0, 0]
     assert [decisions(9, pressed=True), decisions(10, pressed=True)] == [1, 0]
-    assert [decisions(11), decisions(12)] == [0, 1]
+    assert [decisions(11), decisions(12)] == [1, 0]
 
 
 @pytest.mark.parametrize(("gap_ns", "stops"), [(70_000_000, False), (70_000_001, True)])

@@ -81,6 +81,13 @@ def test_unknown_names_are_refused_with_the_known_ones(
         pass
 
 
+def test_calls_and_limits_reach_the_real_stack(robot: t2.Robot) -> None:
+    robot.limit("detector", linear=0.3, seconds=1).end()
+    robot.set_pose(x=1.0)
+    robot.led(channel=1, mode=1)
+    wait_until(lambda: abs(robot.odometry.latest().x - 1.0) < 0.5, "the pose")
+
+
 def test_a_closed_robot_is_named(stack: RunningStack) -> None:
     with t2.connect("001", endpoint=stack.endpoint) as robot:
         robot.odometry.latest(timeout=20.0)

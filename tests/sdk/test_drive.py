@@ -333,9 +333,6 @@ def test_the_wait_for_the_end_of_a_stop_has_an_end(
         limit.end()
 
 
-PENDANT = 'safety.limits.pendant={lease = 1.0, silence = "latch"}'
-
-
 def test_a_drive_is_entered_once_and_alone(robot: t2.Robot) -> None:
     drive = robot.drive("nav")
     with pytest.raises(t2.T2Error, match="not entered"):

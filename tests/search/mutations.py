@@ -175,6 +175,16 @@ def pressed_again_and_again(stack: Stack) -> None:
         stack.press(True, 300)
 
 
+def pressed_again_in_a_stall(stack: Stack) -> None:
+    """Press the bumper twice during a release; safety stalls while it is free in between."""
+    stack.request(0.0, 60)
+    stack.hold("backward", 250)
+    stack.press(False, 40)
+    stack.stall("safety", 45)
+    stack.run(25)
+    stack.press(True, 400)
+
+
 def reset_of_what_was_seen(stack: Stack) -> None:
     """Reset an emergency stop as it was seen before a contact that came meanwhile."""
     stack.stop(100)
@@ -291,7 +301,7 @@ SILENT = LimitSource(lease=LEASE_S, silence="ignore")
 SAFETY: Any = CONFIGS["safety"]
 LIMITS: dict[str, LimitSource] = SAFETY.safety.limits
 ON_MOTION, EXPIRE = leases.on_motion, leases.expire
-AFTER, STORE, ZONES = Release.after, SafetyService._store, planning.zones
+AFTER, ON_BUMPER, ZONES = Release.after, SafetyService._on_bumper, planning.zones
 
 
 def never(*_: Any) -> bool:
@@ -322,6 +332,14 @@ def unforgetting(release: Release, old: Held | None, contact: Held, *rest: Any) 
     """Update a release, but forget earlier presses at each new press."""
     anew = contact.good == 0 and old is not None and old.good > 0
     return AFTER(Release() if anew else release, None if anew else old, contact, *rest)
+
+
+def only_hits(service: SafetyService, arrival: Any) -> None:
+    """Decide on hits, and take a clear sample without a decision."""
+    if arrival.message.pressed:
+        ON_BUMPER(service, arrival)
+    else:
+        service._store("bumper")(arrival)
 
 
 def knows_at_once(overrides: SonarOverrides, unseen: Any, _: Any, now_ns: int) -> SonarOverrides:
@@ -449,6 +467,10 @@ MUTATIONS: dict[str, Mutation] = {
         (*STAND, lambda s: s.estop(), lambda s: s.velocities(False, 1000), *RESET,
          lambda s: s.velocities(True, 1000), *GO),
         "safety knows of estop",
+    ),
+    "a bumper that is free again is not decided on at once": (
+        (SafetyService, "_on_bumper", only_hits), (*STUCK, pressed_again_in_a_stall),
+        "in which the bumper was pressed",
     ),
     "driver faults are not decided on at once": (
         (SafetyService, "_store_driver", SafetyService._store), (driver_blinks,),

@@ -29,7 +29,7 @@ PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "ros2": 11, "
 AGES_S = {"velocity": 0.2, "bumper": 0.07, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
 GOOD_SAMPLES, SETTLE_S = 3, 0.5
 LAPSE_S = 1.0  # after its lease a source is as new
-MARGIN_M, REACT_S, RANGES_AGE_S = 0.20, 0.25, 0.3
+MARGIN_M, REACT_S, RANGES_AGE_S = 0.20, 0.27, 0.3
 # After a zero when a fault had been shown for so long, an operator may creep toward that sonar.
 OPERATORS, BLIND_MPS, SHOWN_S = ("teleop", "checkout", "web"), 0.15, 1.0
 MOST_MPS, MOST_RADPS = 1.0, 1.0

@@ -95,7 +95,7 @@ def test_a_stop_that_was_too_long(
     assert len(rows) == 2
     for speed, _, deceleration, distance, needed, reckoned in (map(float, row) for row in rows):
         assert deceleration == pytest.approx(0.3, rel=0.04)
-        # 0.1 s, two periods of the sonars, from a reading to the command
+        # two periods of the sonars and one of the decisions, from a reading to the command
         assert needed == pytest.approx(distance + 0.12 * speed, abs=0.002)
         assert reckoned == pytest.approx(0.27 * speed + speed**2 / 1.2, abs=0.002)
         assert needed > reckoned

@@ -245,7 +245,7 @@ def test_a_ramp_begins_with_what_is_wanted_of_the_motion(
 
 
 def test_a_sonar_that_is_grazed_hides_no_other_one(field: Zones) -> None:
-    near = [2.0] * 8
+    near = [1.0] * 8
     near[SONAR_NAMES.index("front")] = 0.25
     assert field.too_fast(Twist(1.0, 0.01), near) == SONAR_NAMES.index("front")
 
