@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from common.motion import RUN, STILL, Twist
 from common.settings import Vehicle, sonar_mounts
-from services.safety.config import Safety, SafetyConfig
+from services.safety.config import DECISION_PERIOD_S, Safety, SafetyConfig
 from services.safety.core.planning import (
     GRAZING,
     Planner,
@@ -25,8 +25,9 @@ from services.safety.core.sonars import SonarArray
 from services.safety.core.state import State, Verdict
 from t2.messages import SONAR_NAMES
 
-ALLOWED_AT_1M = math.sqrt(0.15**2 + 2 * 0.6 * 0.8) - 0.15
-ALLOWED_AT_03 = math.sqrt(0.162**2 + 2 * 0.6 * 0.1) - 0.162
+FIELD_S, SHIPPED_S = 0.25, 0.27  # from reading to slowing down, with the wait for a decision
+ALLOWED_AT_1M = math.sqrt((0.6 * FIELD_S) ** 2 + 2 * 0.6 * 0.8) - 0.6 * FIELD_S
+ALLOWED_AT_03 = math.sqrt((0.6 * SHIPPED_S) ** 2 + 2 * 0.6 * 0.1) - 0.6 * SHIPPED_S
 
 distances = st.tuples(*[st.floats(0.0, 6.0) | st.just(math.inf)] * 8)
 twists = st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
@@ -34,8 +35,7 @@ twists = st.builds(Twist, st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 
 @pytest.fixture(scope="module")
 def field() -> Zones:
-    """A decision comes 0.02 s late at most: 0.25 s from reading to slowing down."""
-    return zones(SafetyConfig(safety=Safety(react=0.23)))
+    return zones(SafetyConfig(safety=Safety(react=FIELD_S - DECISION_PERIOD_S)))
 
 
 def test_the_field_is_that_of_the_vehicle_and_the_settings() -> None:
