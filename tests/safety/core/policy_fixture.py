@@ -169,12 +169,13 @@ class PolicyFixture:
         angular: float | None = None,
         reason: str = "",
         source: str = "lidar",
+        echo: int | None = None,
     ) -> Verdict:
         """Put one speed limit."""
         self.limit_seq += 1
         limit = Limit(
             linear=linear, angular=angular, reason=reason,
-            echo=self.echo, seq=self.limit_seq, boot=self.limit_boot,
+            echo=self.echo if echo is None else echo, seq=self.limit_seq, boot=self.limit_boot,
         )  # fmt: skip
         return self.accept(LimitRequest(source, limit, self.now_ns))
 

@@ -416,6 +416,16 @@ def test_other_samples_yield_one_motion() -> None:
     assert len(fixture.motions) == 1
 
 
+def test_a_clear_sample_counts_once_however_often_it_is_decided_on() -> None:
+    fixture = hit()
+    fixture.pressed = False
+    fixture.tick()
+    for _ in range(5):
+        fixture.now_ns += NS_PER_S // 200
+        fixture.decide()
+    assert fixture.state.latches["contact"].good == 1
+
+
 def test_a_contact_brakes_before_any_other_sample() -> None:
     fixture = PolicyFixture()
     fixture.inputs = Inputs(bumper=Latest(Bumper(pressed=True), 5))

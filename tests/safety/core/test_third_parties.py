@@ -181,6 +181,16 @@ def test_a_keepalive_may_echo_an_older_heartbeat_than_a_request_to_move() -> Non
     assert fixture.refused == ""
 
 
+def test_a_limit_is_as_old_as_a_request_at_most_whatever_its_lease() -> None:
+    fixture = PolicyFixture(IGNORED).running()
+    echo = fixture.echo
+    fixture.drive(0.5, seconds=0.45)  # shorter than the lease
+    fixture.limit(0.0, echo=echo)
+    assert fixture.refused == "limit_late"
+    fixture.limit(0.0)
+    assert fixture.refused == ""
+
+
 def test_messages_that_a_proxy_holds_do_not_keep_it_alive() -> None:
     fixture = running()
     echo = fixture.echo
