@@ -14,7 +14,7 @@ import zenoh
 from common import child_process
 from common.bus.session import client_config
 from services.ros2.definitions import HASHES
-from sim.requests import Bumper
+from sim.requests import Bumper, Sonar
 from t2 import codec, keys
 from tests import factories
 from tests.ros2.peer import LATCHED, RosPeer, peer
@@ -71,7 +71,8 @@ def make_ready(node: RosPeer) -> list[Any]:
     return came
 
 
-def test_streams_arrive(node: RosPeer) -> None:
+def test_streams_arrive(node: RosPeer, stack: RunningStack) -> None:
+    stack.control.do(Sonar(name="front", range=1.5))  # wherever other tests have driven to
     odom = node.subscribe("/odom", "nav_msgs/msg/Odometry")
     tf = node.subscribe("/tf", TRANSFORMS)
     ranges = node.subscribe("/sonar_front/range", "sensor_msgs/msg/Range")
@@ -82,7 +83,9 @@ def test_streams_arrive(node: RosPeer) -> None:
     (transform,) = tf[-1].transforms
     assert (transform.header.frame_id, transform.child_frame_id) == ("odom", "base_link")
     assert ranges[-1].header.frame_id == "sonar_front"
+    wait_until(lambda: ranges[-1].range == pytest.approx(1.5, abs=0.1), "the reading")
     assert ranges[-1].min_range < ranges[-1].range <= ranges[-1].max_range
+    stack.control.do(Sonar(name="front"))
     assert bumper[-1].data is False
 
 
