@@ -17,7 +17,7 @@ from t2 import keys
 from t2.errors import T2Error
 
 # Safety reckons from the reading of a sonar on, a stop begins with its command: between them are up
-# to one period of the sonars, one of the bridge's queries, and one of safety's decisions.
+# to one period of the sonars and one of the bridge's queries, besides safety's decision.
 SENSING_S = 2 / keys.ULTRASONIC.rate_hz
 KINDS = {"Motion", "Velocity", "Mileage", "Bumper"}  # the messages that ``Streams`` takes
 HEAD = ("stop", "command", "unit", "speed", "reaction s", "deceleration", "distance",

@@ -221,8 +221,6 @@ class SafetyService:
             reset=reset,
         )
         self._estop_due = False
-        if hit := self._policy.brake_for_hit(before, inputs):
-            self._send(hit, is_tick=is_tick)
         decision = self._policy.decide(before, inputs, now_ns)
         self._state = decision.state
         self._send(decision.motion, is_tick=is_tick)

@@ -14,7 +14,7 @@ with it:
              (``causes.py``)
 
 RUN has one origin: the end of ``_conclude``, when no held cause demands STOP or BRAKE and a fresh
-request exists. ``brake_for_hit`` comes before all these steps, which latch a new contact.
+request exists.
 """
 
 from collections.abc import Iterable
@@ -113,13 +113,6 @@ class Policy:
         """Return the arbiter, which remembers when the vehicle last stood."""
         stands = state.motion.standstill.displacement.is_standing
         return state.arbiter.at_rest(now_ns) if stands else state.arbiter
-
-    def brake_for_hit(self, state: State, inputs: Inputs) -> Motion | None:
-        """Return BRAKE for a new contact, before the decision that latches it; None without one."""
-        if not inputs.is_pressed or "contact" in state.latches:
-            return None
-        hit = Verdict(command=BRAKE, judged=_judged(inputs))
-        return _motion(hit, inputs, state.estop, is_latched=True)
 
     def decide(self, state: State, inputs: Inputs, now_ns: int) -> Decision:
         """Return the new state, and the motion for the bridge."""

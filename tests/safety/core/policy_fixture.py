@@ -6,6 +6,7 @@ import msgspec
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
+from common.motion import STOP
 from services.safety.config import SafetyConfig
 from services.safety.core import release_requests
 from services.safety.core.causes import latched
@@ -69,7 +70,7 @@ class PolicyFixture:
         self.now_ns = 10 * NS_PER_S
         self.inputs = Inputs()
         self.verdict = Verdict()
-        self.motions: list[Motion] = []
+        self.motion = Motion(command=STOP, judged=0)
         self.refused = ""  # why the newest message of a source was refused
         self.muted: set[str] = set()
         self.boot, self.seq = 7, 0
@@ -97,9 +98,8 @@ class PolicyFixture:
         inputs = replace(
             self.inputs, estop_connection=self.estop_connection, estop=estop, reset=reset
         )
-        hit = self.policy.brake_for_hit(self.state, inputs)
         decision = self.policy.decide(self.state, inputs, self.now_ns)
-        self.motions = [*filter(None, [hit]), decision.motion]
+        self.motion = decision.motion
         self.state = decision.state
         self.verdict = self.state.verdict
         return self.verdict

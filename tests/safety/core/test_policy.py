@@ -225,17 +225,17 @@ def test_an_emergency_stop_that_only_the_bridge_received_latches_and_is_acknowle
     fixture.link = replace(fixture.link, estop=77)
     assert fixture.tick().command == "brake"
     assert latched(fixture.state.latches) == ("estop",)
-    assert fixture.motions[-1].estop == 77
+    assert fixture.motion.estop == 77
     fixture.linear = 0.0
     fixture.tick(60)
     assert fixture.reset() == ""  # also before the bridge has received the acknowledgement
     fixture.tick()
-    assert fixture.motions[-1].estop == 77
+    assert fixture.motion.estop == 77
     fixture.link = replace(fixture.link, estop=78)
     assert fixture.tick().command == "brake"
     fixture.pressed = True
     fixture.tick()
-    assert [motion.estop for motion in fixture.motions] == [78, 78]
+    assert fixture.motion.estop == 78
 
 
 def test_a_connection_that_was_lost_between_two_decisions_latches() -> None:
@@ -347,15 +347,14 @@ def test_samples_queued_during_a_stall_are_not_fresh(late_ns: int, command: str)
 
 
 @pytest.mark.parametrize("latched_by", [None, 41])
-def test_a_new_contact_brakes_first_as_its_decision_does(latched_by: int | None) -> None:
+def test_the_motion_of_a_new_contact_acknowledges_it(latched_by: int | None) -> None:
     fixture = PolicyFixture().running(0.3)
     fixture.link = replace(link(), latched_by=latched_by)
     fixture.pressed = True
     fixture.tick()
-    first, decided = fixture.motions
-    assert first == replace(decided, source=None)  # the first BRAKE answers no source
-    assert (first.command, first.judged, first.latched) == ("brake", fixture.seq, True)
-    assert first.predecessor == latched_by
+    motion = fixture.motion
+    assert (motion.command, motion.judged, motion.latched) == ("brake", fixture.seq, True)
+    assert motion.predecessor == latched_by
 
 
 @pytest.mark.parametrize(("source", "ticks"), [("nav", 12), ("teleop", 16)])
@@ -406,16 +405,6 @@ def test_a_zero_that_arrives_under_a_higher_source_is_not_neutral() -> None:
     assert not state.arbiter.is_neutral("nav")
 
 
-def test_other_samples_yield_one_motion() -> None:
-    fixture = PolicyFixture().running(0.3)
-    fixture.tick()
-    assert fixture.refused == ""
-    assert len(fixture.motions) == 1
-    fixture = hit()  # a release may be moving the vehicle off the obstacle
-    fixture.tick()
-    assert len(fixture.motions) == 1
-
-
 def test_a_clear_sample_counts_once_however_often_it_is_decided_on() -> None:
     fixture = hit()
     fixture.pressed = False
@@ -430,8 +419,7 @@ def test_a_contact_brakes_before_any_other_sample() -> None:
     fixture = PolicyFixture()
     fixture.inputs = Inputs(bumper=Latest(Bumper(pressed=True), 5))
     fixture.decide()
-    assert [motion.command for motion in fixture.motions] == ["brake", "brake"]
-    assert fixture.motions[0].predecessor is None
+    assert (fixture.motion.command, fixture.motion.predecessor) == ("brake", None)
 
 
 def test_a_velocity_is_unknown_until_its_first_sample() -> None:
@@ -455,9 +443,9 @@ def test_a_latch_is_reported_until_it_is_reset() -> None:
     fixture, told = PolicyFixture().running(), []
     for step in (fixture.tick, fixture.estop, lambda: fixture.drive(0.0, seconds=1.0)):
         step()
-        told.append(fixture.motions[-1].latched)
+        told.append(fixture.motion.latched)
     assert fixture.reset() == ""
-    assert [*told, fixture.motions[-1].latched] == [False, True, True, False]
+    assert [*told, fixture.motion.latched] == [False, True, True, False]
 
 
 def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
@@ -466,7 +454,7 @@ def test_a_successor_takes_the_latch_on_and_only_a_reset_clears_it() -> None:
     fixture.drive(0.0)
     assert fixture.drive(0.5, seconds=1.0).command == "brake"
     assert latched(fixture.state.latches) == ("predecessor",)
-    motion = fixture.motions[-1]
+    motion = fixture.motion
     assert (motion.latched, motion.predecessor) == (True, OLD)
     assert fixture.reset() == "Still present: Safety restarted while a reset was due."
     fixture.link = replace(fixture.link, latched_by=OWN)  # the bridge has received our latch
@@ -502,7 +490,7 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
 def test_a_motion_carries_its_verdict() -> None:
     fixture = PolicyFixture().running(0.3, 0.1)
     fixture.tick()
-    (motion,) = fixture.motions
+    motion = fixture.motion
     assert (motion.command, motion.linear, motion.angular) == ("run", 0.3, 0.1)
     assert (motion.judged_boot, motion.judged) == (fixture.boot, fixture.seq)
     assert (motion.source, motion.latched) == ("teleop", False)
@@ -513,7 +501,7 @@ def test_a_stop_carries_no_velocity_and_a_barred_source_is_not_in_control() -> N
     fixture = PolicyFixture().running(0.3)
     fixture.sonar(front=0.1)
     fixture.drive(0.3)
-    (motion,) = fixture.motions
+    motion = fixture.motion
     assert (motion.command, motion.linear, motion.source) == ("stop", 0.0, "teleop")
     assert fixture.verdict.control == "teleop"
     fixture.link = replace(fixture.link, state="lost")
