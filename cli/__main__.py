@@ -54,6 +54,7 @@ GROUPS = {
     },
     "Commission": {
         "checkout": ("cli.commission.command", "check the real vehicle before its first drive"),
+        "fit": ("cli.fit.command", "measure a vehicle in recordings, and propose its settings"),
         "wire": ("cli.wire", "decode captured frames"),
     },
     "Administer": {

@@ -7,7 +7,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from cli.commission import stop_command
 from cli.commission.report import Report, Row, Verdict, render
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
@@ -27,16 +26,6 @@ HEALTH_S = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "part", nargs="?", choices=["stop"], help="stop: table of the stops in recordings"
-    )
-    parser.add_argument(
-        "files",
-        metavar="RECORDING",
-        type=file_path,
-        nargs="*",
-        help="recordings (.mcap), directly after `stop`",
-    )
-    parser.add_argument(
         "--only", action="append", choices=NAMES, metavar="STEP", default=[],
         help=f"run this step only; may be repeated: {', '.join(NAMES)}",
     )  # fmt: skip
@@ -50,10 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the steps and write the report; return 0 if all passed and the operator signed."""
     loaded = load(Everything, robot_sources(options))
-    if options.part:
-        if options.only or options.report:
-            raise ConfigError("stop: has no steps and no report")
-        return stop_command.run(options, loaded.config)
     file = report_file(options.report, loaded.config.robot.id)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)  # as Ctrl-C

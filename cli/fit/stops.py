@@ -1,10 +1,9 @@
-"""Stops in the recorded messages of a vehicle: speed, reaction time, deceleration, distance. Pure.
+"""Stops in the streams of a vehicle: speed, reaction time, deceleration, distance. Pure.
 
 A stop begins with the first STOP or BRAKE after a RUN with speed and ends with the second of two
 consecutive velocities below the standstill threshold. Driving and turning are measured one by one:
-a stop in a curve is one of each, in m and in rad. All times are those of the robot's monotonic
-clock, so a late recorder changes nothing. A line through the velocities between 90 % and 10 % of
-the speed has two results::
+a stop in a curve is one of each, in m and in rad. A line through the velocities between 90 % and
+10 % of the speed has two results::
 
     speed ______
                 \\          reaction: from the command until the line falls below the speed
@@ -20,20 +19,20 @@ in steps of 1 mm/s and 0.1 deg/s, counters of 1 mm and 0.1 deg.
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise, takewhile
-from math import isclose, remainder, tau
-from statistics import linear_regression, median
+from math import isclose, radians, remainder, tau
+from statistics import linear_regression, mean
 from typing import Literal
 
+from cli.fit.streams import Streams
 from common.freshness import NS_PER_S
 from common.motion import STANDING_MPS, STANDING_RADPS, Twist
-from t2.messages import Bumper, Command, Message, Mileage, Motion, Velocity
+from t2.messages import Command, Mileage, Motion, Velocity
 
 STEADY_S, STEADY = 0.2, 0.05  # before the command: time, and relative deviation
 LONGEST_GAP_S = 0.1  # between two velocities, and around the begin of a stop
 COUNTED_S = 0.2  # from standstill to the counters' next value
-COARSEST_S = 0.03  # between two velocities; 50 Hz have 0.02 s
 UPPER, LOWER = 0.9, 0.1  # of the speed: the part of the slope that is used
 SLOPE = 3  # velocities on it
 NO_VELOCITIES, NO_COUNTERS = "velocities are missing", "counters are missing"
@@ -51,10 +50,11 @@ class Axis:
     slowest: float  # of the unit per second, as the next two
     steady: float  # deviation before the command
     standing: float
-    speed: Callable[[Velocity], float]
+    resolution: float  # of a velocity
+    speed: Callable[[Velocity | Twist], float]
     travel: Callable[[Mileage, Mileage], float]  # from one reading of the counters to the next
 
-    def runs(self, velocity: Velocity) -> bool:
+    def runs(self, velocity: Twist) -> bool:
         """Return whether the vehicle moves fast enough to show a stop."""
         return abs(self.speed(velocity)) >= self.slowest
 
@@ -65,6 +65,7 @@ DRIVING = Axis(
     slowest=0.1,
     steady=0.03,
     standing=STANDING_MPS,
+    resolution=0.001,
     speed=lambda velocity: velocity.linear,
     travel=lambda before, after: after.distance - before.distance,
 )
@@ -74,55 +75,10 @@ TURNING = Axis(
     slowest=0.2,
     steady=0.05,
     standing=STANDING_RADPS,
+    resolution=radians(0.1),
     speed=lambda velocity: velocity.angular,
     travel=lambda before, after: remainder(after.heading - before.heading, tau),
 )
-
-
-@dataclass(slots=True)
-class Streams:
-    """The messages of one recording that matter here."""
-
-    motions: list[Motion] = field(default_factory=list)
-    velocities: list[Velocity] = field(default_factory=list)
-    mileages: list[Mileage] = field(default_factory=list)
-    bumpers: list[Bumper] = field(default_factory=list)
-
-    def add(self, message: Message) -> None:
-        """Add the next message; other types are ignored."""
-        match message:
-            case Motion():
-                self.motions.append(message)
-            case Velocity():
-                self.velocities.append(message)
-            case Mileage():
-                self.mileages.append(message)
-            case Bumper():
-                self.bumpers.append(message)
-
-    @property
-    def period_s(self) -> float:
-        """Median time between two velocities: the resolution of a reaction time."""
-        steps = [b.mono_ns - a.mono_ns for a, b in pairwise(self.velocities)]
-        return median(steps) / NS_PER_S if steps else 0.0
-
-    @property
-    def problem(self) -> str:
-        """Reason why no stop can be measured, or an empty string."""
-        needed: dict[str, Sequence[Message]] = {
-            "@cmd/motion": self.motions,
-            "tel/bridge/velocity": self.velocities,
-            "tel/bridge/mileage": self.mileages,
-        }
-        missing = [name for name, messages in needed.items() if not messages]
-        if missing:
-            return f"has no {' and no '.join(missing)}: record all keys with `t2 record`"
-        if self.period_s > COARSEST_S:
-            return (
-                f"has a velocity each {self.period_s:.2f} s, too coarse for a stop: laptops get "
-                "downsampled streams over TLS (bus.laptop_rate), so record on the robot"
-            )
-        return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,36 +88,37 @@ class Stop:
     axis: Axis
     kind: Kind
     direction: str
-    speed: float  # m/s or rad/s, at the command
-    twist: Twist  # at the command
+    speed: float  # m/s or rad/s, up to the command
+    twist: Twist  # the same, of both axes
     reaction: float  # s
     deceleration: float  # m/s^2 or rad/s^2
     distance: float  # m or rad, by the counters, from the command to standstill
+    points: tuple[Point, ...]  # the velocities from the command to standstill
+    at_ns: int  # wall clock at the command
     braked: bool = False  # BRAKE followed the STOP before standstill
-    file: str = ""
-    command: tuple[int, int] = (0, 0)  # boot of safety and time; the same in two recordings of it
 
 
 class UnsuitableError(Exception):
     """A stop that shows nothing about the vehicle; the text is the reason."""
 
 
-def find_stops(streams: Streams, file: str = "") -> tuple[list[Stop], Counter[str]]:
+def find_stops(streams: Streams) -> tuple[list[Stop], Counter[str]]:
     """Return the measured stops, and how many were left out for which reason."""
     found: list[Stop] = []
     left_out: Counter[str] = Counter()
     for motions in _begins(streams.motions):
         try:
-            found += _measured(streams, motions, file)
+            found += _measured(streams, motions)
         except UnsuitableError as reason:
             left_out[str(reason)] += 1
     return found, left_out
 
 
-def slope(points: Sequence[Point], standing: float = STANDING_MPS) -> tuple[float, float]:
-    """Return reaction time (s) and deceleration from the first point to standstill."""
-    _, speed = points[0]
-    above = max(n for n, (_, v) in enumerate(points) if v > UPPER * speed)
+def slope(
+    points: Sequence[Point], speed: float, standing: float = STANDING_MPS
+) -> tuple[float, float]:
+    """Return reaction time (s) and deceleration, from this speed to standstill."""
+    above = max((n for n, (_, v) in enumerate(points) if v > UPPER * speed), default=0)
     falling = points[above:]
     lowest = max(LOWER * speed, standing)
     part = list(takewhile(lambda point: point[1] >= lowest, falling))
@@ -186,19 +143,26 @@ def _begins(motions: Sequence[Motion]) -> Iterator[Sequence[Motion]]:
             yield motions[index:]
 
 
-def _measured(streams: Streams, motions: Sequence[Motion], file: str) -> list[Stop]:
+def _measured(streams: Streams, motions: Sequence[Motion]) -> list[Stop]:
     """Return the stop that the first of these motions commands, of each axis that moved."""
-    window = _until_standstill(streams.velocities, motions)
-    axes = [axis for axis in (DRIVING, TURNING) if axis.runs(window[0])]
-    return [_measure(streams, motions, window, axis, file) for axis in axes]
+    first = bisect_right(streams.velocities, motions[0].mono_ns, key=lambda v: v.mono_ns)
+    if first == 0:
+        raise UnsuitableError(NO_VELOCITIES)
+    twist = _steady(streams.velocities[:first])
+    window = _until_standstill(streams.velocities[first - 1 :], motions)
+    axes = [axis for axis in (DRIVING, TURNING) if axis.runs(twist)]
+    return [_measure(streams, motions, twist, window, axis) for axis in axes]
 
 
 def _measure(
-    streams: Streams, motions: Sequence[Motion], window: Sequence[Velocity], axis: Axis, file: str
+    streams: Streams,
+    motions: Sequence[Motion],
+    twist: Twist,
+    window: Sequence[Velocity],
+    axis: Axis,
 ) -> Stop:
     """Return one axis of the stop that the first of these motions commands."""
-    command = motions[0]
-    first, end_ns = window[0], window[-1].mono_ns
+    command, end_ns = motions[0], window[-1].mono_ns
     if any(b.pressed and command.mono_ns <= b.mono_ns <= end_ns for b in streams.bumpers):
         raise UnsuitableError("the bumper was pressed")
     distance = _distance(streams.mileages, command.mono_ns, end_ns, axis)
@@ -206,41 +170,37 @@ def _measure(
     brakes = [m.mono_ns for m in motions if m.command is Command.BRAKE and m.mono_ns <= end_ns]
     braked = kind == "stop" and bool(brakes)
     last_ns = brakes[0] if braked else end_ns
-    speed = abs(axis.speed(first))
-    sign = axis.speed(first) / speed
+    speed = abs(axis.speed(twist))
+    sign = axis.speed(twist) / speed
     points = [
         ((v.mono_ns - command.mono_ns) / NS_PER_S, sign * axis.speed(v))
         for v in window
         if v.mono_ns <= last_ns
     ]
-    reaction, deceleration = slope(points, axis.standing)
+    reaction, deceleration = slope(points, speed, axis.standing)
     return Stop(
         axis,
         kind,
         axis.directions[sign],
         speed,
-        Twist(first.linear, first.angular),
+        twist,
         reaction,
         deceleration,
         distance,
+        tuple(points),
+        command.t_ns,
         braked,
-        file,
-        command=(command.boot, command.mono_ns),
     )
 
 
 def _until_standstill(
     velocities: Sequence[Velocity], motions: Sequence[Motion]
 ) -> Sequence[Velocity]:
-    """Return the velocities of a stop, from the newest one at its command."""
+    """Return the velocities of a stop; the first one is the newest at its command."""
     command = motions[0]
-    first = bisect_right(velocities, command.mono_ns, key=lambda v: v.mono_ns) - 1
-    if first < 0:
-        raise UnsuitableError(NO_VELOCITIES)
-    _check_begin(velocities[: first + 1])
     other = next((m for m in motions if m.command not in (command.command, Command.BRAKE)), None)
-    window = [velocities[first]]
-    for before, now in pairwise(velocities[first:]):
+    window = [velocities[0]]
+    for before, now in pairwise(velocities):
         if now.mono_ns - before.mono_ns > LONGEST_GAP_S * NS_PER_S:
             raise UnsuitableError(NO_VELOCITIES)
         if other is not None and other.mono_ns <= now.mono_ns:
@@ -251,19 +211,23 @@ def _until_standstill(
     raise UnsuitableError("the recording ends before standstill")
 
 
-def _check_begin(velocities: Sequence[Velocity]) -> None:
-    """Check the motion up to the command."""
-    newest = velocities[-1]
-    axes = [axis for axis in (DRIVING, TURNING) if axis.runs(newest)]
+def _steady(velocities: Sequence[Velocity]) -> Twist:
+    """Return the steady velocity up to the command: the mean of the last ones."""
+    since_ns = velocities[-1].mono_ns - round(STEADY_S * NS_PER_S)
+    recent = velocities[bisect_left(velocities, since_ns, key=lambda v: v.mono_ns) :]
+    half = (len(recent) + 1) // 2
+    earlier, later = _mean(recent[:half]), _mean(recent[half:] or recent)
+    axes = [axis for axis in (DRIVING, TURNING) if axis.runs(_mean(recent))]
     if not axes:
         raise UnsuitableError(f"slower than {DRIVING.slowest:g} m/s and {TURNING.slowest:g} rad/s")
-    since_ns = newest.mono_ns - round(STEADY_S * NS_PER_S)
-    since = bisect_left(velocities, since_ns, key=lambda v: v.mono_ns)
-    for before in velocities[since:]:
-        for axis in axes:
-            speeds = axis.speed(before), axis.speed(newest)
-            if not isclose(*speeds, rel_tol=STEADY, abs_tol=axis.steady):
-                raise UnsuitableError("not at a steady speed")
+    for axis in axes:
+        if not isclose(axis.speed(earlier), axis.speed(later), rel_tol=STEADY, abs_tol=axis.steady):
+            raise UnsuitableError("not at a steady speed")
+    return _mean(recent)
+
+
+def _mean(velocities: Sequence[Velocity]) -> Twist:
+    return Twist(mean(v.linear for v in velocities), mean(v.angular for v in velocities))
 
 
 def _distance(mileages: Sequence[Mileage], begin_ns: int, end_ns: int, axis: Axis) -> float:

@@ -5,9 +5,11 @@ from collections.abc import Callable
 
 import msgspec
 
-from cli.commission.stops import Streams
+from cli.fit.streams import Streams
 from common.freshness import NS_PER_S
 from t2.messages import Command, Message, Mileage, Motion, Velocity
+
+AT_NS = 1_800_000_000 * NS_PER_S  # wall clock of the command
 
 
 def at(message: Message, seconds: float, begin_s: float = 10.0) -> Message:
@@ -38,7 +40,7 @@ def streams(
 
     linear, angular = (0.0, sign * speed) if turns else (sign * speed, 0.0)
     add(Motion(command=Command.RUN, linear=linear, angular=angular), -0.02)
-    add(Motion(command=command, boot=6), 0.0)
+    add(Motion(command=command, boot=6, t_ns=AT_NS), 0.0)
     travel = 0.0
     for number in range(-15, round(until_s * 50)):
         now = number / 50 + 0.005

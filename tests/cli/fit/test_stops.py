@@ -5,18 +5,12 @@ from collections.abc import Callable, Sequence
 import pytest
 from msgspec.structs import replace
 
-from cli.commission.stops import (
-    DRIVING,
-    TURNING,
-    Streams,
-    UnsuitableError,
-    find_stops,
-    slope,
-)
+from cli.fit.stops import DRIVING, TURNING, UnsuitableError, find_stops, slope
+from cli.fit.streams import Streams
 from common.freshness import NS_PER_S
 from common.motion import Twist
 from t2.messages import Bumper, Command, Health, Message, Mileage, Motion, Velocity
-from tests.cli.commission.stops_fixture import at, changed, speed_at, streams
+from tests.cli.fit.stops_fixture import AT_NS, at, changed, speed_at, streams
 
 
 @pytest.mark.parametrize(
@@ -29,12 +23,14 @@ from tests.cli.commission.stops_fixture import at, changed, speed_at, streams
     ],
 )
 def test_a_stop_is_measured(turns: bool, sign: int, direction: str) -> None:
-    (stop,), left_out = find_stops(streams(sign=sign, turns=turns), "a.mcap")
+    (stop,), left_out = find_stops(streams(sign=sign, turns=turns))
     assert not left_out
     assert stop.axis is (TURNING if turns else DRIVING)
-    assert (stop.kind, stop.direction, stop.file) == ("stop", direction, "a.mcap")
-    assert (stop.speed, stop.command) == (0.8, (6, 10 * NS_PER_S))
-    assert stop.twist == (Twist(0.0, sign * 0.8) if turns else Twist(sign * 0.8, 0.0))
+    assert (stop.kind, stop.direction, stop.at_ns) == ("stop", direction, AT_NS)
+    assert stop.speed == pytest.approx(0.8)
+    assert stop.twist.linear == pytest.approx(0.0 if turns else sign * 0.8)
+    assert stop.twist.angular == pytest.approx(sign * 0.8 if turns else 0.0)
+    assert len(stop.points) == (83 if turns else 86)
     assert stop.reaction == pytest.approx(0.1, abs=0.002)
     assert stop.deceleration == pytest.approx(0.5, abs=0.002)
     assert stop.distance == pytest.approx(0.8 * 0.1 + 0.64, abs=0.008)
@@ -60,7 +56,6 @@ def test_the_distance_begins_between_two_counters() -> None:
     for now, distance in ((-0.03, 1.0), (0.01, 1.032), (0.05, 1.066), (0.09, 1.1), (0.13, 1.2)):
         made.add(at(Mileage(distance=distance, heading=0.0, epoch=0), now))
     (stop,), _ = find_stops(made)
-    assert stop.file == ""
     assert stop.distance == pytest.approx(1.1 - 1.024)
     assert stop.reaction == pytest.approx(0.03)
     assert stop.deceleration == pytest.approx(0.8 / 0.02)
@@ -94,9 +89,11 @@ def test_a_stop_by_brake() -> None:
     assert (stop.kind, stop.braked) == ("brake", False)
 
 
-def test_the_speed_is_the_newest_one_at_the_command() -> None:
+def test_the_speed_is_the_mean_before_the_command() -> None:
     (stop,), _ = find_stops(faster(0.01, 0.0))
     assert stop.speed == pytest.approx(0.81)
+    (stop,), _ = find_stops(faster(0.022, -0.2))  # one of eleven
+    assert stop.speed == pytest.approx(0.802)
 
 
 def test_a_single_velocity_of_zero_is_no_standstill() -> None:
@@ -116,7 +113,7 @@ def test_all_stops_of_a_recording_are_found() -> None:
 def test_a_vehicle_may_stand_from_the_first_velocity_after_the_command_on() -> None:
     made = changed(streams(), lambda v, now: replace(v, linear=0.0) if now > 0 else v)
     (stop,), _ = find_stops(made)
-    assert stop.speed == 0.8
+    assert stop.speed == pytest.approx(0.8)
 
 
 def test_turning_slower_than_standstill_is_not_on_the_slope() -> None:
@@ -187,11 +184,12 @@ HIT, RESTART = "the bumper was pressed", "bridge or board restarted"
         (streams(speed=0.099), SLOW),
         (streams(speed=0.1), ""),
         (turned(0.19), ""),  # as straight
-        (turned(0.2, -0.15), UNSTEADY),
+        (turned(0.5, -0.105), UNSTEADY),
         (streams(speed=0.199, turns=True), SLOW),
-        # 5 % of the faster velocity, in the 0.2 s before the newest one at the command
-        (faster(0.041, -0.19), ""),
-        (faster(0.043, -0.19), UNSTEADY),
+        # 5 % of the faster velocity, between the halves of the 0.2 s before the command
+        (faster(0.041, -0.1), ""),
+        (faster(0.043, -0.1), UNSTEADY),
+        (faster(0.1, -0.2), ""),  # a single velocity
         (faster(0.1, -0.22), ""),
         (faster(0.029, -0.1, 0.2), ""),  # a slow vehicle may scatter by 3 cm/s
         (faster(0.031, -0.1, 0.2), UNSTEADY),
@@ -259,7 +257,7 @@ def test_what_begins_a_stop() -> None:
 def test_a_rate_that_is_not_falling(speeds: Sequence[float]) -> None:
     points = [(number / 10, speed) for number, speed in enumerate((1.0, *speeds, 0.0))]
     with pytest.raises(UnsuitableError, match=r"^the speed does not fall steadily$"):
-        slope(points)
+        slope(points, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -275,7 +273,7 @@ def test_a_rate_that_is_not_falling(speeds: Sequence[float]) -> None:
 )
 def test_the_slope(speeds: Sequence[float], reaction: float, deceleration: float) -> None:
     points = [(number / 10, speed) for number, speed in enumerate(speeds)]
-    assert slope(points) == pytest.approx((reaction, deceleration), rel=1e-5)
+    assert slope(points, speeds[0]) == pytest.approx((reaction, deceleration), rel=1e-5)
 
 
 def test_problems_of_a_recording() -> None:

@@ -1,0 +1,1 @@
+"""``t2 fit``: the settings of a vehicle, measured in recordings of its motion."""

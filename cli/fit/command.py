@@ -1,0 +1,215 @@
+"""``t2 fit``: what recordings show of a vehicle, and the settings that follow from it."""
+
+import argparse
+import shlex
+import sys
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from math import isfinite
+from pathlib import Path
+
+from cli.fit.answers import answers, restarts_s
+from cli.fit.files import profile, settings_file
+from cli.fit.fit import Fit, fit, needed, reckoned
+from cli.fit.steady import greatest
+from cli.fit.stops import Stop
+from cli.fit.streams import KINDS, Streams
+from cli.inspect import output
+from cli.inspect.addressing import chunks
+from cli.inspect.session import one_robot, robot_sources
+from cli.recordings.info import open_recording
+from cli.settings import Everything, safety_config
+from common.cli_args import add_sources, file_path
+from common.config import flatten, load
+from common.errors import ConfigError
+from common.freshness import NS_PER_S
+from t2.errors import T2Error
+from t2.messages import Message
+
+RED, PLAIN = "\x1b[31m", "\x1b[0m"
+HEAD = ("parameter", "unit", "estimate", "95 % interval", "n", "setting", "today", "proposal")
+STOPS = ("stop at (UTC)", "command", "unit", "speed", "reaction s", "deceleration", "distance",
+         "needed", "reckoned")  # fmt: skip
+LIMITS = (
+    "A slope, a wet floor, a load or worn tyres change stops: the table shows what was recorded. "
+    "Record on the worst ground that the vehicle will drive on."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("files", metavar="RECORDING", type=file_path, nargs="+")
+    parser.add_argument(
+        "--out", type=file_path, metavar="FOLDER", help="out/fit-ROBOT-DATE by default"
+    )
+    parser.add_argument("--stops", action="store_true", help="show a row for each stop, too")
+    parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
+    add_sources(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show the estimates and write the proposal; return 0 if nothing is missing or too long."""
+    settings = load(Everything, robot_sources(options)).config
+    robot, streams, remarks = read(options.files, options.robot)
+    found = fit(streams, settings)
+    if found.too_long:
+        print(red(not_safe(found.too_long[0], settings)))
+    print(output.table(HEAD, list(rows(found))), "", sep="\n")
+    if options.stops and found.stops:
+        print(output.table(STOPS, [as_cells(stop, settings) for stop in found.stops]), "", sep="\n")
+    print(*remarks, *lines(found), sep="\n")
+    folder = options.out or Path("out") / f"fit-{robot}-{time.strftime('%Y%m%d-%H%M%S')}"
+    write(folder, found, [file.name for file in options.files])
+    print(f"Written: {shlex.quote(str(folder))}: fit.toml, profile.toml", flush=True)
+    return 1 if found.missing or found.too_long else 0
+
+
+# --- recordings -----------------------------------------------------------------------------------
+
+
+def read(files: Sequence[Path], robot: str | None) -> tuple[str, Sequence[Streams], Sequence[str]]:
+    """Return the robot, its streams for each start of its computer, and remarks on the files.
+
+    Raise ``T2Error`` for several robots (``robot`` chooses one), and without anything to measure.
+    """
+    robots: set[str] = set()
+    by_host: defaultdict[int, Streams] = defaultdict(Streams)
+    remarks: list[str] = []
+    for file in files:
+        for name, message in _messages(file, remarks):
+            if robot in (None, name):
+                robots.add(name)
+                by_host[message.host].add(message)
+    if len(robots) > 1:
+        raise T2Error(f"recordings of {', '.join(sorted(robots))}: choose one with --robot")
+    usable, problems = [], []
+    for streams in by_host.values():
+        streams.sort()
+        problems += [streams.problem] if streams.problem else []
+        usable += [] if streams.problem else [streams]
+    if not usable:
+        names = ", ".join(map(str, files))
+        of = f" of robot {robot}" if robot else ""
+        problem = problems[0] if problems else f"has no message{of} to measure"
+        raise T2Error(f"{names}: {problem}")
+    remarks += [f"Left out, another start of the robot's computer: {each}." for each in problems]
+    return robots.pop(), usable, remarks
+
+
+def _messages(file: Path, remarks: list[str]) -> Iterator[tuple[str, Message]]:
+    """Yield robot and message of what matters in a recording; remark on a damaged one."""
+    with open_recording(file) as reader:
+        for entry in reader:
+            if entry.kind in KINDS and (message := entry.message) is not None:
+                yield chunks(entry.key)[0], message
+    if reader.cut or reader.damaged:
+        remarks.append(f"{file}: truncated or damaged; what it holds is used.")
+
+
+def write(folder: Path, found: Fit, sources: Sequence[str]) -> None:
+    """Write the proposed settings and the simulator's profile; raise ``ConfigError``."""
+    try:
+        folder.mkdir(parents=True)
+        (folder / "fit.toml").write_text(settings_file(found, sources), encoding="utf-8")
+        (folder / "profile.toml").write_text(profile(found, sources), encoding="utf-8")
+    except FileExistsError:
+        raise ConfigError(f"--out {folder}: exists already; choose another folder") from None
+    except OSError as error:
+        raise ConfigError(f"--out {folder}: cannot be written: {error.strerror}") from None
+
+
+# --- text -----------------------------------------------------------------------------------------
+
+
+def red(text: str) -> str:
+    """Return a text in red on a terminal."""
+    return f"{RED}{text}{PLAIN}" if sys.stdout.isatty() else text
+
+
+def not_safe(stop: Stop, settings: Everything) -> str:
+    """Return the line about a stop that needed more than safety reckons with."""
+    unit = stop.axis.unit
+    return (
+        f"NOT SAFE: {title(stop)} from {stop.speed:.2f} {unit}/s at {clock(stop)} UTC needed "
+        f"{needed(stop):.2f} {unit}; safety reckons with "
+        f"{reckoned(stop, safety_config(settings)):.2f} {unit}.\n"
+    )
+
+
+def rows(found: Fit) -> Iterator[Sequence[str]]:
+    """Yield the estimates as table cells."""
+    today, shown = dict(flatten(found.settings)), set()
+    for each in found.estimates:
+        low, high = each.interval
+        first = each.setting not in shown
+        shown.add(each.setting)
+        proposal = found.proposals.get(each.setting, "") if first else ""
+        yield (
+            each.name,
+            each.unit,
+            f"{each.mean:.4g}",
+            f"{low:.4g} to {high:.4g}" if isfinite(low) else "-",
+            str(len(each.values)),
+            each.setting if first else "",
+            str(today.get(each.setting, "")) if first else "",
+            str(proposal),
+        )
+
+
+def as_cells(stop: Stop, settings: Everything) -> Sequence[str]:
+    """Return one stop as table cells."""
+    return (
+        clock(stop),
+        title(stop),
+        stop.axis.unit,
+        f"{stop.speed:.3f}",
+        f"{stop.reaction:z.3f}",
+        f"{stop.deceleration:.2f}",
+        f"{stop.distance:.3f}",
+        f"{needed(stop):.3f}",
+        f"{reckoned(stop, safety_config(settings)):.3f}",
+    )
+
+
+def title(stop: Stop) -> str:
+    """Return command and direction."""
+    return f"{stop.kind.upper()} {stop.direction}" + ", then BRAKE" * stop.braked
+
+
+def clock(stop: Stop) -> str:
+    """Return the time of a stop, UTC."""
+    return f"{datetime.fromtimestamp(stop.at_ns / NS_PER_S, UTC):%H:%M:%S}"
+
+
+def lines(found: Fit) -> Iterator[str]:
+    """Yield what is below the table."""
+    for streams in found.streams:
+        speeds = greatest(streams)
+        yield f"Greatest speeds: {speeds.linear:.2f} m/s and {speeds.angular:.2f} rad/s."
+        for each in answers(streams):
+            yield (
+                f"{each.stream}: {each.messages} messages, {each.rate:.1f} Hz, "
+                f"{each.lost:.2%} lost, longest gap {each.longest_gap:.3f} s."
+            )
+        for silent_s in restarts_s(streams):
+            yield f"The board restarted: its counters were silent for {silent_s:.2f} s."
+    for it in found.ranges:
+        yield (
+            f"sonars: {it.nearest:.3f} to {it.farthest:.3f} m, in steps of {it.resolution:.3f} m; "
+            f"{it.no_echo:.2%} without an echo, {it.faulty:.2%} faulty, "
+            f"{it.jumps:.2%} of the readings at standstill near for one sample."
+        )
+    if found.left_out:
+        yield f"Stops left out: {counted(found.left_out)}."
+    for manoeuvre in found.missing:
+        yield f"NOT MEASURED: {manoeuvre}."
+    if not found.too_long and not found.missing:
+        yield "No stop was longer than safety reckons with."
+    yield LIMITS
+
+
+def counted(reasons: Counter[str]) -> str:
+    """Return the reasons with their counts as text."""
+    return ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())

@@ -1,0 +1,269 @@
+"""What recordings show of a vehicle, and the settings that follow from it, on the safe side. Pure.
+
+A proposal that a protection depends on is a bound and not a mean (``estimate.py``): decelerations
+from below, and ``safety.react`` from above, as what remains of the distance that each stop needed.
+So safety reckons with more than any of the stops needed. Each direction needs ``LEAST`` STOPs from
+the faster half of the allowed speeds; without them there is no proposal, but the manoeuvre that is
+missing. A proposal outside of a setting's safe values is not made.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from math import ceil, floor
+
+from msgspec.structs import replace
+
+from cli.commission.motion import UNIT_MATCH, UNITS
+from cli.fit import answers, sonars, steady
+from cli.fit.estimate import LEAST, Estimate
+from cli.fit.stops import DRIVING, TURNING, Axis, Stop, find_stops
+from cli.fit.streams import Streams
+from cli.settings import Everything, safety_config
+from common.settings import Safe, Section
+from common.standstill import stopping_s
+from services.safety.config import DECISION_PERIOD_S, SafetyConfig
+from t2 import keys
+
+# Safety reckons from the reading of a sonar on, a stop begins with its command: between them are up
+# to one period of the sonars and one of the bridge's queries, besides safety's decision.
+SENSING_S = 2 / keys.ULTRASONIC.rate_hz
+REACT, DECELERATION = "safety.react", "vehicle.deceleration"
+ANGULAR = "vehicle.angular_deceleration"
+NEARER = 0.98  # of ``vehicle.sonar_max``: a greatest reading that is noise below it is none
+FAST, FASTEST = 0.5, 0.8  # of the greatest allowed speed: of many stops, and of one at least
+
+Value = float | str
+
+
+@dataclass(slots=True)
+class Fit:
+    """Estimates and proposals from the streams of one vehicle."""
+
+    streams: Sequence[Streams]
+    settings: Everything  # today's
+    stops: list[Stop] = field(default_factory=list)
+    left_out: Counter[str] = field(default_factory=Counter)
+    estimates: list[Estimate] = field(default_factory=list)
+    ranges: list[sonars.Ranges] = field(default_factory=list)  # of each of the streams
+    missing: list[str] = field(default_factory=list)  # manoeuvres without which nothing is proposed
+    proposals: dict[str, Value] = field(default_factory=dict)  # by the setting's path
+
+    @property
+    def too_long(self) -> list[Stop]:
+        """The stops that needed more than safety reckons with today, the worst first."""
+        today = safety_config(self.settings)
+        spare = {id(stop): reckoned(stop, today) - needed(stop) for stop in self.stops}
+        worst_first = sorted(self.stops, key=lambda stop: spare[id(stop)])
+        return [stop for stop in worst_first if spare[id(stop)] < 0]
+
+
+def fit(streams: Sequence[Streams], settings: Everything) -> Fit:
+    """Measure the vehicle in its streams, one for each start of the robot's computer."""
+    found = Fit(streams, settings)
+    for each in streams:
+        stops, left_out = find_stops(each)
+        found.stops += stops
+        found.left_out += left_out
+    found.ranges = [it for each in streams if (it := sonars.ranges(each))]
+    rest = chain(_rest(streams), *(_of_sonars(each) for each in found.ranges))
+    found.estimates = [*of_stops(found.stops, streams), *merged(rest)]
+    found.missing = list(missing(found.stops, settings))
+    found.proposals = dict(_proposals(found))
+    return found
+
+
+def _rest(streams: Sequence[Streams]) -> Iterator[Estimate]:
+    for each in streams:
+        yield from steady.of_ramps(each)
+        yield from steady.of_steady_motion(each)
+        yield from steady.of_standstill(each)
+        if hits := answers.hits_s(each.bumpers):
+            yield Estimate(name="hit of the bumper", unit="s", values=hits, resolution=0.02)
+        if trips := answers.round_trips_s(each):
+            yield Estimate(name="round trip of a query", unit="s", values=trips)
+
+
+def _of_sonars(ranges: sonars.Ranges) -> Iterator[Estimate]:
+    yield from filter(None, (ranges.ends, ranges.noise))
+
+
+def merged(estimates: Iterable[Estimate]) -> list[Estimate]:
+    """Return one estimate for each name, with the observations of all."""
+    found: dict[str, Estimate] = {}
+    for each in estimates:
+        before = found.get(each.name)
+        values = (*before.values, *each.values) if before else each.values
+        found[each.name] = replace(each, values=values)
+    return list(found.values())
+
+
+# --- stops ----------------------------------------------------------------------------------------
+
+
+def of_stops(stops: Sequence[Stop], streams: Sequence[Streams]) -> Iterator[Estimate]:
+    """Yield reaction and deceleration of each command, in each direction."""
+    period_s = max(each.period_s for each in streams)
+    for axis, setting in ((DRIVING, DECELERATION), (TURNING, ANGULAR)):
+        for kind in ("stop", "brake"):
+            for direction in axis.directions.values():
+                if not (mine := of_command(stops, kind, direction)):
+                    continue
+                of_safety = kind == "stop"  # BRAKE is never reckoned with
+                yield Estimate(
+                    name=f"{kind.upper()} {direction}: reaction", unit="s",
+                    values=tuple(s.reaction for s in mine), resolution=period_s,
+                    setting=REACT if of_safety else "",
+                )  # fmt: skip
+                yield Estimate(
+                    name=f"{kind.upper()} {direction}: deceleration", unit=f"{axis.unit}/s2",
+                    values=tuple(s.deceleration for s in mine),
+                    resolution=max(axis.resolution * s.deceleration / s.speed for s in mine),
+                    setting=setting if of_safety else "",
+                )  # fmt: skip
+
+
+def needed(stop: Stop) -> float:
+    """Return the distance (m or rad) from the reading to standstill."""
+    return stop.distance + stop.speed * (SENSING_S + DECISION_PERIOD_S)
+
+
+def reckoned(stop: Stop, settings: SafetyConfig) -> float:
+    """Return the distance (m or rad) that safety reckons with: as its zones, by the slower axis."""
+    stop_s = stopping_s(
+        stop.twist, settings.vehicle.deceleration, settings.vehicle.angular_deceleration
+    )
+    return float(stop.speed * (settings.reaction + stop_s / 2))
+
+
+def of_command(stops: Sequence[Stop], kind: str, direction: str) -> list[Stop]:
+    """Return the stops by this command in this direction."""
+    return [stop for stop in stops if (stop.kind, stop.direction) == (kind, direction)]
+
+
+def fast_stops(stops: Sequence[Stop], direction: str, settings: Everything) -> list[Stop]:
+    """Return the STOPs from the faster half of the allowed speeds."""
+    least = FAST * (limits(settings)[axis_of(direction).unit])
+    return [s for s in of_command(stops, "stop", direction) if s.speed >= least]
+
+
+def missing(stops: Sequence[Stop], settings: Everything) -> Iterator[str]:
+    """Yield the manoeuvres without which nothing is proposed."""
+    for axis in (DRIVING, TURNING):
+        most, unit = limits(settings)[axis.unit], f"{axis.unit}/s"
+        for direction in axis.directions.values():
+            fast = fast_stops(stops, direction, settings)
+            if (number := LEAST - len(fast)) > 0:
+                yield f"{number} more of STOP {direction} from {FAST * most:.2f} {unit} or more"
+            elif (fastest := max(s.speed for s in fast)) < FASTEST * most:
+                yield (
+                    f"a STOP {direction} from {FASTEST * most:.2f} {unit} or more: the fastest is "
+                    f"from {fastest:.2f} of the {most:g} that are allowed"
+                )
+
+
+def limits(settings: Everything) -> dict[str, float]:
+    """Return the greatest allowed speed of each axis, by its unit."""
+    return {DRIVING.unit: settings.vehicle.max_linear, TURNING.unit: settings.vehicle.max_angular}
+
+
+# --- proposals ------------------------------------------------------------------------------------
+
+
+def _proposals(found: Fit) -> Iterator[tuple[str, Value]]:
+    """Yield the settings that are proposed, with their values."""
+    if not found.missing:
+        yield from _of_stopping(found)
+    for estimate in found.estimates:
+        if estimate.setting.startswith("wire.") and (unit := _unit(estimate, found.settings)):
+            yield estimate.setting, unit
+        if estimate.setting == sonars.SETTING:
+            nearest = min(estimate.values)
+            if nearest < NEARER * found.settings.vehicle.sonar_max:
+                yield sonars.SETTING, round(nearest, 3)
+
+
+def _of_stopping(found: Fit) -> Iterator[tuple[str, Value]]:
+    """Yield reaction and decelerations of all stops; nothing while their bounds are not safe."""
+    safe = safe_values(found.settings)
+    decelerations = {
+        path: min(down(least_deceleration(found, axis)), safe[path].high)
+        for path, axis in ((DECELERATION, DRIVING), (ANGULAR, TURNING))
+    }
+    if any(value < safe[path].low for path, value in decelerations.items()):
+        found.missing.append("stops that agree better: the bound of a deceleration is too low")
+        return
+    react = max(up(longest_wait(found, decelerations)), safe[REACT].low)
+    if react > safe[REACT].high:
+        found.missing.append("stops that agree better: the bound of the reaction is too high")
+        return
+    yield REACT, react
+    yield from decelerations.items()
+
+
+def least_deceleration(found: Fit, axis: Axis) -> float:
+    """Return the lower bound of the decelerations from the faster half of the allowed speeds.
+
+    A slow stop is all reaction: there the slope depends on the motors' lag.
+    """
+    return min(
+        Estimate(name="", unit="", values=tuple(s.deceleration for s in fast)).lower_bound
+        for direction in axis.directions.values()
+        if (fast := fast_stops(found.stops, direction, found.settings))
+    )
+
+
+def longest_wait(found: Fit, decelerations: Mapping[str, float]) -> float:
+    """Return the upper bound of the time that safety must reckon with before slowing down, s.
+
+    It is the reaction, or what remains of the distance that a stop needed beside v * t / 2 and the
+    decision, if that is longer: a vehicle with lag stops along no line.
+    """
+    bounds = [each.upper_bound + SENSING_S for each in found.estimates if each.setting == REACT]
+    for direction in (*DRIVING.directions.values(), *TURNING.directions.values()):
+        waits = []
+        for stop in of_command(found.stops, "stop", direction):
+            stop_s = stopping_s(stop.twist, decelerations[DECELERATION], decelerations[ANGULAR])
+            waits.append(needed(stop) / stop.speed - stop_s / 2 - DECISION_PERIOD_S)
+        bounds.append(Estimate(name="", unit="s", values=tuple(waits)).upper_bound)
+    return max(bounds)
+
+
+def safe_values(settings: Everything) -> dict[str, Safe]:
+    """Return the safe values of the settings that may be proposed."""
+    sections: dict[str, Section] = {"safety": settings.safety, "vehicle": settings.vehicle}
+    return dict(
+        chain.from_iterable(
+            ((f"{name}.{path}", safe) for path, safe in section.protections().items())
+            for name, section in sections.items()
+        )
+    )
+
+
+def _unit(estimate: Estimate, settings: Everything) -> str:
+    """Return the firmware's unit if it explains a ratio of turning rates; empty otherwise."""
+    command = estimate.setting == "wire.command_angular_unit"
+    wire = settings.wire
+    today = wire.command_angular_unit if command else wire.feedback_angular_unit
+    (other,) = UNITS.keys() - {today}
+    ratio = abs(estimate.mean)
+    if not command:  # a larger unit of the firmware makes our reading smaller
+        ratio = 1 / ratio if ratio else 0.0
+    matches = abs(ratio * UNITS[today] / UNITS[other] - 1) <= UNIT_MATCH
+    return other if matches else ""
+
+
+def up(value: float) -> float:
+    """Return a value rounded up to 0.01."""
+    return ceil(value * 100 - 1e-6) / 100
+
+
+def down(value: float) -> float:
+    """Return a value rounded down to 0.01."""
+    return floor(value * 100 + 1e-6) / 100
+
+
+def axis_of(direction: str) -> Axis:
+    """Return the axis of a direction."""
+    return DRIVING if direction in DRIVING.directions.values() else TURNING

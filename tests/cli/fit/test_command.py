@@ -1,0 +1,169 @@
+"""``t2 fit`` on recordings of synthetic stops."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from cli.__main__ import main
+from cli.fit.streams import Streams
+from cli.settings import Everything
+from common.cli_args import EXIT_CONFIG
+from common.config import Sources, load
+from common.freshness import NS_PER_S
+from common.settings import Vehicle
+from services.recorder.mcap_codec import Encoder
+from services.recorder.writer import RecordingWriter
+from sim.config import load_model
+from t2 import codec
+from t2.messages import Command, Message
+from tests.cli.fit.stops_fixture import streams
+from tests.recorder.samples import bare
+
+PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
+         "mileages": "tel/bridge/mileage"}  # fmt: skip
+CAREFUL = (
+    *("--set", "safety.react=0.4", "--set", "vehicle.deceleration=0.5"),
+    *("--set", "vehicle.angular_deceleration=0.5"),
+)
+SPEEDS = (0.3, 0.5, 0.6, 0.7, 0.8, 0.9)
+ALL = (*SPEEDS, *(-speed for speed in SPEEDS))
+
+
+def record(path: Path, *robots: Streams, host: int = 0) -> Path:
+    """Record the streams of robot 001, and of 002."""
+    messages: list[tuple[str, Message]] = [
+        (f"t2/v1/00{number}/{key}", replace(each, host=host))
+        for number, streams in enumerate(robots, 1)
+        for name, key in PATHS.items()
+        for each in getattr(streams, name)
+    ]
+    writer = RecordingWriter(path, Encoder(Vehicle()))
+    for key, each in sorted(messages, key=lambda one: one[1].mono_ns):
+        at_s = each.mono_ns / NS_PER_S
+        one = bare("", codec.encode(each), codec.encoding(type(each)), at_s)
+        writer.write(replace(one, key=key))
+    writer.write(bare("tel/mine", b"\xc1", at_s=at_s))
+    writer.close()
+    return path
+
+
+def driven(*speeds: float, first_s: float = 10.0, **how: Any) -> Streams:
+    """Return stops and turns from each speed (m/s and rad/s), ten seconds apart."""
+    made = Streams()
+    for number, (speed, turns) in enumerate((s, t) for t in (False, True) for s in speeds):
+        sign, begin_s = (1 if speed > 0 else -1), first_s + 10.0 * number
+        one = streams(sign=sign, speed=abs(speed), begin_s=begin_s, turns=turns, **how)
+        made.motions += one.motions
+        made.velocities += one.velocities
+        made.mileages += one.mileages
+    return made
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("stops") / "a.mcap", driven(*ALL))
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_all_that_safety_needs_is_measured(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A stop in two recordings counts once: the black box records what `t2 record` also has."""
+    assert main(["fit", str(path), str(path), "--stops", "--out", "fitted", *CAREFUL]) == 0
+    printed, errors = capsys.readouterr()
+    assert not errors
+    assert "\x1b" not in printed
+    lines = printed.splitlines()
+    (reaction,) = (line for line in lines if line.startswith("STOP forward: reaction"))
+    assert reaction.split()[-4:] == ["6", "safety.react", "0.4", "0.21"]
+    assert sum("STOP backward  " in line for line in lines) == 6
+    assert "No stop was longer than safety reckons with.\n" in printed
+    assert "NOT MEASURED" not in printed
+    assert printed.endswith("Written: fitted: fit.toml, profile.toml\n")
+    proposed = load(Everything, Sources((Path("fitted/fit.toml"),), {}, ())).config
+    assert (proposed.safety.react, proposed.vehicle.deceleration) == (0.21, 0.49)
+    model = load_model(["fitted/profile.toml"])
+    assert model.drive.coast == pytest.approx(0.5, abs=0.003)
+    assert model.drive.dead_time == pytest.approx(0.1, abs=0.003)
+
+
+def test_a_stop_that_was_too_long_is_the_first_line(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = record(tmp_path / "b.mcap", driven(0.6, -0.6, first_s=400.0, deceleration=0.3))
+    assert main(["fit", str(path), str(other), "--stops"]) == 1
+    printed = capsys.readouterr().out
+    assert printed.startswith("NOT SAFE: STOP ")
+    rows = [line.split()[3:] for line in printed.splitlines() if "  m     0.600  " in line]
+    assert len(rows) == 4
+    for speed, _, _, distance, needed, reckoned in (map(float, row[1:]) for row in rows):
+        # two periods of the sonars and one of the decisions, from a reading to the command
+        assert needed == pytest.approx(distance + 0.12 * speed, abs=0.002)
+        assert reckoned == pytest.approx(0.27 * speed + speed**2 / 1.2, abs=0.002)
+        assert needed > reckoned
+    assert {0.3, 0.5} == {round(float(row[3]), 1) for row in rows}
+
+
+def test_each_direction_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    forward = record(tmp_path / "c.mcap", driven(*SPEEDS))
+    braked = driven(*(-speed for speed in SPEEDS), first_s=500.0, command=Command.BRAKE)
+    backward = record(tmp_path / "d.mcap", braked)
+    assert main(["fit", str(forward), str(backward), *CAREFUL]) == 1
+    printed = capsys.readouterr().out
+    assert "BRAKE backward: deceleration" in printed
+    assert "NOT MEASURED: 5 more of STOP backward from 0.50 m/s or more.\n" in printed
+    assert "NOT MEASURED: 5 more of STOP right from 0.50 rad/s or more.\n" in printed
+    assert "of STOP left" not in printed
+    assert "NOT SAFE" not in printed
+    (text,) = (file.read_text() for file in tmp_path.glob("out/*/fit.toml"))
+    assert "react" not in text
+    assert "# Not measured: 5 more of STOP backward" in text
+
+
+def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    merged = str(record(tmp_path / "two.mcap", driven(*ALL), driven(0.5, first_s=11.0)))
+    assert main(["fit", merged]) == 1
+    assert "recordings of 001, 002: choose one with --robot" in capsys.readouterr().err
+    assert main(["fit", merged, "--robot", "001", *CAREFUL]) == 0
+
+
+def test_the_clock_of_another_start_of_the_computer(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both begin at the same monotonic time; the stops of each are measured."""
+    again = record(tmp_path / "again.mcap", driven(*ALL), host=7)
+    assert main(["fit", str(path), str(again), "--stops", *CAREFUL]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("STOP forward  ") == 12
+    assert printed.count("Greatest speeds: 0.90 m/s and 0.90 rad/s.") == 2
+
+
+def test_a_recording_that_was_cut_is_used(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "cut.mcap").write_bytes(path.read_bytes()[:-4000])
+    assert main(["fit", "cut.mcap", *CAREFUL]) in (0, 1)
+    assert "cut.mcap: truncated or damaged; what it holds is used." in capsys.readouterr().out
+
+
+def test_what_it_cannot_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    still = driven(0.5)
+    still.motions = []
+    stands = record(tmp_path / "still.mcap", still)
+    coarse = driven(0.5)
+    coarse.velocities = coarse.velocities[::5]
+    laptop = record(tmp_path / "laptop.mcap", coarse)
+    (tmp_path / "taken").mkdir()
+    whole = record(tmp_path / "whole.mcap", driven(0.5))
+    for words, code, error in (
+        ((stands,), 1, "still.mcap: has no @cmd/motion: record all keys with `t2 record`"),
+        ((laptop,), 1, "has a velocity each 0.10 s, too coarse for a stop"),
+        ((stands, "--robot", "002"), 1, "has no message of robot 002 to measure"),
+        ((whole, "--out", "taken"), EXIT_CONFIG, "--out taken: exists already"),
+    ):
+        assert main(["fit", *map(str, words)]) == code
+        assert error in capsys.readouterr().err

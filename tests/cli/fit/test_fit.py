@@ -1,0 +1,102 @@
+"""Proposals from synthetic stops: bounds on the safe side, and what is missing."""
+
+import pytest
+from msgspec.structs import replace
+
+from cli.fit.fit import Fit, fit, needed, reckoned
+from cli.fit.streams import Streams
+from cli.settings import Everything, safety_config
+from tests.cli.fit.stops_fixture import streams
+from tests.cli.fit.test_steady import drive
+
+SPEEDS = (0.3, 0.5, 0.6, 0.7, 0.8, 0.9)
+TODAY = Everything()
+
+
+def measured(
+    speeds: tuple[float, ...] = SPEEDS, settings: Everything = TODAY, **decelerations: float
+) -> Fit:
+    """Return the fit of stops in each direction from these speeds."""
+    made = Streams()
+    begin_s = 10.0
+    for direction, sign, turns in (
+        ("forward", 1, False), ("backward", -1, False), ("left", 1, True), ("right", -1, True),
+    ):  # fmt: skip
+        deceleration = decelerations.get(direction, 0.5)
+        for speed in speeds:
+            one = streams(
+                sign=sign, speed=speed, begin_s=begin_s, turns=turns, deceleration=deceleration,
+                until_s=1.0 + speed / deceleration,
+            )  # fmt: skip
+            made.motions += one.motions
+            made.velocities += one.velocities
+            made.mileages += one.mileages
+            begin_s += 10.0
+    made.sort()
+    return fit([made], settings)
+
+
+def test_the_worst_direction_is_proposed() -> None:
+    found = measured(forward=0.5, backward=0.4, left=0.9, right=0.7)
+    assert found.missing == []
+    assert found.proposals["vehicle.deceleration"] == pytest.approx(0.39, abs=0.011)
+    assert found.proposals["vehicle.angular_deceleration"] == pytest.approx(0.69, abs=0.021)
+    assert 0.2 <= float(found.proposals["safety.react"]) <= 0.25
+
+
+def test_with_the_proposal_safety_reckons_with_each_stop() -> None:
+    found = measured(forward=0.3, backward=0.5, left=0.5, right=0.3)
+    assert len(found.too_long) > 10
+    worst = found.too_long[0]
+    assert reckoned(worst, safety_config(TODAY)) < needed(worst)
+    react = float(found.proposals["safety.react"])
+    linear = float(found.proposals["vehicle.deceleration"])
+    angular = float(found.proposals["vehicle.angular_deceleration"])
+    vehicle = replace(TODAY.vehicle, deceleration=linear, angular_deceleration=angular)
+    safety = replace(TODAY.safety, react=react)
+    proposed = replace(TODAY, vehicle=vehicle, safety=safety)
+    assert fit(found.streams, proposed).too_long == []
+
+
+@pytest.mark.parametrize(
+    ("speeds", "missing"),
+    [
+        (SPEEDS[:5], "1 more of STOP forward from 0.50 m/s or more"),
+        ((0.5, 0.5, 0.5, 0.6, 0.7), "a STOP forward from 0.80 m/s or more: the fastest is from "
+         "0.70 of the 1 that are allowed"),
+        ((0.5, 0.5, 0.5, 0.6, 0.81), ""),
+    ],
+)  # fmt: skip
+def test_what_is_missing(speeds: tuple[float, ...], missing: str) -> None:
+    found = measured(speeds)
+    assert found.missing[:1] == ([missing] if missing else [])
+    assert bool(found.proposals) is not bool(missing)
+
+
+def test_no_proposal_takes_a_protection_away() -> None:
+    """The vehicle brakes better than the settings may say, or worse than they can."""
+    strong = measured(forward=1.9, backward=1.9, left=5.0, right=5.0).proposals
+    assert strong["vehicle.deceleration"] == 1.0
+    assert strong["vehicle.angular_deceleration"] == 3.0
+    weak = measured(left=0.09)
+    assert "vehicle.angular_deceleration" not in weak.proposals
+    assert any("the bound of a deceleration is too low" in each for each in weak.missing)
+
+
+@pytest.mark.parametrize(
+    ("counted", "path", "unit"),
+    [
+        (0.573, "wire.command_angular_unit", "milliradian"),
+        (1.0, "wire.command_angular_unit", None),
+        (1.2, "wire.command_angular_unit", None),
+        (0.573, "wire.feedback_angular_unit", None),
+        (1.745, "wire.feedback_angular_unit", "milliradian"),
+    ],
+)
+def test_units(counted: float, path: str, unit: str | None) -> None:
+    """The counters show the firmware's unit; the measured velocity agrees with the command."""
+    made = drive((1.0, 0, 0), (2.0, 0, 0.5), scale=counted)
+    if path.startswith("wire.feedback"):
+        made.mileages = drive((1.0, 0, 0), (2.0, 0, 0.5)).mileages
+        made.velocities = [replace(v, angular=v.angular * counted) for v in made.velocities]
+    assert fit([made], TODAY).proposals.get(path) == unit

@@ -1,0 +1,63 @@
+"""The proof of ``t2 fit`` on two vehicles, and that it would find a wrong estimate."""
+
+import pytest
+from msgspec.structs import replace
+
+from cli.fit.fit import DECELERATION, REACT, Fit
+from cli.settings import Everything
+from common.motion import Twist
+from sim.config import load_model
+from sim.model import Model
+from verification.fit.run import measure, vehicles
+from verification.fit.truth import stopped_within, truths, unsafe
+
+PROPOSED = {REACT: 0.11, DECELERATION: 0.79, "vehicle.angular_deceleration": 1.9}
+
+
+def fitted(**changes: float) -> Fit:
+    found = Fit([], Everything())
+    found.proposals = {**PROPOSED, **changes}
+    return found
+
+
+@pytest.mark.parametrize("number", [0, 23 + 4])
+def test_a_vehicle_is_measured(number: int) -> None:
+    """A profile, and a random vehicle with lag, dead time and noise."""
+    result = measure(vehicles(5)[number])
+    assert result.missing == ()
+    assert result.proposes
+    assert result.unsafe == ()
+    assert len(result.outside) <= 1
+    assert result.inside >= 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "short"),
+    [
+        ({}, False),
+        ({REACT: 0.07}, True),
+        ({DECELERATION: 0.85}, True),
+        ({"vehicle.angular_deceleration": 2.2}, True),
+    ],
+)
+def test_a_proposal_that_reckons_with_too_little_is_found(
+    changes: dict[str, float], short: bool
+) -> None:
+    assert bool(unsafe(fitted(**changes), Model())) is short
+
+
+def test_the_distance_of_a_stop_by_the_motors() -> None:
+    model = load_model(["slow-motors"])
+    ideal = replace(model, drive=replace(model.drive, lag=0.0, dead_time=0.0))
+    a = model.drive.coast
+    assert stopped_within(Twist(0.8), ideal, 0.5) == pytest.approx(0.8**2 / 2 / a, abs=0.01)
+    late = replace(model, drive=replace(model.drive, lag=0.0))
+    assert stopped_within(Twist(0.8), late, 0.5) == pytest.approx(
+        0.8**2 / 2 / a + 0.8 * model.drive.dead_time, abs=0.01
+    )
+    assert stopped_within(Twist(0.8), model, 0.5) > stopped_within(Twist(0.8), late, 0.5)
+
+
+def test_motors_with_lag_have_no_true_deceleration() -> None:
+    assert "STOP left: deceleration" in dict(truths(Model()))
+    assert "STOP left: deceleration" not in dict(truths(load_model(["slow-motors"])))
