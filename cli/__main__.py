@@ -41,6 +41,7 @@ GROUPS = {
             "record everything on the bus to files, until Ctrl-C",
         ),
         "info": ("cli.recordings.info", "show the content of a recording"),
+        "why": ("cli.recordings.why", "why safety stopped: its decisions again, from a recording"),
         "replay": ("cli.recordings.replay", "play a recording onto the bus"),
         "report": (
             "cli.recordings.report",

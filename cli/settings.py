@@ -36,7 +36,9 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
 
 def safety_config(config: Everything) -> SafetyConfig:
     """Return the sections of safety."""
-    return SafetyConfig(host=config.host, vehicle=config.vehicle, safety=config.safety)
+    return SafetyConfig(
+        host=config.host, board=config.board, vehicle=config.vehicle, safety=config.safety
+    )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

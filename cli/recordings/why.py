@@ -1,0 +1,366 @@
+"""``t2 why``: why safety stopped, by its own decisions, made again from a recording.
+
+Default: each stop with its cause, the input that shows it, its age and the rule. ``--at`` shows one
+decision in full, ``--set`` what other settings would have decided.
+"""
+
+import argparse
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from cli.inspect import output
+from cli.inspect.addressing import chunks
+from cli.inspect.session import one_robot
+from cli.recordings import decision_text as text
+from cli.recordings.decision_replay import (
+    SEVERITY,
+    Decided,
+    Replay,
+    Variant,
+    differences,
+    new_stops,
+)
+from cli.recordings.info import open_recording
+from cli.recordings.safety_inputs import UNSURE_NS, Recorded, Run, is_input, runs
+from cli.settings import Everything, safety_config
+from common.cli_args import add_sources, file_path, reader_language, sources
+from common.config import load
+from common.freshness import NS_PER_S
+from common.text import printable
+from services.safety.config import SafetyConfig
+from services.safety.core.policy import Policy
+from t2 import keys
+from t2.errors import T2Error
+from t2.messages import Motion
+from t2.words import Language
+
+CLOCK = re.compile(r"(\d\d):(\d\d):(\d\d(?:\.\d+)?)")  # UTC
+DAY_S = 86_400
+INDENT = " " * 12
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add this command's options."""
+    parser.add_argument("file", metavar="RECORDING", type=file_path)
+    parser.add_argument(
+        "--at", metavar="TIME", type=parse_time,
+        help="the whole decision at this time: s since the start, as `t2 info` shows, or HH:MM:SS",
+    )  # fmt: skip
+    parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
+    add_sources(parser)
+
+
+def parse_time(word: str) -> float | str:
+    """Parse seconds since the start, or a time of day (UTC)."""
+    if CLOCK.fullmatch(word):
+        return word
+    try:
+        return float(word)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{word!r} is not a time; use seconds since the start (12.3) or UTC (08:15:42)"
+        ) from None
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show the stops or one decision; return 1 if a motion did not come out again."""
+    given = sources(options)
+    settings = safety_config(load(Everything, replace(given, sets=())).config)
+    changed = safety_config(load(Everything, given).config) if given.sets else None
+    recording = read(options.file, options.robot)
+    view = View(recording, settings, changed, given.sets, reader_language())
+    lines = list(view.at(options.at) if options.at is not None else view.stops())
+    print(printable("\n".join(lines), "\n"), flush=True)
+    return 0 if view.agrees else 1
+
+
+# --- the file -----------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Recording:
+    """What a file contains of one robot."""
+
+    file: Path
+    robot: str = ""
+    began_ns: int = 0
+    ended_ns: int = 0
+    is_cut: bool = False  # truncated or damaged
+    runs: list[Run] = field(default_factory=list)
+
+    def since_start(self, log_ns: int) -> float:
+        """Return a time of the recording in seconds since its start."""
+        return (log_ns - self.began_ns) / NS_PER_S
+
+    def moment(self, log_ns: int) -> str:
+        """Return a time as `t2 info` shows it: seconds since the start, and UTC."""
+        utc = datetime.fromtimestamp(log_ns / NS_PER_S, UTC)
+        return f"{self.since_start(log_ns):8.2f} s  {utc:%H:%M:%S}"
+
+    def log_ns(self, at: float | str) -> int:
+        """Return the time that an option names; raise ``T2Error`` outside of the recording."""
+        lasted_s = self.since_start(self.ended_ns)
+        at_s = self._of_day(at) if isinstance(at, str) else at
+        if not 0 <= at_s <= lasted_s:
+            first, last = (self.moment(ns).strip() for ns in (self.began_ns, self.ended_ns))
+            raise T2Error(f"--at {at}: the recording is from {first} to {last}")
+        return self.began_ns + round(at_s * NS_PER_S)
+
+    def _of_day(self, clock: str) -> float:
+        hours, minutes, seconds = (float(part) for part in clock.split(":"))
+        began_s = self.began_ns / NS_PER_S % DAY_S
+        # A second's begin may be before the recording's start in it.
+        at_s = hours * 3600 + minutes * 60 + seconds - began_s
+        at_s = at_s + DAY_S if at_s <= -1 else at_s
+        return max(0.0, at_s)
+
+
+def read(file: Path, robot: str | None) -> Recording:
+    """Read the messages of one robot; raise ``T2Error`` if they show no decisions."""
+    found = Recording(file)
+    robots: dict[str, list[Recorded]] = {}
+    with open_recording(file) as reader:
+        for entry in reader:
+            found.began_ns = found.began_ns or entry.log_ns
+            found.ended_ns = max(found.ended_ns, entry.log_ns)
+            name, path = chunks(entry.key)
+            if not is_input(path, entry.kind):
+                continue
+            message = None if path == keys.ESTOP_PATH else entry.message
+            if message is not None or path == keys.ESTOP_PATH:
+                robots.setdefault(name, []).append(Recorded(path, message, entry.log_ns))
+    found.is_cut = bool(reader.cut or reader.damaged)
+    fleet = [each for name in robots if "*" in name for each in robots[name]]
+    names = sorted(name for name in robots if "*" not in name)
+    if robot is None and len(names) > 1:
+        raise T2Error(f"{file}: recording of {', '.join(names)}: choose one with --robot")
+    found.robot = robot or (names[0] if names else "")
+    recorded = sorted([*robots.get(found.robot, ()), *fleet], key=lambda one: one.log_ns)
+    try:
+        found.runs = runs(recorded)
+    except T2Error as error:
+        raise T2Error(f"{file}: robot {found.robot or '-'}: {error}") from None
+    return found
+
+
+# --- output -------------------------------------------------------------------------------------
+
+
+@dataclass(slots=True)
+class Agreement:
+    """How many motions of a run came out again."""
+
+    motions: int = 0
+    compared: int = 0
+    reordered: int = 0
+    since_ns: int | None = None  # first compared one
+    differing: int = 0
+    first: Decided | None = None  # the first one that differs
+
+    def add(self, decided: Decided) -> None:
+        """Count a decision."""
+        self.motions += 1
+        if not decided.is_compared:
+            return
+        self.since_ns = decided.at_ns if self.since_ns is None else self.since_ns
+        self.compared += 1
+        self.reordered += decided.is_reordered
+        if decided.differences:
+            self.differing += 1
+            self.first = self.first or decided
+
+
+@dataclass(slots=True)
+class Comparison:
+    """How the motions of other settings differ from those of the recording's settings."""
+
+    compared: int = 0
+    differing: int = 0
+    first: tuple[Decided, Motion] | None = None
+    worst: tuple[Decided, Motion] | None = None
+
+    def add(self, decided: Decided, other: Motion) -> None:
+        """Count a decision with its motion of other settings."""
+        self.compared += 1
+        if not differences(decided.motion, other):
+            return
+        self.differing += 1
+        self.first = self.first or (decided, other)
+        if self.worst is None or _distance(decided, other) > _distance(*self.worst):
+            self.worst = decided, other
+
+
+def _distance(decided: Decided, other: Motion) -> tuple[int, float]:
+    """Return how much two motions differ: first by the command, then by the speed."""
+    one = decided.motion
+    steps = abs(SEVERITY[one.command] - SEVERITY[other.command])
+    return steps, abs(one.linear - other.linear) + abs(one.angular - other.angular)
+
+
+@dataclass
+class View:
+    """The text of a recording's decisions."""
+
+    recording: Recording
+    settings: SafetyConfig
+    changed: SafetyConfig | None
+    sets: Sequence[str]
+    language: Language
+    agrees: bool = True
+
+    def stops(self) -> Iterator[str]:
+        """Yield each stop of each run, and how many motions agree."""
+        yield from self._head()
+        for run in self.recording.runs:
+            lines: list[str] = []
+            before: Decided | None = None
+            agreement, comparison = Agreement(), Comparison()
+            variant = Variant(self.changed) if self.changed else None
+            for decided in Replay(self.settings, run).decisions():
+                agreement.add(decided)
+                lines += self._stop(run, before, decided)
+                if variant:
+                    other = variant.decide(decided)
+                    if decided.is_compared:
+                        comparison.add(decided, other)
+                before = decided
+            yield from self._agreement(run, agreement)
+            yield from ["", "stops (since the start, and UTC):", *lines] if lines else ["no stop"]
+            if variant:
+                yield from ["", *self._comparison(run, comparison)]
+
+    def at(self, at: float | str) -> Iterator[str]:
+        """Yield the whole decision at a time."""
+        log_ns = self.recording.log_ns(at)
+        yield from self._head()
+        run = next(
+            (one for one in reversed(self.recording.runs)
+             if one.logged_ns(one.motions[0].mono_ns) <= log_ns),
+            self.recording.runs[0],
+        )  # fmt: skip
+        chosen, other = None, None
+        variant = Variant(self.changed) if self.changed else None
+        for decided in Replay(self.settings, run).decisions():
+            if chosen is not None and run.logged_ns(decided.at_ns) > log_ns:
+                break
+            chosen, other = decided, variant.decide(decided) if variant else None
+        if chosen is not None:
+            yield from self._decision(run, chosen, other)
+
+    def _head(self) -> Iterator[str]:
+        recording = self.recording
+        yield f"file: {recording.file}, robot {recording.robot}"
+        if recording.is_cut:
+            yield "The file is truncated or damaged: what is readable is used."
+        if len(recording.runs) > 1:
+            yield f"Safety started {len(recording.runs)} times: each run is shown by itself."
+
+    def _stop(self, run: Run, before: Decided | None, decided: Decided) -> Iterator[str]:
+        """Yield the lines of a stop that begins with this decision."""
+        names = new_stops(before, decided)
+        if not names or before is None:
+            return
+        worst, when = names[0], self.recording.moment(run.logged_ns(decided.at_ns))
+        command = decided.motion.command.upper()
+        yield f"{when}  {command:5}  {worst}: {text.cause_text(decided, worst, self.language)}"
+        yield f"{INDENT}before: {text.motion_text(before.motion)}"
+        for each in text.shown_by(decided, worst, self.settings):
+            yield f"{INDENT}input: {each}"
+        yield f"{INDENT}rule: {text.rule(worst)}"
+        if worst == "blocked":
+            planner = Policy(self.settings).planner
+            yield f"{INDENT}zone: {text.zone(decided, planner, self.settings)}"
+        for name in names[1:]:
+            yield f"{INDENT}also: {name}: {text.cause_text(decided, name, self.language)}"
+        if not decided.is_compared:
+            yield f"{INDENT}not verified: the replay takes its state from the recording here"
+        elif decided.differences:
+            yield f"{INDENT}DIFFERS: recorded was {text.motion_text(decided.recorded)}"
+
+    def _agreement(self, run: Run, found: Agreement) -> Iterator[str]:
+        self.agrees = self.agrees and found.compared > 0 and not found.differing
+        if found.since_ns is None:
+            yield (
+                f"replay: none of {found.motions} motions could be compared: the replayed state "
+                "never agreed for 0.5 s; were these the settings of the robot? (--config FILE)"
+            )
+            return
+        since = self.recording.moment(run.logged_ns(found.since_ns)).strip()
+        yield (
+            f"replay: {found.compared - found.differing} of {found.compared} motions agree, from "
+            f"{since} on; {found.motions - found.compared} others only give the state to start from"
+        )
+        if found.reordered:
+            yield (
+                f"{found.reordered} of them agree with messages in another order: the order within "
+                f"{UNSURE_NS / 1e6:.0f} ms is not recorded"
+            )
+        if found.first is not None:
+            one = found.first
+            yield (
+                f"first difference at {self.recording.moment(run.logged_ns(one.at_ns)).strip()}: "
+                f"{', '.join(one.differences)}: recorded {text.motion_text(one.recorded)}, "
+                f"replayed {text.motion_text(one.motion)}. A recording contains no settings (name "
+                "those of the robot with --config), and not the order of messages within "
+                f"{UNSURE_NS / 1e6:.0f} ms"
+            )
+
+    def _comparison(self, run: Run, found: Comparison) -> Iterator[str]:
+        yield (
+            f"with {', '.join(self.sets)}: {found.differing} of {found.compared} motions differ. "
+            "The reaction of the vehicle is not simulated: each decision begins at the recorded "
+            "state."
+        )
+        for title, pair in (("first", found.first), ("worst", found.worst)):
+            if pair is not None:
+                decided, other = pair
+                when = self.recording.moment(run.logged_ns(decided.at_ns))
+                yield (
+                    f"{when}  {title}: {text.motion_text(decided.motion)} becomes "
+                    f"{text.motion_text(other)}"
+                )
+
+    def _decision(self, run: Run, decided: Decided, other: Motion | None) -> Iterator[str]:
+        """Yield everything about one decision."""
+        state = decided.state
+        yield f"decision at {self.recording.moment(run.logged_ns(decided.at_ns)).strip()}"
+        rows = [
+            (each.name, _seconds(each.age_s), _seconds(each.limit_s),
+             "TOO OLD" if each.is_late else "", each.value)
+            for each in text.inputs(decided, self.settings)
+        ]  # fmt: skip
+        yield from ["", output.table(("input", "age s", "limit s", "", "value"), rows)]
+        causes = text.held(decided, self.language)
+        head = ("cause", "action", "since s", "good", "text")
+        yield from ["", output.table(head, causes) if causes else "no cause is held"]
+        yield ""
+        planner = Policy(self.settings).planner
+        requested = planner.requested(state, decided.at_ns)
+        if requested is None:
+            yield "request: none"
+        else:
+            slower = f", slowed by limit {requested.limited_by}" if requested.limited_by else ""
+            yield f"request: {requested.source}: {text.speed(requested.twist)}{slower}"
+        if plan := text.zone(decided, planner, self.settings):
+            yield f"plan: {plan}"
+        yield f"motion: {text.motion_text(decided.motion)}, verdict {state.verdict.name}"
+        yield f"recorded: {text.motion_text(decided.recorded)}{_remark(decided)}"
+        if other is not None:
+            yield f"with {', '.join(self.sets)}: {text.motion_text(other)}"
+
+
+def _remark(decided: Decided) -> str:
+    if not decided.is_compared:
+        return " (not compared: the replay takes its state from the recording here)"
+    if decided.differences:
+        return f" (DIFFERS in {', '.join(decided.differences)})"
+    return " (agrees, with messages in another order)" if decided.is_reordered else " (agrees)"
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"
