@@ -11,6 +11,7 @@ from common.motion import RUN, STILL, Twist
 from services.safety.config import SafetyConfig
 from services.safety.core.causes import BY_NAME, Clears, ordered
 from services.safety.core.planning import Planner
+from services.safety.core.speed_limits import LimitChannel
 from services.safety.report import described
 from t2.catalogue import CAUSES
 from t2.messages import (
@@ -58,7 +59,7 @@ SHOWN_BY: dict[CauseName, tuple[str, ...]] = {
     "limit_silent": ("limit",),
     "two_publishers": ("drive ", "limit"),
     "neutral": ("drive ",),
-    "blocked": ("ultrasonic", "velocity"),
+    "blocked": ("ultrasonic",),
     "no_request": ("drive ",),
     "limit": ("limit",),
     "obstacle": ("ultrasonic",),
@@ -132,21 +133,23 @@ def _requests(decided: Decided) -> Iterator[Input]:
             yield Input(f"drive {name}", asked + due, channel.age_s(now_ns), source.lease)
     for name, limit in limits.sources.items():
         if cap := limits.channels.get(name):
-            value = f"{_cap(cap.linear)} m/s, {_cap(cap.angular)} rad/s{cap.because}"
-            yield Input(f"limit {name}", value, cap.age_s(now_ns), limit.lease)
+            yield Input(f"limit {name}", _caps(cap) + cap.because, cap.age_s(now_ns), limit.lease)
         else:
             yield Input(f"limit {name}", "not received", None, limit.lease)
 
 
-def _cap(value: float) -> str:
-    return "no cap" if math.isinf(value) else f"{value:g}"
+def _caps(limit: LimitChannel) -> str:
+    caps = ((limit.linear, "m/s"), (limit.angular, "rad/s"))
+    return ", ".join(f"{cap:g} {unit}" for cap, unit in caps if math.isfinite(cap)) or "no cap"
 
 
 def _ranges(sample: Ultrasonic) -> str:
     readings = zip(SONAR_NAMES, sample.ranges, sample.status, strict=True)
-    return ", ".join(
-        f"{name} {status if far is None else f'{far:.2f} m'}" for name, far, status in readings
-    )
+    return ", ".join(f"{name} {_range(far, status)}" for name, far, status in readings)
+
+
+def _range(far: float | None, status: str) -> str:
+    return status if far is None else f"{far:.2f} m"
 
 
 def _faults(sample: Driver) -> str:
@@ -204,11 +207,23 @@ def shown_by(decided: Decided, name: CauseName, settings: SafetyConfig) -> list[
     found = [one for one in inputs(decided, settings) if one.name.startswith(prefixes)]
     if name == "silent":
         return [one for one in found if one.is_late]
+    sonar = decided.state.verdict.blocked_by
+    if name == "blocked" and sonar is not None:
+        return [_one_sonar(each, decided, sonar) for each in found]
     if name == "estop" and decided.inputs.estop:
         return [one for one in found if one.name == "estop key"]
     if name == "starting":
         return [one for one in found if one.value == "not received"]
     return found
+
+
+def _one_sonar(one: Input, decided: Decided, sonar: int) -> Input:
+    """Return the input of all sonars with the reading of one."""
+    if decided.inputs.ultrasonic is None:
+        return one
+    sample = decided.inputs.ultrasonic.value
+    value = f"{SONAR_NAMES[sonar]} {_range(sample.ranges[sonar], sample.status[sonar])}"
+    return Input(one.name, value, one.age_s, one.limit_s)
 
 
 def zone(decided: Decided, planner: Planner, settings: SafetyConfig) -> str:

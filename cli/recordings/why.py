@@ -41,6 +41,7 @@ from t2.words import Language
 
 CLOCK = re.compile(r"(\d\d):(\d\d):(\d\d(?:\.\d+)?)")  # UTC
 DAY_S = 86_400
+SHOWN_NS = NS_PER_S // 200  # half of the resolution of a time that is shown
 INDENT = " " * 12
 
 
@@ -95,7 +96,7 @@ class Recording:
 
     def since_start(self, log_ns: int) -> float:
         """Return a time of the recording in seconds since its start."""
-        return (log_ns - self.began_ns) / NS_PER_S
+        return max(0, log_ns - self.began_ns) / NS_PER_S
 
     def moment(self, log_ns: int) -> str:
         """Return a time as `t2 info` shows it: seconds since the start, and UTC."""
@@ -243,14 +244,27 @@ class View:
              if one.logged_ns(one.motions[0].mono_ns) <= log_ns),
             self.recording.runs[0],
         )  # fmt: skip
-        chosen, other = None, None
+        if chosen := self._chosen(run, log_ns, NS_PER_S if isinstance(at, str) else 0):
+            yield from self._decision(run, *chosen)
+
+    def _chosen(self, run: Run, log_ns: int, span_ns: int) -> tuple[Decided, Motion | None] | None:
+        """Return the newest decision at a time, with the motion of the changed settings.
+
+        A time of day is a whole second: the first stop in it, otherwise its first decision.
+        """
         variant = Variant(self.changed) if self.changed else None
+        chosen, before = None, None
         for decided in Replay(self.settings, run).decisions():
-            if chosen is not None and run.logged_ns(decided.at_ns) > log_ns:
+            at_ns = run.logged_ns(decided.at_ns)
+            if chosen is not None and at_ns > log_ns + max(span_ns, SHOWN_NS):
                 break
-            chosen, other = decided, variant.decide(decided) if variant else None
-        if chosen is not None:
-            yield from self._decision(run, chosen, other)
+            is_stop = bool(new_stops(before, decided)) and at_ns >= log_ns
+            pair = decided, variant.decide(decided) if variant else None
+            if is_stop and span_ns:
+                return pair
+            is_new = before is None or run.logged_ns(before.at_ns) < log_ns
+            chosen, before = pair if is_new or not span_ns else chosen, decided
+        return chosen
 
     def _head(self) -> Iterator[str]:
         recording = self.recording
@@ -306,8 +320,8 @@ class View:
                 f"first difference at {self.recording.moment(run.logged_ns(one.at_ns)).strip()}: "
                 f"{', '.join(one.differences)}: recorded {text.motion_text(one.recorded)}, "
                 f"replayed {text.motion_text(one.motion)}. A recording contains no settings (name "
-                "those of the robot with --config), and not the order of messages within "
-                f"{UNSURE_NS / 1e6:.0f} ms"
+                "those of the robot with --config), no message that the recorder lost, and not the "
+                f"order of messages within {UNSURE_NS / 1e6:.0f} ms"
             )
 
     def _comparison(self, run: Run, found: Comparison) -> Iterator[str]:

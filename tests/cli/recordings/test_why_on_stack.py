@@ -1,0 +1,49 @@
+"""``t2 why`` on a recording of the real processes."""
+
+import re
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cli.__main__ import main
+from cli.settings import Everything
+from common.loop import Loop
+from sim.requests import Bumper
+from tests.drive_source import ConstantSource, drive_until_moving
+from verification.harness.bus import bus_on, running, set_options
+from verification.harness.stack import running_stack
+
+AGREEING = 0.99  # of the motions, on a busy host
+
+
+@pytest.mark.timed
+def test_the_motions_of_a_real_stack_come_out_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "recordings"
+
+    def recorder(config: Everything) -> dict[str, list[str]]:
+        sets = (f"bus.connect={config.bus.endpoints[0]}", f"recorder.folder={folder}",
+                "recorder.everything=true")  # fmt: skip
+        return {"recorder": [sys.executable, "-m", "services.recorder", *set_options(*sets)]}
+
+    with running_stack(tmp_path, shipped=True, beside=recorder) as stack, running(Loop()) as loop:
+        source = ConstantSource(loop)
+        with bus_on(stack.endpoint, loop, source.declare):
+            time.sleep(1.0)
+            drive_until_moving(stack, source)
+            stack.control.do(Bumper(pressed=True))
+            time.sleep(0.5)
+            stack.control.do(Bumper(pressed=False))
+            time.sleep(1.0)
+        stack.processes["recorder"].terminate()
+        stack.processes["recorder"].wait(10)
+    (file,) = (each for each in folder.glob("*.mcap") if "latch" not in each.name)
+    main(["why", str(file)])
+    shown = capsys.readouterr().out
+    found = re.search(r"replay: (\d+) of (\d+) motions agree", shown)
+    assert found, shown
+    assert int(found[1]) >= AGREEING * int(found[2]) > 50, shown
+    assert "BRAKE  contact: The bumper was hit." in shown
