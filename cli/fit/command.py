@@ -5,16 +5,20 @@ import shlex
 import sys
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
 from cli.fit.answers import answers, restarts_s
-from cli.fit.files import profile, settings_file
+from cli.fit.check import Course, Difference, compare
+from cli.fit.check import lines as difference_lines
+from cli.fit.files import model, profile, settings_file
 from cli.fit.fit import Fit, fit, needed, reckoned
+from cli.fit.page import page
 from cli.fit.steady import greatest
-from cli.fit.stops import Stop
+from cli.fit.stops import Stop, find_stops
 from cli.fit.streams import KINDS, Streams
 from cli.inspect import output
 from cli.inspect.addressing import chunks
@@ -44,26 +48,51 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=file_path, metavar="FOLDER", help="out/fit-ROBOT-DATE by default"
     )
+    parser.add_argument(
+        "--check", type=file_path, metavar="RECORDING",
+        help="drive the fitted vehicle with the commands of this recording, and compare",
+    )  # fmt: skip
     parser.add_argument("--stops", action="store_true", help="show a row for each stop, too")
     parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
     add_sources(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the estimates and write the proposal; return 0 if nothing is missing or too long."""
+    """Show the estimates and write the files; return 0 if nothing is missing or wrong."""
     settings = load(Everything, robot_sources(options)).config
     robot, streams, remarks = read(options.files, options.robot)
     found = fit(streams, settings)
-    if found.too_long:
-        print(red(not_safe(found.too_long[0], settings)))
+    warning = not_safe(found.too_long[0], settings) if found.too_long else ""
+    if warning:
+        print(red(warning), end="\n\n")
     print(output.table(HEAD, list(rows(found))), "", sep="\n")
     if options.stops and found.stops:
         print(output.table(STOPS, [as_cells(stop, settings) for stop in found.stops]), "", sep="\n")
-    print(*remarks, *lines(found), sep="\n")
+    text, checked, explained = [*remarks, *lines(found)], None, True
+    if options.check:
+        checked, differences = check(options.check, robot, found)
+        text += ["", f"The model under the commands of {options.check}:"]
+        text += difference_lines(differences)
+        explained = all(each.is_explained for each in differences)
+    print(*text, sep="\n")
     folder = options.out or Path("out") / f"fit-{robot}-{time.strftime('%Y%m%d-%H%M%S')}"
-    write(folder, found, [file.name for file in options.files])
-    print(f"Written: {shlex.quote(str(folder))}: fit.toml, profile.toml", flush=True)
-    return 1 if found.missing or found.too_long else 0
+    html = partial(
+        page, found, title=f"Robot {robot}, measured by t2 fit", not_safe=warning, head=HEAD,
+        rows=list(rows(found)), lines=text, checked=checked,
+    )  # fmt: skip
+    write(folder, found, [file.name for file in options.files], html)
+    print(f"Written: {shlex.quote(str(folder))}: fit.toml, profile.toml, fit.html", flush=True)
+    return 1 if found.missing or warning or not explained else 0
+
+
+def check(
+    file: Path, robot: str, found: Fit
+) -> tuple[tuple[Streams, Course], Sequence[Difference]]:
+    """Return a recording with the model's course under its commands, and the differences."""
+    _, (streams, *_), _ = read([file], robot)
+    stops, _ = find_stops(streams)
+    course, differences = compare(streams, stops, model(found))
+    return (streams, course), differences
 
 
 # --- recordings -----------------------------------------------------------------------------------
@@ -108,12 +137,17 @@ def _messages(file: Path, remarks: list[str]) -> Iterator[tuple[str, Message]]:
         remarks.append(f"{file}: truncated or damaged; what it holds is used.")
 
 
-def write(folder: Path, found: Fit, sources: Sequence[str]) -> None:
-    """Write the proposed settings and the simulator's profile; raise ``ConfigError``."""
+def write(folder: Path, found: Fit, sources: Sequence[str], html: Callable[[], str]) -> None:
+    """Write settings, the simulator's profile and the page; raise ``ConfigError``."""
+    texts = {
+        "fit.toml": settings_file(found, sources),
+        "profile.toml": profile(found, sources),
+        "fit.html": html(),
+    }
     try:
         folder.mkdir(parents=True)
-        (folder / "fit.toml").write_text(settings_file(found, sources), encoding="utf-8")
-        (folder / "profile.toml").write_text(profile(found, sources), encoding="utf-8")
+        for name, text in texts.items():
+            (folder / name).write_text(text, encoding="utf-8")
     except FileExistsError:
         raise ConfigError(f"--out {folder}: exists already; choose another folder") from None
     except OSError as error:
@@ -134,7 +168,7 @@ def not_safe(stop: Stop, settings: Everything) -> str:
     return (
         f"NOT SAFE: {title(stop)} from {stop.speed:.2f} {unit}/s at {clock(stop)} UTC needed "
         f"{needed(stop):.2f} {unit}; safety reckons with "
-        f"{reckoned(stop, safety_config(settings)):.2f} {unit}.\n"
+        f"{reckoned(stop, safety_config(settings)):.2f} {unit}."
     )
 
 

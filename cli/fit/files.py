@@ -1,10 +1,15 @@
 """The files of a fit: the proposed settings, and a profile for the simulator. Pure."""
 
 from collections.abc import Iterable, Sequence
-from math import isfinite
 from statistics import mean
 
+from msgspec.structs import replace
+
 from cli.fit.fit import Fit, Value
+from cli.fit.steady import DELAY_STEP_S
+from common.config import Setting, build
+from common.errors import ConfigError
+from sim.model import Model
 
 # Parameters of ``sim.model`` by the estimates whose mean they are.
 SAME = {
@@ -20,10 +25,10 @@ SAME = {
     "velocity.noise": ("speed at standstill, noise",),
     "velocity.angular_bias": ("turning speed at standstill, bias",),
     "velocity.angular_noise": ("turning speed at standstill, noise",),
-    "counters.pull": ("turn counted on a straight line",),
     "sonar.noise": ("sonars at standstill, noise",),
     "sonar.saturation": ("sonars, greatest reading",),
 }  # fmt: skip
+DELAYS = ("RUN driving: delay", "RUN turning: delay")
 
 
 def settings_file(found: Fit, sources: Sequence[str]) -> str:
@@ -32,24 +37,47 @@ def settings_file(found: Fit, sources: Sequence[str]) -> str:
     return _toml(head, found.proposals)
 
 
-def profile(found: Fit, sources: Sequence[str]) -> str:
-    """Return a profile of the simulated vehicle that behaves as this one did."""
+def parameters(found: Fit) -> dict[str, Value]:
+    """Return the parameters of ``sim.model`` that this vehicle has shown, by path."""
     by_name = {each.name: each for each in found.estimates}
     values: dict[str, Value] = {}
     for path, names in SAME.items():
-        seen = [value for name in names if name in by_name for value in by_name[name].values]
-        if seen and isfinite(mean(seen)):
-            values[path] = round(mean(seen), 4)
+        if seen := [value for name in names if name in by_name for value in by_name[name].values]:
+            values[path] = round(mean(seen), 4) + 0.0  # no -0.0
     for path in ("drive.dead_time", "velocity.noise", "velocity.angular_noise"):
         if path in values:
             values[path] = max(0.0, float(values[path]))
+    delays = [each.mean for name, each in by_name.items() if name in DELAYS]
+    if delays:  # a ramp is followed later by dead time and lag
+        lag = mean(delays) - float(values.get("drive.dead_time", 0.0))
+        values["drive.lag"] = round(max(0.0, lag - DELAY_STEP_S), 3)
     if found.ranges:
         values["sonar.quantum"] = round(min(each.resolution for each in found.ranges), 4)
+    return {path: value for path, value in values.items() if _is_allowed(path, value)}
+
+
+def _is_allowed(path: str, value: Value) -> bool:
+    """Return whether the simulator has this value."""
+    try:
+        build(Model, {path: Setting(value, "t2 fit")})
+    except ConfigError:
+        return False
+    return True
+
+
+def model(found: Fit) -> Model:
+    """Return the simulated vehicle that behaves as this one did."""
+    given = {path: Setting(value, "t2 fit") for path, value in parameters(found).items()}
+    return replace(build(Model, given), vehicle=found.settings.vehicle)
+
+
+def profile(found: Fit, sources: Sequence[str]) -> str:
+    """Return that vehicle as a profile of the simulator."""
     head = [
         f'title = "Measured in {len(sources)} recordings"',
         f"source = '{', '.join(sources)}'",
     ]
-    return _toml(head, values)
+    return _toml(head, parameters(found))
 
 
 def _missing(manoeuvres: Iterable[str]) -> list[str]:

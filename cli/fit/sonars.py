@@ -16,6 +16,7 @@ STEP_M = 0.001  # of the ranges on the wire
 JUMP_M = 0.3  # nearer than the readings before and after it
 ENDS, ENDS_SHARE = 20, 0.01  # equal greatest readings, of two sonars: there the sonars end
 SETTING = "vehicle.sonar_max"
+DIFFERENT = 10  # readings that show a resolution
 LEAST = 8  # readings of a standstill
 
 
@@ -28,7 +29,7 @@ class Ranges(Struct, frozen=True, kw_only=True):
     nearest: float  # m
     farthest: float  # m
     ends: Estimate | None  # m, the greatest readings of the sonars, if many are equal to it
-    resolution: float  # m, of which all readings are multiples
+    resolution: float  # m, of which all readings are multiples; 0.001 if there are few
     jumps: float  # share of the readings at standstill that were nearer by 0.3 m for one sample
     noise: Estimate | None  # m, at standstill
 
@@ -49,7 +50,7 @@ def ranges(streams: Streams) -> Ranges | None:
         nearest=min(millimetres) * STEP_M,
         farthest=max(millimetres) * STEP_M,
         ends=_end(found),
-        resolution=math.gcd(*millimetres) * STEP_M,
+        resolution=(math.gcd(*millimetres) if len(millimetres) >= DIFFERENT else 1) * STEP_M,
         jumps=jumps / still if still else 0.0,
         noise=noise,
     )
@@ -63,8 +64,11 @@ def _end(found: list[tuple[int, float]]) -> Estimate | None:
         farthest = max(millimetres, default=0)
         if millimetres[farthest] >= max(ENDS, ENDS_SHARE * millimetres.total()):
             ends.append(farthest * STEP_M)
-    name = "sonars, greatest reading"
-    return Estimate(name=name, unit="m", values=tuple(ends), setting=SETTING) if ends[1:] else None
+    end = Estimate(
+        name="sonars, greatest reading", unit="m", values=tuple(ends), resolution=STEP_M,
+        setting=SETTING,
+    )  # fmt: skip
+    return end if ends[1:] else None
 
 
 def _at_standstill(streams: Streams) -> tuple[int, Estimate | None, int]:

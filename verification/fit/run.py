@@ -12,7 +12,7 @@ from verification.search.bus import MS
 from verification.search.draw import TURN_BRAKING, draw
 from verification.search.stack import PLANE, Stack
 
-STEP_NS = 5 * MS
+STEP_NS = 10 * MS
 
 
 class Result(Struct, frozen=True, kw_only=True):

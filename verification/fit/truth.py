@@ -8,7 +8,7 @@ is a parameter of ``sim.model``; motors with lag have no deceleration, so they a
 from collections.abc import Iterator
 
 from cli.fit.fit import ANGULAR, DECELERATION, REACT, SENSING_S, Fit
-from common.motion import Twist
+from common.motion import STANDING_MPS, STANDING_RADPS, Twist
 from common.wire.commands import MotionKind
 from services.safety.config import DECISION_PERIOD_S
 from sim.model import Model
@@ -46,12 +46,13 @@ def stopped_within(twist: Twist, model: Model, track: float) -> float:
     motors, distance = Motors(model.drive, track), 0.0
     for _ in range(STEADY):
         motors.follow(twist, MotionKind.RUN, twist, STEP_S)
+    turns = bool(twist.angular)
     for _ in range(LONGEST):
-        after = motors.follow(twist, MotionKind.STOP, Twist(), STEP_S)
-        if Twist(after.linear, after.angular).is_standing:
-            break
-        twist = after
-        distance += abs(twist.linear or twist.angular) * STEP_S
+        twist = motors.follow(twist, MotionKind.STOP, Twist(), STEP_S)
+        speed = abs(twist.angular if turns else twist.linear)
+        if speed < (STANDING_RADPS if turns else STANDING_MPS):
+            break  # on a slope the vehicle may roll on: that is no part of the stop
+        distance += speed * STEP_S
     return distance
 
 

@@ -83,7 +83,7 @@ def test_all_that_safety_needs_is_measured(path: Path, capsys: pytest.CaptureFix
     assert sum("STOP backward  " in line for line in lines) == 6
     assert "No stop was longer than safety reckons with.\n" in printed
     assert "NOT MEASURED" not in printed
-    assert printed.endswith("Written: fitted: fit.toml, profile.toml\n")
+    assert printed.endswith("Written: fitted: fit.toml, profile.toml, fit.html\n")
     proposed = load(Everything, Sources((Path("fitted/fit.toml"),), {}, ())).config
     assert (proposed.safety.react, proposed.vehicle.deceleration) == (0.21, 0.49)
     model = load_model(["fitted/profile.toml"])
@@ -122,6 +122,23 @@ def test_each_direction_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[
     (text,) = (file.read_text() for file in tmp_path.glob("out/*/fit.toml"))
     assert "react" not in text
     assert "# Not measured: 5 more of STOP backward" in text
+
+
+def test_the_fitted_vehicle_explains_its_recording_and_no_other_one(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The synthetic vehicle stops without having driven off: only its stops are explained."""
+    other = record(tmp_path / "other.mcap", driven(*ALL, deceleration=1.5))
+    for number, (file, explained) in enumerate(((path, True), (other, False))):
+        out = f"page{number}"
+        assert main(["fit", str(path), "--check", str(file), "--out", out, *CAREFUL]) == 1
+        printed = capsys.readouterr().out
+        (stops,) = (line for line in printed.splitlines() if line.startswith("stops, m:"))
+        assert ("NOT EXPLAINED" not in stops) is explained
+        html = (tmp_path / out / "fit.html").read_text()
+        assert html.count("<svg") == 7
+        assert "The model under the recorded commands" in html
+        assert stops in html
 
 
 def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

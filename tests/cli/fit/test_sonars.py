@@ -39,7 +39,9 @@ def test_shares_and_extremes() -> None:
     found = measured(standing([1.0, 1.2, 0.4, None, 2.0, 2.0, 2.0, 2.0]))
     assert (found.readings, found.no_echo, found.faulty) == (8, 1 / 8, 0.0)
     assert (found.nearest, found.farthest) == (0.4, 2.0)
-    assert found.resolution == pytest.approx(0.2)
+    assert found.resolution == 0.001  # too few different ones
+    steps = measured(standing(*[[1.0 + n / 100] * 8 for n in range(12)]))
+    assert steps.resolution == pytest.approx(0.01)
     assert measured(standing([1.0] * 7 + [None], status="fault")).faulty == 1 / 8
 
 

@@ -1,0 +1,56 @@
+"""The page of a fit: the table, and a figure of what each estimate was made from."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from cli.fit.check import Course
+from cli.fit.fit import Fit, of_command
+from cli.fit.stops import DRIVING, TURNING
+from cli.fit.streams import Streams
+from common.cli_args import needs_extra
+
+TEMPLATE = Path(__file__).with_name("fit.html")
+TITLES = {"stop": "STOP", "brake": "BRAKE"}
+
+Figure = tuple[str, str]  # a title, and SVG
+
+
+def page(
+    found: Fit,
+    *,
+    title: str,
+    not_safe: str,
+    head: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    lines: Sequence[str],
+    checked: tuple[Streams, Course] | None,
+) -> str:
+    """Return the page; ``checked`` is the recording that the model has followed."""
+    with needs_extra("report", "a page"):
+        from jinja2 import Environment, StrictUndefined
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+        title=title,
+        not_safe=not_safe,
+        head=head,
+        rows=rows,
+        lines=lines,
+        figures=list(_figures(found, checked)),
+    )
+
+
+def _figures(found: Fit, checked: tuple[Streams, Course] | None) -> Iterator[Figure]:
+    from cli.fit import figures  # of the extra
+
+    for axis in (DRIVING, TURNING):
+        for direction in axis.directions.values():
+            for kind, title in TITLES.items():
+                if mine := of_command(found.stops, kind, direction):
+                    yield f"{title} {direction}", figures.stops(mine, f"{kind}-{direction}")
+    if checked is not None:
+        yield "The model under the recorded commands", figures.check(*checked)
+    if found.ranges:
+        yield "Sonars", figures.sonars(found.streams)
+    for streams in found.streams:
+        yield "Counted and integrated distance", figures.distances(streams)
+        yield "Gaps of the velocity", figures.gaps(streams)
