@@ -3,7 +3,7 @@
 A proposal that a protection depends on is a bound and not a mean (``estimate.py``): decelerations
 from below, and ``safety.react`` from above, as what remains of the distance that each stop needed.
 So safety reckons with more than any of the stops needed. Each direction needs ``LEAST`` STOPs from
-the faster half of the allowed speeds; without them there is no proposal, but the manoeuvre that is
+at least 0.4 of the allowed speeds; without them there is no proposal, but the manoeuvre that is
 missing. A proposal outside of a setting's safe values is not made.
 """
 
@@ -32,7 +32,7 @@ SENSING_S = 2 / keys.ULTRASONIC.rate_hz
 REACT, DECELERATION = "safety.react", "vehicle.deceleration"
 ANGULAR = "vehicle.angular_deceleration"
 NEARER = 0.98  # of ``vehicle.sonar_max``: a greatest reading that is noise below it is none
-FAST, FASTEST = 0.5, 0.8  # of the greatest allowed speed: of many stops, and of one at least
+FAST, FASTEST = 0.4, 0.7  # of the greatest allowed speed: of many stops, and of one at least
 
 Value = float | str
 
@@ -143,7 +143,7 @@ def of_command(stops: Sequence[Stop], kind: str, direction: str) -> list[Stop]:
 
 
 def fast_stops(stops: Sequence[Stop], direction: str, settings: Everything) -> list[Stop]:
-    """Return the STOPs from the faster half of the allowed speeds."""
+    """Return the STOPs from at least 0.4 of the allowed speeds."""
     least = FAST * (limits(settings)[axis_of(direction).unit])
     return [s for s in of_command(stops, "stop", direction) if s.speed >= least]
 
@@ -203,7 +203,7 @@ def _of_stopping(found: Fit) -> Iterator[tuple[str, Value]]:
 
 
 def least_deceleration(found: Fit, axis: Axis) -> float:
-    """Return the lower bound of the decelerations from the faster half of the allowed speeds.
+    """Return the lower bound of the decelerations from at least 0.4 of the allowed speeds.
 
     A slow stop is all reaction: there the slope depends on the motors' lag.
     """

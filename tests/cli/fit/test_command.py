@@ -115,8 +115,8 @@ def test_each_direction_is_needed(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(["fit", str(forward), str(backward), *CAREFUL]) == 1
     printed = capsys.readouterr().out
     assert "BRAKE backward: deceleration" in printed
-    assert "NOT MEASURED: 5 more of STOP backward from 0.50 m/s or more.\n" in printed
-    assert "NOT MEASURED: 5 more of STOP right from 0.50 rad/s or more.\n" in printed
+    assert "NOT MEASURED: 5 more of STOP backward from 0.40 m/s or more.\n" in printed
+    assert "NOT MEASURED: 5 more of STOP right from 0.40 rad/s or more.\n" in printed
     assert "of STOP left" not in printed
     assert "NOT SAFE" not in printed
     (text,) = (file.read_text() for file in tmp_path.glob("out/*/fit.toml"))
