@@ -8,7 +8,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 
 from cli.fit.answers import answers, restarts_s
@@ -17,7 +17,7 @@ from cli.fit.check import lines as difference_lines
 from cli.fit.files import model, profile, settings_file
 from cli.fit.fit import Fit, fit, needed, reckoned
 from cli.fit.page import page
-from cli.fit.steady import greatest
+from cli.fit.steady import greatest, of_ground_truth
 from cli.fit.stops import Stop, find_stops
 from cli.fit.streams import KINDS, Streams
 from cli.inspect import output
@@ -52,6 +52,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--check", type=file_path, metavar="RECORDING",
         help="drive the fitted vehicle with the commands of this recording, and compare",
     )  # fmt: skip
+    parser.add_argument(
+        "--drove", type=positive, metavar="M",
+        help="the vehicle ended this far from its start, by a tape measure",
+    )  # fmt: skip
+    parser.add_argument(
+        "--turned", type=positive, metavar="TURNS",
+        help="it turned so often in one direction, by a mark on the ground",
+    )  # fmt: skip
     parser.add_argument("--stops", action="store_true", help="show a row for each stop, too")
     parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
     add_sources(parser)
@@ -62,6 +70,10 @@ def run(options: argparse.Namespace) -> int:
     settings = load(Everything, robot_sources(options)).config
     robot, streams, remarks = read(options.files, options.robot)
     found = fit(streams, settings)
+    try:
+        found.estimates += of_ground_truth(streams, options.drove, options.turned)
+    except ValueError as error:
+        raise T2Error(f"--drove, --turned: {error}") from None
     warning = not_safe(found.too_long[0], settings) if found.too_long else ""
     if warning:
         print(red(warning), end="\n\n")
@@ -93,6 +105,17 @@ def check(
     stops, _ = find_stops(streams)
     course, differences = compare(streams, stops, model(found))
     return (streams, course), differences
+
+
+def positive(text: str) -> float:
+    """Return a positive number; raise ``argparse.ArgumentTypeError`` otherwise."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is no positive number")
+    return value
 
 
 # --- recordings -----------------------------------------------------------------------------------

@@ -28,6 +28,10 @@ SAME = {
     "sonar.noise": ("sonars at standstill, noise",),
     "sonar.saturation": ("sonars, greatest reading",),
 }  # fmt: skip
+TRUE = {
+    "counters.scale": "distance, counted / driven",
+    "counters.turn_scale": "turn, counted / turned",
+}
 DELAYS = ("RUN driving: delay", "RUN turning: delay")
 
 
@@ -40,20 +44,20 @@ def settings_file(found: Fit, sources: Sequence[str]) -> str:
 def parameters(found: Fit) -> dict[str, Value]:
     """Return the parameters of ``sim.model`` that this vehicle has shown, by path."""
     by_name = {each.name: each for each in found.estimates}
-    values: dict[str, Value] = {}
-    for path, names in SAME.items():
-        if seen := [value for name in names if name in by_name for value in by_name[name].values]:
-            values[path] = round(mean(seen), 4) + 0.0  # no -0.0
-    for path in ("drive.dead_time", "velocity.noise", "velocity.angular_noise"):
-        if path in values:
-            values[path] = max(0.0, float(values[path]))
-    delays = [each.mean for name, each in by_name.items() if name in DELAYS]
-    if delays:  # a ramp is followed later by dead time and lag
-        lag = mean(delays) - float(values.get("drive.dead_time", 0.0))
-        values["drive.lag"] = round(max(0.0, lag - DELAY_STEP_S), 3)
+
+    def observed(names: Sequence[str]) -> list[float]:
+        return [value for name in names if name in by_name for value in by_name[name].values]
+
+    values = {path: mean(seen) for path, names in SAME.items() if (seen := observed(names))}
+    values |= {path: mean(seen) - 1 for path, name in TRUE.items() if (seen := observed([name]))}
+    values["drive.dead_time"] = max(0.0, values.get("drive.dead_time", 0.0))
+    if delays := observed(DELAYS):  # a ramp is followed later by dead time and lag
+        lag = mean(delays) - values["drive.dead_time"]
+        values["drive.lag"] = max(0.0, lag - DELAY_STEP_S)
     if found.ranges:
-        values["sonar.quantum"] = round(min(each.resolution for each in found.ranges), 4)
-    return {path: value for path, value in values.items() if _is_allowed(path, value)}
+        values["sonar.quantum"] = min(each.resolution for each in found.ranges)
+    rounded = {path: round(value, 4) + 0.0 for path, value in values.items()}  # no -0.0
+    return {path: value for path, value in rounded.items() if _is_allowed(path, value)}
 
 
 def _is_allowed(path: str, value: Value) -> bool:

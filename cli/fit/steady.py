@@ -150,6 +150,29 @@ def standstills(streams: Streams) -> Iterator[Window]:
             yield window
 
 
+def of_ground_truth(
+    streams: Sequence[Streams], drove: float | None, turned: float | None
+) -> Iterator[Estimate]:
+    """Yield the counters' ratios to a distance (m) and to turns that were measured on the ground.
+
+    Each of the streams is such a drive. Raise ``ValueError`` if the counters began again in it.
+    """
+    ways, turns = [], []
+    for each in streams:
+        counters = each.mileages
+        if not all(comparable(*pair) for pair in pairwise(counters)):
+            raise ValueError("bridge or board restarted, so the counters show no distance")
+        ways.append(abs(counters[-1].distance - counters[0].distance))
+        turn = sum(math.remainder(b.heading - a.heading, math.tau) for a, b in pairwise(counters))
+        turns.append(abs(turn) / math.tau)
+    if drove:
+        ratios = tuple(way / drove for way in ways)
+        yield Estimate(name="distance, counted / driven", unit="", values=ratios)
+    if turned:
+        ratios = tuple(turn / turned for turn in turns)
+        yield Estimate(name="turn, counted / turned", unit="", values=ratios)
+
+
 def greatest(streams: Streams) -> Twist:
     """Return the greatest speeds that three velocities in a row have reached."""
     triples = list(zip(*(streams.velocities[n:] for n in range(3)), strict=False))

@@ -141,6 +141,16 @@ def test_the_fitted_vehicle_explains_its_recording_and_no_other_one(
         assert stops in html
 
 
+def test_a_distance_by_tape_measure_is_in_the_profile(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fit", str(path), "--drove", "0.001", "--out", "wild", *CAREFUL]) == 0
+    assert "scale" not in Path("wild/profile.toml").read_text()  # the simulator has none as wild
+    with pytest.raises(SystemExit):
+        main(["fit", str(path), "--drove", "-1"])
+    assert "argument --drove: '-1' is no positive number" in capsys.readouterr().err
+
+
 def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     merged = str(record(tmp_path / "two.mcap", driven(*ALL), driven(0.5, first_s=11.0)))
     assert main(["fit", merged]) == 1

@@ -6,7 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from cli.fit.estimate import Estimate
-from cli.fit.steady import greatest, of_ramps, of_standstill, of_steady_motion
+from cli.fit.steady import greatest, of_ground_truth, of_ramps, of_standstill, of_steady_motion
 from cli.fit.streams import Streams
 from common.freshness import NS_PER_S
 from t2.messages import Command, Mileage, Motion, Velocity
@@ -112,6 +112,18 @@ def test_the_delay_of_a_commanded_speed(late: int) -> None:
 
 def test_a_small_change_of_speed_shows_no_delay() -> None:
     assert of_ramps(drive((1.0, 0.3, 0), (1.0, 0.4, 0))) == []
+
+
+def test_a_distance_and_a_turn_that_were_measured_on_the_ground() -> None:
+    line = drive((1.0, 0, 0), (2.0, -0.5, 0), (1.0, 0, 0), scale=1.02)
+    (distance,) = of_ground_truth([line], 1.0, None)
+    assert distance.mean == pytest.approx(1.02, abs=0.03)
+    turn = drive((1.0, 0, 0), (2 * math.tau, 0, 1.0), (1.0, 0, 0), scale=0.98)
+    (turned,) = of_ground_truth([turn], None, 2.0)
+    assert turned.mean == pytest.approx(0.98, abs=0.02)
+    line.mileages[9:] = [replace(m, epoch=1) for m in line.mileages[9:]]
+    with pytest.raises(ValueError, match="restarted"):
+        list(of_ground_truth([line], 1.0, None))
 
 
 def test_the_greatest_speed_needs_three_velocities() -> None:
