@@ -1,16 +1,20 @@
 """``t2 checkout``: checks of a real vehicle before its first drive."""
 
 import argparse
+import math
 import shlex
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
+from cli.commission.drive_command import guided_drive
+from cli.commission.manoeuvres import GROUPS
 from cli.commission.report import Report, Row, Verdict, render
 from cli.commission.session import CheckoutSession, checkout_session
-from cli.commission.steps import PHRASE, RESET_PHRASE, STEPS, Step, prompt, show
-from cli.inspect.session import one_robot, robot_sources
+from cli.commission.steps import STEPS, Step, choice, prompt, show
+from cli.inspect.session import one_robot, positive, robot_sources
 from cli.settings import Everything
 from common.cli_args import VERSION, add_sources, file_path, reader_language
 from common.config import Loaded, load
@@ -21,13 +25,25 @@ from t2.errors import T2Error
 NAMES = [step.name for step in STEPS]
 SECTIONS = {"bridge": ("wire", "board", "vehicle", "bridge"), "safety": ("safety",)}
 HEALTH_S = 3.0
+Work = Callable[[Report, CheckoutSession], None]  # fills in the report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add this command's options."""
     parser.add_argument(
-        "--only", action="append", choices=NAMES, metavar="STEP", default=[],
-        help=f"run this step only; may be repeated: {', '.join(NAMES)}",
+        "part",
+        nargs="?",
+        choices=["drive"],
+        help="drive: manoeuvres on the ground, for a recording",
+    )
+    parser.add_argument(
+        "--only", action="append", choices=[*NAMES, *GROUPS], metavar="STEP", default=[],
+        help=f"run this step only; may be repeated: {', '.join(NAMES)}; of drive: "
+        f"{', '.join(GROUPS)}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--space", type=positive, metavar="M",
+        help="drive: leave out what needs more than M metres ahead or behind",
     )  # fmt: skip
     parser.add_argument(
         "--report", type=file_path, metavar="FILE", help="out/checkout-ROBOT-DATE.md by default"
@@ -37,49 +53,58 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the steps and write the report; return 0 if all passed and the operator signed."""
+    """Run the checks and write the report; return 0 if all passed and the operator signed."""
     loaded = load(Everything, robot_sources(options))
+    check(options)
     file = report_file(options.report, loaded.config.robot.id)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)  # as Ctrl-C
-    report = checkout(loaded, options.only)
+    work = partial(guided_drive, only=options.only, space_m=options.space or math.inf)
+    if options.part is None:
+        work = partial(run_steps, only=options.only)
+    report = checkout(loaded, work)
     file.write_text(render(report), encoding="utf-8")
     outcome = "Passed" if report.passed else "NOT PASSED"
     print(f"\n{outcome}. The report: {shlex.quote(str(file))}", flush=True)
     return 0 if report.passed else 1
 
 
-def checkout(loaded: Loaded[Everything], only: Sequence[str]) -> Report:
-    """Run the steps on the running stack."""
+def check(options: argparse.Namespace) -> None:
+    """Refuse options of another part with ``ConfigError``."""
+    if options.part is None and options.space:
+        raise ConfigError("--space: is an option of `t2 checkout drive`")
+    names: Sequence[str] = GROUPS if options.part == "drive" else NAMES
+    for name in options.only:
+        if name not in names:
+            raise ConfigError(f"--only {name}: allowed are {', '.join(names)}")
+
+
+def checkout(loaded: Loaded[Everything], work: Work) -> Report:
+    """Do the work on the running stack, and return its report."""
     with checkout_session(loaded.config, reader_language()) as session:
         facts = [
             ("board", session.of(keys.LINK)[-1].value.board),
             ("T2 of this tool", VERSION),
             *versions(session),
         ]
-        report = Report(
-            robot=session.robot,
-            date=now(),
-            facts=facts,
-            settings=settings(session),
-            left_out=[name for name in NAMES if only and name not in only],
-        )
-        guide(report, [step for step in STEPS if step.name not in report.left_out], session)
+        report = Report(robot=session.robot, date=now(), facts=facts, settings=settings(session))
+        guide(report, session, work)
     return report
 
 
-def guide(report: Report, steps: Sequence[Step], session: CheckoutSession) -> None:
-    """Run the steps with the operator; the report includes what was done before an abort."""
+def guide(report: Report, session: CheckoutSession, work: Work) -> None:
+    """Do the work with the operator; the report includes what was done before an abort."""
     show(f"Checkout of robot {report.robot}, board {dict(report.facts)['board']}.")
     name = firmware = ""
     try:
         name = prompt("Your name:")
         firmware = prompt("The firmware version, from the board's label:")
-        for number, step in enumerate(steps, 1):
-            show(f"\n[{number}/{len(steps)}] {step.title}\n{step.what}")
-            report.steps.append((step.title, verdict(step, session)))
+        work(report, session)
         show("")
-        for title, found in report.steps:
+        others = [each for each in report.manoeuvres if each[1].outcome != "passed"]
+        if report.manoeuvres:
+            show(f"{len(report.manoeuvres) - len(others)} of {len(report.manoeuvres)} passed.")
+        for title, found in (*report.steps, *others):
             show(f"{found.outcome:8} {title}: {found.text}")
         typed = prompt(f"To sign this off, type your name ({name}):")
         report.signed = name if typed.casefold() == name.casefold() else ""
@@ -87,9 +112,19 @@ def guide(report: Report, steps: Sequence[Step], session: CheckoutSession) -> No
         report.aborted = "interrupted by the operator"
     except T2Error as error:
         report.aborted = str(error)
+        show(f"\nEnded early: {error}")
     report.operator = name or "unknown"
     report.facts.append(("firmware", firmware or "unknown"))
     report.ended = now()
+
+
+def run_steps(report: Report, session: CheckoutSession, only: Sequence[str]) -> None:
+    """Run the steps with the wheels off the ground, or only these."""
+    report.left_out = [name for name in NAMES if only and name not in only]
+    steps = [step for step in STEPS if step.name not in report.left_out]
+    for number, step in enumerate(steps, 1):
+        show(f"\n[{number}/{len(steps)}] {step.title}\n{step.what}")
+        report.steps.append((step.title, verdict(step, session)))
 
 
 def verdict(step: Step, session: CheckoutSession) -> Verdict:
@@ -103,12 +138,6 @@ def verdict(step: Step, session: CheckoutSession) -> Verdict:
             "Press Enter to try again, or type any word to continue:"
         ):
             return found
-
-
-def choice(question: str) -> str:
-    """Return one line; a phrase that was typed too early or too late counts as Enter."""
-    typed = prompt(question)
-    return "" if typed.casefold() in (PHRASE, RESET_PHRASE) else typed
 
 
 def now() -> str:

@@ -1,11 +1,14 @@
 """Verdicts of the steps, and the report of a checkout in Markdown. Pure."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 Outcome = Literal["passed", "failed", "skipped"]
 Row = tuple[str, str]  # a measured quantity, and its value with unit
+# Data of a manoeuvre, in the order of the report.
+COLUMNS = ("commanded", "measured", "counted", "noise", "reaction", "deceleration",
+           "stop distance", "needed", "reckoned")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +46,8 @@ class Report:
     settings: Sequence[tuple[str, str, str]]  # path, value, origin
     operator: str = ""
     steps: list[tuple[str, Verdict]] = field(default_factory=list)  # by title
-    left_out: Sequence[str] = ()  # steps excluded by --only
+    manoeuvres: list[tuple[str, Verdict]] = field(default_factory=list)  # of the guided drive
+    left_out: Sequence[str] = ()  # steps or manoeuvres that the options exclude
     aborted: str = ""  # reason of an early end
     signed: str = ""  # the name typed at the end
     ended: str = ""  # date of the end
@@ -51,30 +55,48 @@ class Report:
     @property
     def passed(self) -> bool:
         """Whether each selected step passed, to the end, with a signature."""
-        good = all(verdict.outcome == "passed" for _, verdict in self.steps)
-        return bool(self.steps) and good and not self.aborted and bool(self.signed)
+        done = [*self.steps, *self.manoeuvres]
+        good = all(verdict.outcome == "passed" for _, verdict in done)
+        return bool(done) and good and not self.aborted and bool(self.signed)
 
 
 def render(report: Report) -> str:
     """Return the report as Markdown."""
     about = [("date", report.date), ("operator", report.operator), *report.facts]
-    steps = [(title, verdict.outcome, verdict.text) for title, verdict in report.steps]
     signature = f"{_cell(report.signed)}, {report.ended}" if report.signed else "Not signed."
     parts = [
         [f"# Checkout of robot {_cell(report.robot)}", "", _headline(report)],
         _table(("what", "value"), about),
-        ["## Steps", ""],
-        _table(("step", "result", "finding"), steps),
-        *(
-            [f"### {_cell(title)}", "", *_table(("measured", "value"), verdict.data)]
-            for title, verdict in report.steps
-            if verdict.data
-        ),
+        *(_steps(report.steps) if report.steps or not report.manoeuvres else ()),
+        *(_manoeuvres(report.manoeuvres) if report.manoeuvres else ()),
         ["## Effective settings", ""],
         _table(("setting", "value", "from"), report.settings),
         ["## Signed off", "", signature],
     ]
     return "\n\n".join("\n".join(part).rstrip("\n") for part in parts) + "\n"
+
+
+def _steps(steps: Sequence[tuple[str, Verdict]]) -> Iterator[list[str]]:
+    """Yield the parts on the steps: one table of all, and one of each step's data."""
+    yield ["## Steps", ""]
+    yield _table(
+        ("step", "result", "finding"),
+        [(title, verdict.outcome, verdict.text) for title, verdict in steps],
+    )
+    for title, verdict in steps:
+        if verdict.data:
+            yield [f"### {_cell(title)}", "", *_table(("measured", "value"), verdict.data)]
+
+
+def _manoeuvres(done: Sequence[tuple[str, Verdict]]) -> Iterator[list[str]]:
+    """Yield the parts on the guided drive: one row a manoeuvre."""
+    yield ["## Manoeuvres", ""]
+    rows = []
+    for title, verdict in done:
+        data = dict(verdict.data)
+        figures = (data.get(name, "") for name in COLUMNS)
+        rows.append((title, *figures, verdict.outcome, verdict.text))
+    yield _table(("manoeuvre", *COLUMNS, "result", "finding"), rows)
 
 
 def _headline(report: Report) -> str:

@@ -3,12 +3,16 @@
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from statistics import mean
 from typing import Any, TypeVar
 
 import msgspec
 
+from cli.commission.drive_verdict import Drive
 from cli.commission.latches import Reset
+from cli.commission.manoeuvres import Ending, Manoeuvre
 from cli.commission.motion import too_fast
+from cli.commission.supervision import Problem, Supervision
 from cli.inspect.addressing import decode, topic_of
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import decoded
@@ -23,7 +27,7 @@ from t2.client import request, reset_request
 from t2.codec import Sample
 from t2.errors import LinkError, MessageError, T2Error
 from t2.keys import Topic
-from t2.messages import Message, ResetDone
+from t2.messages import Message, ResetDone, SafetyState
 from t2.words import Language, render
 
 SOURCE = "checkout"  # as in safety's settings
@@ -31,8 +35,14 @@ STACK_S = 10.0
 READY_S = 8.0  # wait for safety to grant motion; a cause that clears by itself needs 0.5 s
 REST_S = 3.0  # wait for standstill after the last request
 ZEROS_S = 0.15  # three requests
+RESTING_S = 0.5  # of standstill after a manoeuvre, in which the counters settle
+RESETS = 8  # in 4 s
+WINDOW = 50  # velocities: more than arrive within it
+LATE_S = 0.5  # from the end of the lease to the STOP, including a slow bus
+LATCH_S = 1.0  # from an emergency stop to its latch
+ESTOP = "estop"  # the cause, and the event of an operator's emergency stop
 TOPICS = (keys.LINK, keys.MOTION, keys.VELOCITY, keys.MILEAGE, keys.ULTRASONIC, keys.BUMPER,
-          keys.SWITCHES, keys.DRIVER, keys.HEALTH)  # fmt: skip
+          keys.SWITCHES, keys.DRIVER, keys.HEALTH, keys.EVENTS)  # fmt: skip
 
 M = TypeVar("M", bound=Message)
 
@@ -44,6 +54,7 @@ class CheckoutSession(SafetyClient):
         """Listen to the robot; ``language`` is that of safety's texts."""
         super().__init__(opened, robot, SOURCE, language)
         self._marked_ns = 0
+        self._braked_ns = 0  # when this manoeuvre's emergency stop was published; 0 without one
         self._log: defaultdict[str, list[Any]] = defaultdict(list)
         for topic in TOPICS:
             opened.listen(topic.on(robot, side="*", service="*"))
@@ -87,11 +98,14 @@ class CheckoutSession(SafetyClient):
         """Return the latched causes of safety's newest state."""
         return self.state.latched if self.state else ()
 
-    def reset(self) -> Reset:
-        """Request a reset of the latched causes, and return what stays latched."""
+    def reset(self, seen: SafetyState | None = None) -> Reset:
+        """Request a reset of the causes latched in ``seen``, and return what stays latched.
+
+        Without ``seen`` these are the causes that are latched now.
+        """
         requested_ns = clock.now_ns()
         try:
-            seen = self.fresh_state()
+            seen = seen or self.fresh_state()
             requested_ns = self.mark()
             answers = self.call(keys.RESET, reset_request(seen))
             if not self.is_reset(seen, answers):
@@ -109,9 +123,7 @@ class CheckoutSession(SafetyClient):
         has latched before.
         """
         try:
-            self.requested = request()
-            self.until(lambda: self.latched() or self._is_granted(), READY_S)
-            if self.latched() or not self._is_granted():
+            if not self._becomes_ready():
                 return None
             self.requested = request(requested.linear, requested.angular)
             self.until(lambda: self._must_stop(requested), seconds)
@@ -120,10 +132,154 @@ class CheckoutSession(SafetyClient):
             self.until(lambda: self._stands(ended_ns), REST_S)
             return ended_ns
         finally:
-            # On every way out: zeros, the first one at once. The silence after them is letting go.
-            self.requested = None
-            self.tick()
-            self.listen(ZEROS_S)
+            self._let_go()
+
+    def perform(self, it: Manoeuvre, lease_s: float, stop_s: float) -> Drive | None:
+        """Carry out a manoeuvre, from standstill to standstill, under supervision.
+
+        ``lease_s`` is that of the checkout, ``stop_s`` the longest stop from its command on.
+        Ctrl-C is an emergency stop. Return None if safety did not grant motion.
+        """
+        self.mark()
+        self._braked_ns = 0
+        try:
+            if not self._becomes_ready():
+                return None
+            problem, is_steady = self._move(it)
+            ended_ns = clock.now_ns()
+            self._end(it.ending if problem is None else problem.ending, lease_s)
+            stood = self.until(lambda: self._rests(ended_ns), stop_s)
+            if not stood:
+                self._brake()
+                braked_ns = clock.now_ns()
+                self.until(lambda: self._rests(braked_ns), REST_S)
+        except KeyboardInterrupt:
+            self._brake()
+            self.until(lambda: ESTOP in self.latched(), LATCH_S)
+            raise
+        finally:
+            self._let_go()
+        return self._drive_of(it, ended_ns, stood, is_steady, problem)
+
+    def observe(self, it: Manoeuvre) -> Drive:
+        """Watch a standstill without any request."""
+        self.mark()
+        self.listen(it.seconds)
+        return self._drive_of(it, clock.now_ns(), True, True, None)
+
+    def reset_own_stop(self) -> str:
+        """Reset the emergency stop of the last manoeuvre, and no other cause.
+
+        Return why it stays latched, or an empty string. An operator may have pressed an emergency
+        stop, too: safety has one latch for both, so theirs shows in its event.
+        """
+        if not self._braked_ns:
+            return ""
+        own = [
+            cause.id
+            for state in self.of(keys.SAFETY)
+            if state.received_ns >= self._braked_ns
+            for cause in state.value.causes
+            if cause.name == ESTOP
+        ]
+        events = (event.value for event in self.of(keys.EVENTS))
+        if any(event.name == ESTOP and "by" in event.about for event in events):
+            return "An operator has pressed the emergency stop: find out why."
+        for attempt in range(RESETS):
+            seen = self.fresh_state()
+            ids = [cause.id for cause in seen.causes if cause.name in seen.latched]
+            if not own or ids != own[:1]:
+                return f"Safety has latched {', '.join(seen.latched) or 'nothing'}: find out why."
+            done = self.reset(seen)
+            if done.granted or attempt == RESETS - 1:
+                break
+            self.listen(RESTING_S)  # safety refuses it while noise looks like motion
+        return "" if done.granted and not done.latched else f"The reset failed: {done.text}"
+
+    def _becomes_ready(self) -> bool:
+        """Request zero until safety grants motion; return whether it does, with no latch."""
+        self.requested = request()
+        self.until(lambda: self.latched() or self._is_granted(), READY_S)
+        return not self.latched() and self._is_granted()
+
+    def _move(self, it: Manoeuvre) -> tuple[Problem | None, bool]:
+        """Request the motion until it is over.
+
+        Return what contradicts it, if anything does, and whether it reached a steady speed.
+        """
+        supervision = Supervision(it)
+        logs = self.of(keys.MOTION), self.of(keys.VELOCITY), self.of(keys.MILEAGE)
+        found: list[Problem] = []
+
+        def is_over() -> bool:
+            if interference := self._interference():
+                found.append(interference)
+            elif supervision.take(*logs):
+                if problem := supervision.problem():
+                    found.append(problem)
+                return bool(found) or supervision.is_at_limit or supervision.is_steady(logs[1])
+            return bool(found)
+
+        self.requested = request(it.twist.linear, it.twist.angular)
+        self.until(is_over, it.seconds)
+        return found[0] if found else None, supervision.is_steady(logs[1])
+
+    def _interference(self) -> Problem | None:
+        """Return why safety does not let the checkout drive on."""
+        state = self.state
+        if state is None or (state.source == SOURCE and state.verdict in ("run", "slow")):
+            return None
+        if state.source not in (None, SOURCE):
+            return Problem(f"Another source drives, {state.source}: end it first.", "again", "slow")
+        text = render(state.phrases, self.language, state.text)
+        return Problem(f"Safety stopped it: {text}", "again", "slow")
+
+    def _end(self, ending: Ending, lease_s: float) -> None:
+        """End the motion; without STOP after the lease by an emergency stop."""
+        if ending == "stop":
+            self.fall_silent()
+            if not self.until(self._is_stopped, lease_s + LATE_S):
+                self._brake()
+        elif ending == "brake":
+            self._brake()
+        else:
+            self.requested = request()
+
+    def _brake(self) -> None:
+        """Publish an emergency stop, at first at once, then until safety has latched it."""
+        self._braked_ns = self._braked_ns or clock.now_ns()
+        self.order_stop(self.robot)
+        self.begin_stop([self.robot])
+        self.requested = None
+
+    def _let_go(self) -> None:
+        # On every way out: zeros, the first one at once. The silence after them is letting go.
+        self.requested = None
+        self.tick()
+        self.listen(ZEROS_S)
+
+    def _drive_of(
+        self,
+        it: Manoeuvre,
+        ended_ns: int,
+        stood: bool,
+        is_steady: bool,
+        problem: Problem | None,
+    ) -> Drive:
+        """Return the manoeuvre with copies of the logs, which the next one clears."""
+        return Drive(
+            it,
+            ended_ns,
+            stood,
+            list(self.of(keys.MOTION)),
+            list(self.of(keys.VELOCITY)),
+            list(self.of(keys.MILEAGE)),
+            list(self.of(keys.BUMPER)),
+            list(self.of(keys.SAFETY)),
+            is_steady,
+            problem,
+            self.language,
+        )
 
     def _is_granted(self) -> bool:
         if not self.state or not self.of(keys.LINK):
@@ -135,6 +291,25 @@ class CheckoutSession(SafetyClient):
         velocities = self.of(keys.VELOCITY)
         fast = bool(velocities) and too_fast(requested, velocities[-1].value)
         return fast or bool(self.latched())
+
+    def _is_stopped(self) -> bool:
+        """Return whether safety commands standstill."""
+        motions = self.of(keys.MOTION)
+        newest = motions[-1].value if motions else None
+        return newest is None or Twist(newest.linear, newest.angular).rounds_to_zero
+
+    def _rests(self, since_ns: int) -> bool:
+        """Return whether the vehicle has stood for a while, by a mean: velocities are noisy."""
+        begin_ns = max(since_ns, clock.now_ns() - round(RESTING_S * NS_PER_S))
+        recent = [v for v in self.of(keys.VELOCITY)[-WINDOW:] if v.received_ns >= begin_ns]
+        if not recent or recent[-1].received_ns < since_ns + RESTING_S * NS_PER_S:
+            return False
+        return (
+            self._is_stopped()
+            and Twist(
+                mean(v.value.linear for v in recent), mean(v.value.angular for v in recent)
+            ).is_standing
+        )
 
     def _stands(self, since_ns: int) -> bool:
         velocities = self.of(keys.VELOCITY)

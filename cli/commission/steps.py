@@ -37,6 +37,7 @@ CLEAR_S = 0.3  # the bridge needs three clear samples, and safety three samples 
 DRIVE_S = 2.0
 FORWARD, TURN = Twist(linear=0.1), Twist(angular=0.2)
 RESET_PHRASE, PHRASE = "reset", "wheels off the ground"
+GROUND_PHRASE = "on the ground, free space"  # of the guided drive
 
 
 # --- dialogue ----------------------------------------------------------------------------------
@@ -68,6 +69,12 @@ def prompt(question: str) -> str:
 def confirm(fact: str, phrase: str) -> bool:
     """Return whether the operator types the phrase."""
     return prompt(f'{fact}\nType "{phrase}" to confirm:').lower() == phrase
+
+
+def choice(question: str) -> str:
+    """Return one line; a phrase that was typed too early or too late counts as Enter."""
+    typed = prompt(question)
+    return "" if typed.casefold() in (PHRASE, RESET_PHRASE, GROUND_PHRASE) else typed
 
 
 # --- steps --------------------------------------------------------------------------------------
@@ -129,7 +136,7 @@ def _wait(session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float) ->
 
 def bumper(session: CheckoutSession) -> Verdict:
     """Check that the strip reports being pressed and free, and the reset."""
-    if problem := _unlatch(session):
+    if problem := unlatch(session):
         return failed(problem)
     session.mark()
     samples = session.of(keys.BUMPER)
@@ -152,7 +159,7 @@ def bumper(session: CheckoutSession) -> Verdict:
 
 def estop(session: CheckoutSession) -> Verdict:
     """Publish an emergency stop, and reset it."""
-    if problem := _unlatch(session):
+    if problem := unlatch(session):
         return failed(problem)
     at_ns = session.mark()
     session.order_stop(session.robot)
@@ -163,7 +170,7 @@ def estop(session: CheckoutSession) -> Verdict:
     return judge_latch(_latch_test(session, "estop", at_ns))
 
 
-def _unlatch(session: CheckoutSession) -> str:
+def unlatch(session: CheckoutSession) -> str:
     """Reset earlier latches after confirmation; return the problem, or an empty string."""
     latched = session.fresh_state().latched
     if not latched:
@@ -183,7 +190,7 @@ def _latch_test(session: CheckoutSession, cause: str, at_ns: int) -> LatchTest:
 
 def move(requested: Twist, session: CheckoutSession) -> Verdict:
     """Drive a motion after the operator's confirmation."""
-    if problem := _unlatch(session):
+    if problem := unlatch(session):
         return failed(problem)
     if not confirm("The wheels will turn. All of them must be off the ground.", PHRASE):
         return failed("Not confirmed: no motion was requested.")
@@ -193,7 +200,7 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
     ended_ns = session.drive(requested, DRIVE_S)
     if ended_ns is None:
         return failed(
-            f"Safety does not grant motion to the checkout. It reports: {_reported(session)}"
+            f"Safety does not grant motion to the checkout. It reports: {reported(session)}"
         )
     run = Run(
         requested=requested,
@@ -209,7 +216,7 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
     return judge_motion(run)
 
 
-def _reported(session: CheckoutSession) -> str:
+def reported(session: CheckoutSession) -> str:
     """Return why safety and the bridge grant no motion."""
     state, links = session.state, session.of(keys.LINK)
     text = render(state.phrases, session.language, state.text) if state else "no state"

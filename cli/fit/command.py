@@ -4,11 +4,11 @@ import argparse
 import shlex
 import sys
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from functools import partial
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 
 from cli.fit.answers import answers, restarts_s
@@ -18,11 +18,11 @@ from cli.fit.files import model, profile, settings_file
 from cli.fit.fit import Fit, fit, needed, reckoned
 from cli.fit.page import page
 from cli.fit.steady import greatest, of_ground_truth
-from cli.fit.stops import Stop, find_stops
+from cli.fit.stops import Stop, counted, find_stops
 from cli.fit.streams import KINDS, Streams
 from cli.inspect import output
 from cli.inspect.addressing import chunks
-from cli.inspect.session import one_robot, robot_sources
+from cli.inspect.session import one_robot, positive, robot_sources
 from cli.recordings.info import open_recording
 from cli.settings import Everything, safety_config
 from common.cli_args import add_sources, file_path
@@ -105,17 +105,6 @@ def check(
     stops, _ = find_stops(streams)
     course, differences = compare(streams, stops, model(found))
     return (streams, course), differences
-
-
-def positive(text: str) -> float:
-    """Return a positive number; raise ``argparse.ArgumentTypeError`` otherwise."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is no positive number")
-    return value
 
 
 # --- recordings -----------------------------------------------------------------------------------
@@ -265,8 +254,3 @@ def lines(found: Fit) -> Iterator[str]:
     if not found.too_long and not found.missing:
         yield "No stop was longer than safety reckons with."
     yield LIMITS
-
-
-def counted(reasons: Counter[str]) -> str:
-    """Return the reasons with their counts as text."""
-    return ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())

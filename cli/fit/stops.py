@@ -114,6 +114,11 @@ def find_stops(streams: Streams) -> tuple[list[Stop], Counter[str]]:
     return found, left_out
 
 
+def counted(reasons: Counter[str]) -> str:
+    """Return reasons with their counts as text."""
+    return ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
+
+
 def slope(
     points: Sequence[Point], speed: float, standing: float = STANDING_MPS
 ) -> tuple[float, float]:

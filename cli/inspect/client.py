@@ -133,16 +133,28 @@ class SafetyClient:
 
         ``seconds`` replaces the 3 s after which it counts as not confirmed.
         """
-        ticks = None if seconds is None else max(1, round(seconds / TICK_S))
         self.forget()
-        self._stops = {robot: EstopRepetition() for robot in robots}
-        for stop in self._stops.values():
-            stop.start(None, ticks)
-        while any(stop.is_pending for stop in self._stops.values()):
+        self.begin_stop(robots, None if seconds is None else max(1, round(seconds / TICK_S)))
+        while self.is_stopping:
             if "*" in self.robot:  # for robots that are not known here
                 self.order_stop(self.robot)
             self.until(lambda: False, TICK_S)
         return {robot for robot, state in self.states.items() if "estop" in state.latched}
+
+    def begin_stop(self, robots: Iterable[str], ticks: int | None = None) -> None:
+        """Repeat an emergency stop on each tick until all have latched it, after the first one."""
+        self._stops = {robot: EstopRepetition() for robot in robots}
+        for robot, stop in self._stops.items():
+            stop.start(self.states.get(robot), ticks)
+
+    @property
+    def is_stopping(self) -> bool:
+        """Whether an emergency stop is still repeated."""
+        return any(stop.is_pending for stop in self._stops.values())
+
+    def fall_silent(self) -> None:
+        """Send no more requests, and no zeros either: the lease of the last one ends."""
+        self.requested, self._drive = None, DriveRequests()
 
     def forget(self) -> None:
         """Discard what has arrived: only states that arrive from now on count."""

@@ -31,6 +31,8 @@ REPORT = Report(
         ({"steps": []}, "**Not passed.**"),
         ({"aborted": "ctrl-c"}, "**Not passed.** Ended early: ctrl-c."),
         ({"signed": ""}, "Not signed."),
+        ({"steps": [], "manoeuvres": [GOOD]}, "**Passed.**"),
+        ({"steps": [], "manoeuvres": [GOOD, SKIPPED]}, "**Not passed.**"),
     ],
 )
 def test_conditions_of_a_pass(change: dict[str, object], text: str) -> None:
@@ -40,3 +42,12 @@ def test_conditions_of_a_pass(change: dict[str, object], text: str) -> None:
     shown = render(report)
     assert ("**Not passed.**" in shown) is not passed
     assert text in shown
+
+
+def test_a_manoeuvre_is_a_row_with_its_figures() -> None:
+    data = (("commanded", "+0.200 m/s"), ("stop distance", "0.024 m"))
+    stop = ("STOP forward", Verdict("passed", "As expected.", data))
+    shown = render(replace(REPORT, steps=[], manoeuvres=[stop, SKIPPED]))
+    assert "## Steps" not in shown
+    assert "| STOP forward | +0.200 m/s |  |  |  |  |  | 0.024 m |  |  | passed | As ex" in shown
+    assert "| Turn |  |  |  |  |  |  |  |  |  | skipped | no blocks" in shown

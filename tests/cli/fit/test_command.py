@@ -148,7 +148,7 @@ def test_a_distance_by_tape_measure_is_in_the_profile(
     assert "scale" not in Path("wild/profile.toml").read_text()  # the simulator has none as wild
     with pytest.raises(SystemExit):
         main(["fit", str(path), "--drove", "-1"])
-    assert "argument --drove: '-1' is no positive number" in capsys.readouterr().err
+    assert "argument --drove: -1 must be more than 0" in capsys.readouterr().err
 
 
 def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,295 @@
+"""The guided drive on the shipped services and the simulated vehicle, in simulated time."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from cli.commission import drive_command, steps
+from cli.commission.drive_command import GuidedDrive, guided_drive
+from cli.commission.manoeuvres import Group, Manoeuvre, plan
+from cli.commission.report import Report, render
+from cli.commission.session import CheckoutSession
+from cli.commission.steps import GROUND_PHRASE, RESET_PHRASE
+from cli.fit.stops import find_stops
+from cli.fit.streams import Streams
+from common.config import build
+from common.freshness import NS_PER_S
+from services.safety.config import SafetyConfig
+from sim.model import Drive, Model
+from sim.requests import Bumper
+from t2 import keys
+from t2 import messages as m
+from t2.errors import T2Error
+from tests.cli.commission.simulated_session import SimulatedInspector, simulated_session
+
+SKIPPED = "no room there"
+
+
+@dataclass
+class Operator:
+    """The person who answers, and everything that is shown."""
+
+    shown: list[str]
+    answers: Callable[[str], str] = lambda question: ""
+
+    def prompt(self, question: str) -> str:
+        self.shown.append(question)
+        return self.answers(question)
+
+    @property
+    def text(self) -> str:
+        return "\n".join(self.shown)
+
+
+@dataclass
+class Fixture:
+    """A guided drive on a simulated stack."""
+
+    drive: GuidedDrive
+    inspector: SimulatedInspector
+    operator: Operator
+
+    @property
+    def session(self) -> CheckoutSession:
+        return self.drive.session
+
+    @property
+    def speed(self) -> float:
+        return abs(self.inspector.stack.vehicle.truth.linear)
+
+    def run(self, *titles: str, returns: bool = False) -> list[str]:
+        """Carry out these manoeuvres, or all; return the outcome of each."""
+        manoeuvres = [it for it in plan(self.drive.settings) if not titles or it.title in titles]
+        assert len(manoeuvres) >= len(titles)
+        self.drive.run(manoeuvres, returns=returns)
+        assert self.inspector.stack.oracle.violations == []
+        return self.outcomes
+
+    @property
+    def outcomes(self) -> list[str]:
+        return [verdict.outcome for _, verdict in self.drive.report.manoeuvres]
+
+    @property
+    def finding(self) -> str:
+        """The text of the newest verdict."""
+        return self.drive.report.manoeuvres[-1][1].text
+
+    def when(self, speed: float, do: Callable[[], object]) -> None:
+        """Do something once, when the vehicle is so fast."""
+
+        def each_step() -> None:
+            if self.speed > speed:
+                self.inspector.each_step = lambda: None
+                do()
+
+        self.inspector.each_step = each_step
+
+
+@contextmanager
+def driving(
+    monkeypatch: pytest.MonkeyPatch, model: Model | None = None, answers: Any = lambda _: ""
+) -> Iterator[Fixture]:
+    operator = Operator([], answers)
+    for module in (steps, drive_command):
+        monkeypatch.setattr(module, "prompt", operator.prompt)
+        monkeypatch.setattr(module, "show", operator.shown.append)
+    with simulated_session(model or Model()) as (session, inspector):
+        settings = build(SafetyConfig, session.settings("safety"))
+        report = Report(robot="001", date="", facts=[], settings=[])
+        drive = GuidedDrive(session, report, settings, unrecorded=True)
+        yield Fixture(drive, inspector, operator)
+
+
+def recorded(inspector: SimulatedInspector) -> Streams:
+    """Record the streams that show stops, from now on."""
+    streams = Streams()
+    process = inspector.stack.process("recorder")
+    for topic in (keys.MOTION, keys.VELOCITY, keys.MILEAGE, keys.BUMPER):
+        process.subscribe(topic, lambda arrival: streams.add(arrival.message))
+    return streams
+
+
+def test_the_whole_plan_is_driven_and_shows_every_kind_of_stop(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with driving(monkeypatch) as it:
+        streams = recorded(it.inspector)
+        begin, begin_ns = it.inspector.stack.vehicle.truth, it.inspector.stack.net.now_ns
+        outcomes = it.run(returns=True)
+        assert outcomes == ["passed"] * len(plan(it.drive.settings)), it.operator.text
+        minutes = (it.inspector.stack.net.now_ns - begin_ns) / NS_PER_S / 60
+        assert minutes < 4
+        end = it.inspector.stack.vehicle.truth
+        assert (end.x, end.y) == pytest.approx((begin.x, begin.y), abs=0.15)
+        assert not it.session.latched()
+        assert "still missing" not in it.operator.text
+    stops, left_out = find_stops(streams)
+    assert not left_out
+    for kind, number in (("stop", 6), ("brake", 3)):
+        for direction in ("forward", "backward", "left", "right"):
+            found = [s.speed for s in stops if (s.kind, s.direction) == (kind, direction)]
+            assert len(found) >= number
+            assert max(found) == pytest.approx(0.8, abs=0.01)
+    report = render(it.drive.report)
+    assert "| STOP backward from 0.80 m/s | -0.800 m/s | -0.800 m/s | -0.800 m/s |" in report
+
+
+def test_a_stop_that_is_too_long_ends_the_rising_series(monkeypatch: pytest.MonkeyPatch) -> None:
+    weak = Model(drive=Drive(coast=0.3))
+    titles = [f"STOP {way} from {speed} m/s" for speed in ("0.20", "0.45", "0.50")
+              for way in ("forward", "backward")]  # fmt: skip
+    with driving(monkeypatch, weak) as it:
+        outcomes = it.run(*titles, "STOP left from 0.80 rad/s")
+        assert outcomes == ["failed", "failed", *["skipped"] * 4, "passed"], it.operator.text
+        text = it.drive.report.manoeuvres[0][1].text
+        assert text.startswith("The stop was too long: from 0.20 m/s it needs 0.09")
+        assert "Do not drive faster: set vehicle.deceleration to at most 0.30 m/s2" in text
+        assert "Stops that are still missing for a fit: STOP forward: 0 of 6; " in it.operator.text
+
+
+def negated(message: m.Message) -> m.Message:
+    if isinstance(message, m.Velocity):
+        return replace(message, linear=-message.linear)
+    return message
+
+
+def halved(message: m.Message) -> m.Message:
+    if isinstance(message, m.Mileage):
+        return replace(message, distance=message.distance / 2)
+    return message
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (negated, "Wrong sign: by the velocities it has travelled -0.0"),
+        (halved, "Counters and velocities differ by "),
+    ],
+)
+def test_a_contradiction_stops_the_vehicle_and_ends_the_drive(
+    change: Callable[[m.Message], m.Message], text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with driving(monkeypatch) as it:
+        it.inspector.change = change
+        with pytest.raises(T2Error, match=r"STOP forward from 0.80 m/s: "):
+            it.run("STOP forward from 0.80 m/s", "STOP backward from 0.80 m/s")
+        assert it.outcomes == ["failed"]
+        assert text in it.finding
+        assert it.speed == 0
+        assert not it.session.latched()  # its own emergency stop
+
+
+def test_an_emergency_stop_of_an_operator_is_not_reset(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["", "go on"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        it.when(0.3, it.inspector.stack.estop)
+        assert it.run("STOP forward from 0.50 m/s") == ["failed"]
+        assert it.finding.startswith("Safety stopped it: ")
+        assert it.session.fresh_state().latched == ("estop",)
+
+
+def press(it: Fixture) -> None:
+    """Press the emergency stop of a screen, which reports who has pressed it."""
+    stack = it.inspector.stack
+    event = m.Event(name="estop", level="warning", text="", about={"by": "ada"})
+    it.inspector.process.post(keys.EVENTS.on("001", service="teleop"), event)
+    stack.estop()
+
+
+def test_its_own_latch_stays_when_an_operator_has_pressed_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answers = iter(["", "go on", "", RESET_PHRASE])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+
+        def once_latched() -> None:
+            if it.session.latched() == ("estop",):
+                it.inspector.each_step = lambda: None
+                press(it)
+
+        it.inspector.each_step = once_latched
+        assert it.run("BRAKE forward from 0.50 m/s") == ["failed"]
+        assert "Its own emergency stop stays latched. An operator has pressed the" in it.finding
+        assert it.session.fresh_state().latched == ("estop",)
+        # The next manoeuvre asks for the reset.
+        assert it.run("BRAKE backward from 0.50 m/s")[-1] == "passed"
+
+
+def test_a_contact_ends_a_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["", "go on"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        it.when(0.3, lambda: it.inspector.stack.vehicle.inject(Bumper(pressed=True)))
+        assert it.run("BRAKE forward from 0.50 m/s") == ["failed"]
+        assert "The bumper" in it.finding
+        assert it.session.fresh_state().latched == ("contact",)
+
+
+def test_ctrl_c_is_an_emergency_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    with driving(monkeypatch) as it:
+        it.when(0.3, interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            it.run("STOP forward from 0.50 m/s")
+        assert it.speed == 0
+        assert it.session.latched() == ("estop",)
+        assert it.finding.startswith("Interrupted by the operator")
+        assert "Reset it with `t2 drive`." in it.operator.text
+
+
+def test_skipped_and_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter([SKIPPED, "", "", "on with it"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        it.inspector.stack.vehicle.inject(Bumper(pressed=True))
+        it.inspector.stack.run(500)
+        it.inspector.stack.vehicle.inject(Bumper(pressed=False))
+        it.inspector.stack.run(500)
+        assert it.run("STOP forward from 0.20 m/s", "STOP backward from 0.20 m/s") == [
+            "skipped", "failed",
+        ]  # fmt: skip
+        assert it.finding == "The earlier latch of safety was not reset."
+        assert it.drive.report.manoeuvres[0][1].text == SKIPPED
+
+
+def chosen(*groups: Group) -> Callable[[Report, CheckoutSession], None]:
+    return lambda report, session: guided_drive(report, session, groups, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("answers", "error"),
+    [
+        (["hm"], "No recorder is running"),
+        (["", "hm"], "No recorder is running"),
+        (["without a recording", "wheels off the ground"], "not confirmed"),
+    ],
+)
+def test_it_refuses_to_begin(
+    answers: list[str], error: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = iter(answers)
+    with driving(monkeypatch, answers=lambda _: next(left)) as it:
+        with pytest.raises(T2Error, match=error):
+            chosen("straight")(it.drive.report, it.session)
+        assert it.outcomes == []
+        assert list(left) == []
+
+
+def test_groups_and_the_free_space_choose(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = {"recording": "without a recording", "confirm": GROUND_PHRASE}
+
+    def answer(question: str) -> str:
+        return next((text for word, text in answers.items() if word in question), "")
+
+    with driving(monkeypatch, answers=answer) as it:
+        chosen("straight", "return")(it.drive.report, it.session)
+        made: list[Manoeuvre] = plan(it.drive.settings)  # type: ignore[assignment]
+        near = [one.title for one in made if one.group == "straight" and one.ahead <= 1.0]
+        assert [title for title, _ in it.drive.report.manoeuvres] == near
+        assert it.drive.report.left_out == ["44 manoeuvres by --only or --space"]
+        assert ("recording", "none: No recorder is running: start `t2 record` on the robot, in "
+                "another terminal.") in it.drive.report.facts  # fmt: skip
