@@ -67,13 +67,15 @@ class Difference(Struct, frozen=True, kw_only=True):
 def follow(motions: Sequence[Motion], model: Model) -> Course:
     """Return how the model follows the recorded motions, from a standstill on."""
     motors, course, twist = Motors(model.drive, model.vehicle.track), Course(), STILL
+    at_ns = motions[0].mono_ns
     for now, after in pairwise(motions):
-        for at_ns in range(now.mono_ns, min(after.mono_ns, now.mono_ns + NS_PER_S), STEP_NS):
+        while at_ns < after.mono_ns:
             is_obeyed = at_ns - now.mono_ns < LEASE_NS
             kind = KINDS[now.command] if is_obeyed else MotionKind.STOP
             twist = motors.follow(twist, kind, Twist(now.linear, now.angular), STEP_S)
             course.times.append(at_ns)
             course.twists.append(twist)
+            at_ns += STEP_NS
     return course
 
 

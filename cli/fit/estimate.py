@@ -3,7 +3,7 @@
 The interval is that of Student's t for the mean, widened by half of the resolution of one
 observation. A bound is what 95 % of all further observations keep, with a confidence of 95 %
 (a one-sided tolerance limit of a normal distribution, NIST/SEMATECH e-Handbook of Statistical
-Methods, 7.2.6.3), and never better than the worst observation.
+Methods, 7.2.6.3), never better than the worst observation, and half of the resolution worse.
 """
 
 from math import inf, sqrt
@@ -44,12 +44,12 @@ class Estimate(Struct, frozen=True, kw_only=True):
     @property
     def upper_bound(self) -> float:
         """Value that further observations exceed in 5 % of the cases at most."""
-        return max(*self.values, self.mean + self._margin())
+        return max(*self.values, self.mean + self._margin()) + self.resolution / 2
 
     @property
     def lower_bound(self) -> float:
         """Value that further observations fall below in 5 % of the cases at most."""
-        return min(*self.values, self.mean - self._margin())
+        return min(*self.values, self.mean - self._margin()) - self.resolution / 2
 
     def _margin(self) -> float:
         if len(self.values) < LEAST:

@@ -34,6 +34,8 @@ ANGULAR = "vehicle.angular_deceleration"
 NEARER = 0.98  # of ``vehicle.sonar_max``: a greatest reading that is noise below it is none
 FAST, FASTEST = 0.4, 0.7  # of the greatest allowed speed: of many stops, and of one at least
 
+ROUNDING = 1e-6
+
 Value = float | str
 
 
@@ -104,7 +106,6 @@ def merged(estimates: Iterable[Estimate]) -> list[Estimate]:
 
 def of_stops(stops: Sequence[Stop], streams: Sequence[Streams]) -> Iterator[Estimate]:
     """Yield reaction and deceleration of each command, in each direction."""
-    period_s = max(each.period_s for each in streams)
     for axis, setting in ((DRIVING, DECELERATION), (TURNING, ANGULAR)):
         for kind in ("stop", "brake"):
             for direction in axis.directions.values():
@@ -113,15 +114,23 @@ def of_stops(stops: Sequence[Stop], streams: Sequence[Streams]) -> Iterator[Esti
                 of_safety = kind == "stop"  # BRAKE is never reckoned with
                 yield Estimate(
                     name=f"{kind.upper()} {direction}: reaction", unit="s",
-                    values=tuple(s.reaction for s in mine), resolution=period_s,
+                    values=tuple(s.reaction for s in mine), resolution=period_s(streams),
                     setting=REACT if of_safety else "",
                 )  # fmt: skip
-                yield Estimate(
-                    name=f"{kind.upper()} {direction}: deceleration", unit=f"{axis.unit}/s2",
-                    values=tuple(s.deceleration for s in mine),
-                    resolution=max(axis.resolution * s.deceleration / s.speed for s in mine),
-                    setting=setting if of_safety else "",
-                )  # fmt: skip
+                of = of_decelerations(f"{kind.upper()} {direction}: deceleration", axis, mine)
+                yield replace(of, setting=setting if of_safety else "")
+
+
+def of_decelerations(name: str, axis: Axis, stops: Sequence[Stop]) -> Estimate:
+    """Return the deceleration of stops on an axis."""
+    values = tuple(stop.deceleration for stop in stops)
+    step = max(axis.resolution * stop.deceleration / stop.speed for stop in stops)
+    return Estimate(name=name, unit=f"{axis.unit}/s2", values=values, resolution=step)
+
+
+def period_s(streams: Sequence[Streams]) -> float:
+    """Return the time between two velocities, s."""
+    return max(each.period_s for each in streams)
 
 
 def needed(stop: Stop) -> float:
@@ -208,7 +217,7 @@ def least_deceleration(found: Fit, axis: Axis) -> float:
     A slow stop is all reaction: there the slope depends on the motors' lag.
     """
     return min(
-        Estimate(name="", unit="", values=tuple(s.deceleration for s in fast)).lower_bound
+        of_decelerations("", axis, fast).lower_bound
         for direction in axis.directions.values()
         if (fast := fast_stops(found.stops, direction, found.settings))
     )
@@ -223,10 +232,14 @@ def longest_wait(found: Fit, decelerations: Mapping[str, float]) -> float:
     bounds = [each.upper_bound + SENSING_S for each in found.estimates if each.setting == REACT]
     for direction in (*DRIVING.directions.values(), *TURNING.directions.values()):
         waits = []
+        own = decelerations[DECELERATION if axis_of(direction) is DRIVING else ANGULAR]
         for stop in of_command(found.stops, "stop", direction):
             stop_s = stopping_s(stop.twist, decelerations[DECELERATION], decelerations[ANGULAR])
+            if stop_s * own > stop.speed * (1 + ROUNDING):
+                continue  # in a curve the other axis stops later, so this one has time to spare
             waits.append(needed(stop) / stop.speed - stop_s / 2 - DECISION_PERIOD_S)
-        bounds.append(Estimate(name="", unit="s", values=tuple(waits)).upper_bound)
+        wait = Estimate(name="", unit="s", values=tuple(waits), resolution=period_s(found.streams))
+        bounds.append(wait.upper_bound)
     return max(bounds)
 
 

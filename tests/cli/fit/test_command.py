@@ -79,13 +79,13 @@ def test_all_that_safety_needs_is_measured(path: Path, capsys: pytest.CaptureFix
     assert "\x1b" not in printed
     lines = printed.splitlines()
     (reaction,) = (line for line in lines if line.startswith("STOP forward: reaction"))
-    assert reaction.split()[-4:] == ["6", "safety.react", "0.4", "0.21"]
+    assert reaction.split()[-4:] == ["6", "safety.react", "0.4", "0.22"]
     assert sum("STOP backward  " in line for line in lines) == 6
     assert "No stop was longer than safety reckons with.\n" in printed
     assert "NOT MEASURED" not in printed
     assert printed.endswith("Written: fitted: fit.toml, profile.toml, fit.html\n")
     proposed = load(Everything, Sources((Path("fitted/fit.toml"),), {}, ())).config
-    assert (proposed.safety.react, proposed.vehicle.deceleration) == (0.21, 0.49)
+    assert (proposed.safety.react, proposed.vehicle.deceleration) == (0.22, 0.49)
     model = load_model(["fitted/profile.toml"])
     assert model.drive.coast == pytest.approx(0.5, abs=0.003)
     assert model.drive.dead_time == pytest.approx(0.1, abs=0.003)
