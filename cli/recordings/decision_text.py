@@ -190,6 +190,16 @@ def motion_text(motion: Motion) -> str:
     return f"RUN {speed(Twist(motion.linear, motion.angular))}"
 
 
+def difference_text(decided: Decided) -> str:
+    """Return both motions, and what differs besides command and speed."""
+    others = [name for name in decided.differences if name not in ("command", "linear", "angular")]
+    recorded, replayed = (
+        ", ".join([motion_text(motion), *(f"{name} {getattr(motion, name)}" for name in others)])
+        for motion in (decided.recorded, decided.motion)
+    )
+    return f"recorded {recorded}; replayed {replayed}"
+
+
 def cause_text(decided: Decided, name: CauseName, language: Language) -> str:
     """Return the text of a held cause, as the screens show it."""
     title = in_language(CAUSES[name].text, language)

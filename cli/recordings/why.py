@@ -318,8 +318,7 @@ class View:
             one = found.first
             yield (
                 f"first difference at {self.recording.moment(run.logged_ns(one.at_ns)).strip()}: "
-                f"{', '.join(one.differences)}: recorded {text.motion_text(one.recorded)}, "
-                f"replayed {text.motion_text(one.motion)}. A recording contains no settings (name "
+                f"{text.difference_text(one)}. A recording contains no settings (name "
                 "those of the robot with --config), no message that the recorder lost, and not the "
                 f"order of messages within {UNSURE_NS / 1e6:.0f} ms"
             )
