@@ -229,18 +229,26 @@ def clock(stop: Stop) -> str:
     return f"{datetime.fromtimestamp(stop.at_ns / NS_PER_S, UTC):%H:%M:%S}"
 
 
+def of_streams(streams: Streams) -> Iterator[str]:
+    """Yield what is said of the streams themselves."""
+    speeds = greatest(streams)
+    yield f"Greatest speeds: {speeds.linear:.2f} m/s and {speeds.angular:.2f} rad/s."
+    for each in answers(streams):
+        yield (
+            f"{each.stream}: {each.messages} messages, {each.rate:.1f} Hz, "
+            f"{each.lost:.2%} lost, longest gap {each.longest_gap:.3f} s."
+        )
+    if streams.links:
+        ports = streams.links[-1].ports.items()
+        yield f"Ports of the answers: {', '.join(f'{name} {port}' for name, port in ports)}."
+    for silent_s in restarts_s(streams):
+        yield f"The board restarted: its counters were silent for {silent_s:.2f} s."
+
+
 def lines(found: Fit) -> Iterator[str]:
     """Yield what is below the table."""
     for streams in found.streams:
-        speeds = greatest(streams)
-        yield f"Greatest speeds: {speeds.linear:.2f} m/s and {speeds.angular:.2f} rad/s."
-        for each in answers(streams):
-            yield (
-                f"{each.stream}: {each.messages} messages, {each.rate:.1f} Hz, "
-                f"{each.lost:.2%} lost, longest gap {each.longest_gap:.3f} s."
-            )
-        for silent_s in restarts_s(streams):
-            yield f"The board restarted: its counters were silent for {silent_s:.2f} s."
+        yield from of_streams(streams)
     for it in found.ranges:
         yield (
             f"sonars: {it.nearest:.3f} to {it.farthest:.3f} m, in steps of {it.resolution:.3f} m; "

@@ -25,7 +25,11 @@ STRAIGHT, ASIDE = Twist(0.05, 0.02), Twist(0.02, 0.1)  # the slowest speed of on
 SPAN = Twist(0.15, 0.3)  # commanded change of speed that shows a delay, m/s and rad/s
 DELAY_STEP_S, DELAYS = 0.01, 41  # 0 to 0.4 s
 LEAST = 8  # velocities of a window
+RISE = 10  # velocities, 0.2 s, over which an acceleration is measured
 SAME, SAME_TWIST = 0.02, Twist(0.01, 0.02)  # deviation of a steady speed: relative, or absolute
+
+
+Component = Callable[[Velocity | Motion], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,12 +110,19 @@ def of_standstill(streams: Streams) -> list[Estimate]:
 
 
 def of_ramps(streams: Streams) -> list[Estimate]:
-    """Return the delay from a commanded change of speed to the measured one."""
-    axes = (("driving", SPAN.linear, _linear), ("turning", SPAN.angular, _angular))
+    """Return the delay from a commanded change of speed to the measured one, and the acceleration.
+
+    The vehicle accelerates at most as commanded: safety's ramp is ``safety.linear_acceleration``.
+    """
+    axes: tuple[tuple[str, str, float, Component], ...] = (
+        ("driving", "m/s2", SPAN.linear, _linear), ("turning", "rad/s2", SPAN.angular, _angular)
+    )  # fmt: skip
     drives = [one for one in _groups(streams.motions, _runs) if _lasts(one, SETTLE_NS)]
     found = []
-    for name, span, of in axes:
-        delays = [d for one in drives if (d := _delay_s(streams, one, span, of)) is not None]
+    for name, unit, span, of in axes:
+        changing = [one for one in drives if _changes(one, span, of)]
+        delays = [d for one in changing if (d := _delay_s(streams, one, of)) is not None]
+        rises = [r for one in changing if (r := _rise(streams, one, of)) is not None]
         if delays:
             found.append(
                 Estimate(
@@ -119,6 +130,9 @@ def of_ramps(streams: Streams) -> list[Estimate]:
                     resolution=streams.period_s,
                 )
             )  # fmt: skip
+        if rises:
+            name = f"RUN {name}: acceleration"
+            found.append(Estimate(name=name, unit=unit, values=tuple(rises)))
     return found
 
 
@@ -237,13 +251,25 @@ def _mean(velocities: Sequence[Velocity]) -> Twist:
     return Twist(mean(map(_linear, velocities)), mean(map(_angular, velocities)))
 
 
-def _delay_s(
-    streams: Streams, drive: Sequence[Motion], span: float, of: Callable[[Velocity | Motion], float]
-) -> float | None:
-    """Return the delay that explains a drive best; None for too small a change of speed."""
+def _changes(drive: Sequence[Motion], span: float, of: Component) -> bool:
+    """Return whether the commanded speed changes by this much."""
     commands = [of(motion) for motion in drive]
-    if max(commands) - min(commands) < span:
-        return None
+    return max(commands) - min(commands) >= span
+
+
+def _rise(streams: Streams, drive: Sequence[Motion], of: Component) -> float | None:
+    """Return the greatest change of the measured speed in ``RISE`` velocities, per second."""
+    velocities = between(streams.velocities, drive[0].mono_ns, drive[-1].mono_ns)
+    rises = [
+        (abs(of(b)) - abs(of(a))) / (b.mono_ns - a.mono_ns) * NS_PER_S
+        for a, b in zip(velocities, velocities[RISE:], strict=False)
+    ]
+    return max(rises, default=None)
+
+
+def _delay_s(streams: Streams, drive: Sequence[Motion], of: Component) -> float | None:
+    """Return the delay that explains a drive best; None without enough velocities."""
+    commands = [of(motion) for motion in drive]
     velocities = between(streams.velocities, drive[0].mono_ns, drive[-1].mono_ns)
     if len(velocities) < LEAST:
         return None

@@ -105,9 +105,10 @@ def test_a_vehicle_that_never_stands_shows_no_bias() -> None:
 @pytest.mark.parametrize("late", [0, 5, 10])
 def test_the_delay_of_a_commanded_speed(late: int) -> None:
     ramp = [(STEP_S, 0.02 * n, 0.0) for n in range(1, 26)]
-    (found,) = of_ramps(drive((1.0, 0, 0), *ramp, (1.0, 0.5, 0), late=late))
-    assert found.name == "RUN driving: delay"
-    assert found.mean == pytest.approx(late * STEP_S, abs=0.011)
+    delay, acceleration = of_ramps(drive((1.0, 0, 0), *ramp, (1.0, 0.5, 0), late=late))
+    assert (delay.name, acceleration.name) == ("RUN driving: delay", "RUN driving: acceleration")
+    assert delay.mean == pytest.approx(late * STEP_S, abs=0.011)
+    assert acceleration.mean == pytest.approx(1.0, rel=0.05)
 
 
 def test_a_small_change_of_speed_shows_no_delay() -> None:
