@@ -15,7 +15,7 @@ from cli.fit.answers import answers, restarts_s
 from cli.fit.check import Course, Difference, compare
 from cli.fit.check import lines as difference_lines
 from cli.fit.files import model, profile, settings_file
-from cli.fit.fit import Fit, fit, needed, reckoned
+from cli.fit.fit import Fit, fit, needed, reckoned, refusal
 from cli.fit.page import page
 from cli.fit.steady import greatest, of_ground_truth
 from cli.fit.stops import Stop, counted, find_stops
@@ -259,6 +259,8 @@ def lines(found: Fit) -> Iterator[str]:
         yield f"Stops left out: {counted(found.left_out)}."
     for manoeuvre in found.missing:
         yield f"NOT MEASURED: {manoeuvre}."
+    if problem := refusal(found):
+        yield f"NOT USABLE as it is, because safety refuses to start: {problem}."
     if not found.too_long and not found.missing:
         yield "No stop was longer than safety reckons with."
     yield LIMITS

@@ -193,6 +193,21 @@ def _proposals(found: Fit) -> Iterator[tuple[str, Value]]:
                 yield sonars.SETTING, round(nearest, 3)
 
 
+def refusal(found: Fit) -> str:
+    """Return why safety would refuse to start with the proposals; empty if it would not."""
+    sections: dict[str, dict[str, Value]] = {"safety": {}, "vehicle": {}}
+    for path, value in found.proposals.items():
+        section, _, name = path.partition(".")
+        sections.get(section, {})[name] = value
+    vehicle = replace(found.settings.vehicle, **sections["vehicle"])
+    safety = replace(found.settings.safety, **sections["safety"])
+    try:
+        safety_config(replace(found.settings, vehicle=vehicle, safety=safety))
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
 def _of_stopping(found: Fit) -> Iterator[tuple[str, Value]]:
     """Yield reaction and decelerations of all stops; nothing while their bounds are not safe."""
     safe = safe_values(found.settings)

@@ -3,7 +3,7 @@
 import pytest
 from msgspec.structs import replace
 
-from cli.fit.fit import Fit, fit, needed, reckoned
+from cli.fit.fit import Fit, fit, needed, reckoned, refusal
 from cli.fit.streams import Streams
 from cli.settings import Everything, safety_config
 from tests.cli.fit.stops_fixture import streams
@@ -81,6 +81,14 @@ def test_no_proposal_takes_a_protection_away() -> None:
     weak = measured(left=0.09)
     assert "vehicle.angular_deceleration" not in weak.proposals
     assert any("the bound of a deceleration is too low" in each for each in weak.missing)
+
+
+def test_proposals_with_which_safety_would_not_start_say_so() -> None:
+    """The sonars see 1 m, and the vehicle stops within more than that."""
+    found = measured(forward=0.3)
+    assert refusal(found) == ""
+    found.proposals["vehicle.sonar_max"] = 1.0
+    assert refusal(found).startswith("sonar_max 1 m is too near: from max_linear 1 m/s")
 
 
 @pytest.mark.parametrize(
