@@ -20,10 +20,9 @@ def fitted(**changes: float) -> Fit:
     return found
 
 
-@pytest.mark.parametrize("number", [0, 23 + 4])
-def test_a_vehicle_is_measured(number: int) -> None:
-    """A profile, and a random vehicle with lag, dead time and noise."""
-    result = measure(vehicles(5)[number])
+def test_a_vehicle_is_measured() -> None:
+    """A random one, with dead time and noise."""
+    result = measure(vehicles(5)[-1])
     assert result.missing == ()
     assert result.proposes
     assert result.unsafe == ()
