@@ -82,7 +82,12 @@ def follow(motions: Sequence[Motion], model: Model) -> Course:
 def compare(
     streams: Streams, stops: Sequence[Stop], model: Model
 ) -> tuple[Course, list[Difference]]:
-    """Return the model's course, and its differences from the recording."""
+    """Return the model's course, and its differences from the recording.
+
+    Raise ``ValueError`` without motions to follow.
+    """
+    if len(streams.motions) < 2:
+        raise ValueError("has a single motion")
     course = follow(streams.motions, model)
     linear = [abs(twist.linear) for twist in course.twists]
     angular = [abs(twist.angular) for twist in course.twists]

@@ -68,10 +68,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Show the estimates and write the files; return 0 if nothing is missing or wrong."""
     settings = load(Everything, robot_sources(options)).config
+    if options.out and options.out.exists():
+        raise ConfigError(f"--out {options.out}: exists already; choose another folder")
     robot, streams, remarks = read(options.files, options.robot)
-    found = fit(streams, settings)
     try:
-        found.estimates += of_ground_truth(streams, options.drove, options.turned)
+        found = fit(streams, settings, of_ground_truth(streams, options.drove, options.turned))
     except ValueError as error:
         raise T2Error(f"--drove, --turned: {error}") from None
     warning = not_safe(found.too_long[0], settings) if found.too_long else ""
@@ -103,7 +104,10 @@ def check(
     """Return a recording with the model's course under its commands, and the differences."""
     _, (streams, *_), _ = read([file], robot)
     stops, _ = find_stops(streams)
-    course, differences = compare(streams, stops, model(found))
+    try:
+        course, differences = compare(streams, stops, model(found))
+    except ValueError as error:
+        raise T2Error(f"--check {file}: {error}") from None
     return (streams, course), differences
 
 
@@ -150,20 +154,18 @@ def _messages(file: Path, remarks: list[str]) -> Iterator[tuple[str, Message]]:
 
 
 def write(folder: Path, found: Fit, sources: Sequence[str], html: Callable[[], str]) -> None:
-    """Write settings, the simulator's profile and the page; raise ``ConfigError``."""
+    """Write settings, the simulator's profile and the page; raise ``T2Error``."""
     texts = {
-        "fit.toml": settings_file(found, sources),
-        "profile.toml": profile(found, sources),
-        "fit.html": html(),
+        "fit.toml": lambda: settings_file(found, sources),
+        "profile.toml": lambda: profile(found, sources),
+        "fit.html": html,  # last: it needs an extra
     }
     try:
         folder.mkdir(parents=True)
         for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
-    except FileExistsError:
-        raise ConfigError(f"--out {folder}: exists already; choose another folder") from None
+            (folder / name).write_text(text(), encoding="utf-8")
     except OSError as error:
-        raise ConfigError(f"--out {folder}: cannot be written: {error.strerror}") from None
+        raise T2Error(f"--out {folder}: cannot be written: {error.strerror}") from None
 
 
 # --- text -----------------------------------------------------------------------------------------

@@ -1,12 +1,13 @@
 """The files of a fit: the proposed settings, and a profile for the simulator. Pure."""
 
+import json
 from collections.abc import Iterable, Sequence
 from statistics import mean
 
 from msgspec.structs import replace
 
 from cli.fit.fit import Fit, Value
-from cli.fit.steady import DELAY_STEP_S
+from cli.fit.steady import DELAY_STEP_S, GROUND
 from common.config import Setting, build
 from common.errors import ConfigError
 from sim.model import Model
@@ -29,8 +30,8 @@ SAME = {
     "sonar.saturation": ("sonars, greatest reading",),
 }  # fmt: skip
 TRUE = {
-    "counters.scale": "distance, counted / driven",
-    "counters.turn_scale": "turn, counted / turned",
+    "counters.scale": GROUND[0],
+    "counters.turn_scale": GROUND[1],
 }
 DELAYS = ("RUN driving: delay", "RUN turning: delay")
 
@@ -79,7 +80,7 @@ def profile(found: Fit, sources: Sequence[str]) -> str:
     """Return that vehicle as a profile of the simulator."""
     head = [
         f'title = "Measured in {len(sources)} recordings"',
-        f"source = '{', '.join(sources)}'",
+        f"source = {json.dumps(', '.join(sources))}",
     ]
     return _toml(head, parameters(found))
 

@@ -34,7 +34,9 @@ ANGULAR = "vehicle.angular_deceleration"
 NEARER = 0.98  # of ``vehicle.sonar_max``: a greatest reading that is noise below it is none
 FAST, FASTEST = 0.4, 0.7  # of the greatest allowed speed: of many stops, and of one at least
 
-ROUNDING = 1e-6
+# Allowed deviations from 1: of velocities from counters and from commands, and of counters from the
+# ground.
+UNLIKE, UNTRUE, TINY = 0.08, 0.02, 1e-9
 
 Value = float | str
 
@@ -61,17 +63,20 @@ class Fit:
         return [stop for stop in worst_first if spare[id(stop)] < 0]
 
 
-def fit(streams: Sequence[Streams], settings: Everything) -> Fit:
-    """Measure the vehicle in its streams, one for each start of the robot's computer."""
+def fit(streams: Sequence[Streams], settings: Everything, truths: Iterable[Estimate] = ()) -> Fit:
+    """Measure the vehicle in its streams, one for each start of the robot's computer.
+
+    ``truths`` are ratios of the counters to the ground, ``steady.of_ground_truth``.
+    """
     found = Fit(streams, settings)
     for each in streams:
         stops, left_out = find_stops(each)
         found.stops += stops
         found.left_out += left_out
     found.ranges = [it for each in streams if (it := sonars.ranges(each))]
-    rest = chain(_rest(streams), *(_of_sonars(each) for each in found.ranges))
+    rest = chain(truths, _rest(streams), *(_of_sonars(each) for each in found.ranges))
     found.estimates = [*of_stops(found.stops, streams), *merged(rest)]
-    found.missing = list(missing(found.stops, settings))
+    found.missing = [*missing(found.stops, settings), *doubts(found)]
     found.proposals = dict(_proposals(found))
     return found
 
@@ -109,7 +114,7 @@ def of_stops(stops: Sequence[Stop], streams: Sequence[Streams]) -> Iterator[Esti
     for axis, setting in ((DRIVING, DECELERATION), (TURNING, ANGULAR)):
         for kind in ("stop", "brake"):
             for direction in axis.directions.values():
-                if not (mine := of_command(stops, kind, direction)):
+                if not (mine := steady_stops(stops, kind, direction)):
                     continue
                 of_safety = kind == "stop"  # BRAKE is never reckoned with
                 yield Estimate(
@@ -151,10 +156,16 @@ def of_command(stops: Sequence[Stop], kind: str, direction: str) -> list[Stop]:
     return [stop for stop in stops if (stop.kind, stop.direction) == (kind, direction)]
 
 
+def steady_stops(stops: Sequence[Stop], kind: str, direction: str) -> list[Stop]:
+    """Return those of them in which the vehicle slowed down steadily."""
+    return [stop for stop in of_command(stops, kind, direction) if stop.is_steady]
+
+
 def fast_stops(stops: Sequence[Stop], direction: str, settings: Everything) -> list[Stop]:
-    """Return the STOPs from at least 0.4 of the allowed speeds."""
+    """Return the STOPs from at least 0.4 of the allowed speeds, without those in curves."""
     least = FAST * (limits(settings)[axis_of(direction).unit])
-    return [s for s in of_command(stops, "stop", direction) if s.speed >= least]
+    found = steady_stops(stops, "stop", direction)
+    return [s for s in found if s.speed >= least and not s.is_curve]
 
 
 def missing(stops: Sequence[Stop], settings: Everything) -> Iterator[str]:
@@ -170,6 +181,33 @@ def missing(stops: Sequence[Stop], settings: Everything) -> Iterator[str]:
                     f"a STOP {direction} from {FASTEST * most:.2f} {unit} or more: the fastest is "
                     f"from {fastest:.2f} of the {most:g} that are allowed"
                 )
+
+
+def doubts(found: Fit) -> Iterator[str]:
+    """Yield what contradicts the measured stops, so that nothing may follow from them."""
+    stops = [stop for stop in found.stops if stop.kind == "stop"]
+    for stop in stops:
+        if not stop.is_steady:
+            yield (
+                f"a steady STOP {stop.direction}: the one from {stop.speed:.2f} {stop.axis.unit}/s "
+                f"that needed {stop.distance:.2f} {stop.axis.unit} did not slow down by itself"
+            )
+    for name, axis in (("driving", DRIVING), ("turning", TURNING)):
+        yield from _doubts_of(name, [s for s in stops if s.axis is axis and not s.is_curve])
+    for each in found.estimates:
+        if each.name in steady.GROUND and abs(each.mean - 1) > UNTRUE:
+            yield f"true counters: {each.name} is {each.mean:.3f}"
+
+
+def _doubts_of(name: str, stops: Sequence[Stop]) -> Iterator[str]:
+    """Yield what contradicts the stops of one axis."""
+    counted_way = sum(stop.distance for stop in stops)
+    ratio = sum(stop.integrated for stop in stops) / counted_way if counted_way else 1.0
+    if abs(ratio - 1) > UNLIKE:
+        yield f"velocities and counters that agree: {name} to standstill {ratio:.2f} : 1"
+    obeyed = [stop.speed / stop.commanded for stop in stops if stop.commanded > 0]
+    if (fastest := max(obeyed, default=1.0)) > 1 + UNLIKE:
+        yield f"a vehicle that obeys: {name} it was {fastest:.2f} times as fast as commanded"
 
 
 def limits(settings: Everything) -> dict[str, float]:
@@ -247,12 +285,10 @@ def longest_wait(found: Fit, decelerations: Mapping[str, float]) -> float:
     bounds = [each.upper_bound + SENSING_S for each in found.estimates if each.setting == REACT]
     for direction in (*DRIVING.directions.values(), *TURNING.directions.values()):
         waits = []
-        own = decelerations[DECELERATION if axis_of(direction) is DRIVING else ANGULAR]
-        for stop in of_command(found.stops, "stop", direction):
-            stop_s = stopping_s(stop.twist, decelerations[DECELERATION], decelerations[ANGULAR])
-            if stop_s * own > stop.speed * (1 + ROUNDING):
-                continue  # in a curve the other axis stops later, so this one has time to spare
-            waits.append(needed(stop) / stop.speed - stop_s / 2 - DECISION_PERIOD_S)
+        for stop in steady_stops(found.stops, "stop", direction):
+            if not stop.is_curve:  # there the other axis may stop later, and time is to spare
+                stop_s = stopping_s(stop.twist, decelerations[DECELERATION], decelerations[ANGULAR])
+                waits.append(needed(stop) / stop.speed - stop_s / 2 - DECISION_PERIOD_S)
         wait = Estimate(name="", unit="s", values=tuple(waits), resolution=period_s(found.streams))
         bounds.append(wait.upper_bound)
     return max(bounds)
@@ -275,11 +311,13 @@ def _unit(estimate: Estimate, settings: Everything) -> str:
     wire = settings.wire
     today = wire.command_angular_unit if command else wire.feedback_angular_unit
     (other,) = UNITS.keys() - {today}
-    ratio = abs(estimate.mean)
-    if not command:  # a larger unit of the firmware makes our reading smaller
-        ratio = 1 / ratio if ratio else 0.0
-    matches = abs(ratio * UNITS[today] / UNITS[other] - 1) <= UNIT_MATCH
-    return other if matches else ""
+    matches = [
+        abs(ratio * UNITS[today] / UNITS[other] - 1) <= UNIT_MATCH
+        for each in estimate.interval
+        # A larger unit of the firmware makes our reading smaller.
+        for ratio in (abs(each) if command else 1 / max(abs(each), TINY),)
+    ]
+    return other if all(matches) and len(estimate.values) >= LEAST else ""
 
 
 def up(value: float) -> float:

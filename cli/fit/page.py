@@ -47,10 +47,10 @@ def _figures(found: Fit, checked: tuple[Streams, Course] | None) -> Iterator[Fig
             for kind, title in TITLES.items():
                 if mine := of_command(found.stops, kind, direction):
                     yield f"{title} {direction}", figures.stops(mine, f"{kind}-{direction}")
-    if checked is not None:
+    if checked is not None and checked[1].times:
         yield "The model under the recorded commands", figures.check(*checked)
     if found.ranges:
         yield "Sonars", figures.sonars(found.streams)
-    for streams in found.streams:
+    for streams in (each for each in found.streams if len(each.velocities) > 1):
         yield "Counted and integrated distance", figures.distances(streams)
         yield "Gaps of the velocity", figures.gaps(streams)

@@ -16,6 +16,7 @@ STEP_M = 0.001  # of the ranges on the wire
 JUMP_M = 0.3  # nearer than the readings before and after it
 ENDS, ENDS_SHARE = 20, 0.01  # equal greatest readings, of two sonars: there the sonars end
 SETTING = "vehicle.sonar_max"
+AGREE_M = 0.02  # between the greatest readings of all sonars
 DIFFERENT = 10  # readings that show a resolution
 LEAST = 8  # readings of a standstill
 
@@ -57,7 +58,7 @@ def ranges(streams: Streams) -> Ranges | None:
 
 
 def _end(found: list[tuple[int, float]]) -> Estimate | None:
-    """Return the greatest readings of the sonars that end there; None without two of them."""
+    """Return the greatest readings of the sonars that end there; None unless two agree."""
     ends = []
     for n in range(len(SONAR_NAMES)):
         millimetres = Counter(round(r / STEP_M) for sonar, r in found if sonar == n)
@@ -68,7 +69,8 @@ def _end(found: list[tuple[int, float]]) -> Estimate | None:
         name="sonars, greatest reading", unit="m", values=tuple(ends), resolution=STEP_M,
         setting=SETTING,
     )  # fmt: skip
-    return end if ends[1:] else None
+    agree = bool(ends[1:]) and max(r for _, r in found) - min(ends) < AGREE_M
+    return end if agree else None
 
 
 def _at_standstill(streams: Streams) -> tuple[int, Estimate | None, int]:

@@ -25,6 +25,7 @@ STRAIGHT, ASIDE = Twist(0.05, 0.02), Twist(0.02, 0.1)  # the slowest speed of on
 SPAN = Twist(0.15, 0.3)  # commanded change of speed that shows a delay, m/s and rad/s
 DELAY_STEP_S, DELAYS = 0.01, 41  # 0 to 0.4 s
 LEAST = 8  # velocities of a window
+GROUND = ("distance, counted / driven", "turn, counted / turned")
 RISE = 10  # velocities, 0.2 s, over which an acceleration is measured
 SAME, SAME_TWIST = 0.02, Twist(0.01, 0.02)  # deviation of a steady speed: relative, or absolute
 
@@ -181,10 +182,10 @@ def of_ground_truth(
         turns.append(abs(turn) / math.tau)
     if drove:
         ratios = tuple(way / drove for way in ways)
-        yield Estimate(name="distance, counted / driven", unit="", values=ratios)
+        yield Estimate(name=GROUND[0], unit="", values=ratios)
     if turned:
         ratios = tuple(turn / turned for turn in turns)
-        yield Estimate(name="turn, counted / turned", unit="", values=ratios)
+        yield Estimate(name=GROUND[1], unit="", values=ratios)
 
 
 def greatest(streams: Streams) -> Twist:

@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, takewhile
-from math import isclose, radians, remainder, tau
+from math import isclose, isfinite, nan, radians, remainder, tau
 from statistics import linear_regression, mean
 from typing import Literal
 
@@ -35,6 +35,7 @@ LONGEST_GAP_S = 0.1  # between two velocities, and around the begin of a stop
 COUNTED_S = 0.2  # from standstill to the counters' next value
 UPPER, LOWER = 0.9, 0.1  # of the speed: the part of the slope that is used
 SLOPE = 3  # velocities on it
+AGAINST = 0.005  # m or rad, steps of the counters
 NO_VELOCITIES, NO_COUNTERS = "velocities are missing", "counters are missing"
 
 Kind = Literal["stop", "brake"]
@@ -90,12 +91,24 @@ class Stop:
     direction: str
     speed: float  # m/s or rad/s, up to the command
     twist: Twist  # the same, of both axes
-    reaction: float  # s
+    reaction: float  # s; NaN if the vehicle did not slow down steadily, as the next one
     deceleration: float  # m/s^2 or rad/s^2
     distance: float  # m or rad, by the counters, from the command to standstill
     points: tuple[Point, ...]  # the velocities from the command to standstill
     at_ns: int  # wall clock at the command
     braked: bool = False  # BRAKE followed the STOP before standstill
+    commanded: float = nan  # speed of the last RUN
+    integrated: float = nan  # m or rad, by the velocities, from the command to standstill
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether the vehicle slowed down steadily by this command."""
+        return isfinite(self.deceleration)
+
+    @property
+    def is_curve(self) -> bool:
+        """Whether the vehicle drove and turned."""
+        return DRIVING.runs(self.twist) and TURNING.runs(self.twist)
 
 
 class UnsuitableError(Exception):
@@ -122,9 +135,12 @@ def counted(reasons: Counter[str]) -> str:
 def slope(
     points: Sequence[Point], speed: float, standing: float = STANDING_MPS
 ) -> tuple[float, float]:
-    """Return reaction time (s) and deceleration, from this speed to standstill."""
-    above = max((n for n, (_, v) in enumerate(points) if v > UPPER * speed), default=0)
-    falling = points[above:]
+    """Return reaction time (s) and deceleration, from this speed to standstill.
+
+    Both are NaN if the vehicle did not slow down, or not steadily.
+    """
+    above = [n for n, (_, v) in enumerate(points) if v > UPPER * speed]
+    falling = points[above[-1] if above else 0 :]
     lowest = max(LOWER * speed, standing)
     part = list(takewhile(lambda point: point[1] >= lowest, falling))
     below = falling[len(part) :]
@@ -133,28 +149,31 @@ def slope(
     elif below:
         part = [falling[0], below[0]]
     else:
-        raise UnsuitableError("changed to BRAKE before it slowed down")
+        return nan, nan
     rate, at_zero = linear_regression([s for s, _ in part], [v for _, v in part])
     if rate >= 0:
-        raise UnsuitableError("the speed does not fall steadily")
+        return nan, nan
     return (speed - at_zero) / rate, -rate
 
 
 def _begins(motions: Sequence[Motion]) -> Iterator[Sequence[Motion]]:
-    """Yield the motions from each command on that ends a RUN with speed."""
+    """Yield the motions from each RUN with speed on that a command ends."""
     for index, (before, now) in enumerate(pairwise(motions), 1):
         ran = not Twist(before.linear, before.angular).rounds_to_zero
         if before.command is Command.RUN and ran and now.command is not Command.RUN:
-            yield motions[index:]
+            yield motions[index - 1 :]
 
 
 def _measured(streams: Streams, motions: Sequence[Motion]) -> list[Stop]:
-    """Return the stop that the first of these motions commands, of each axis that moved."""
-    first = bisect_right(streams.velocities, motions[0].mono_ns, key=lambda v: v.mono_ns)
+    """Return the stop that the second of these motions commands, of each axis that moved."""
+    run, command = motions[:2]
+    if run.boot != command.boot or run.seq + 1 != command.seq:
+        raise UnsuitableError("its begin is missing")  # an earlier command may have been lost
+    first = bisect_right(streams.velocities, command.mono_ns, key=lambda v: v.mono_ns)
     if first == 0:
         raise UnsuitableError(NO_VELOCITIES)
     twist = _steady(streams.velocities[:first])
-    window = _until_standstill(streams.velocities[first - 1 :], motions)
+    window = _until_standstill(streams.velocities[first - 1 :], motions[1:])
     axes = [axis for axis in (DRIVING, TURNING) if axis.runs(twist)]
     return [_measure(streams, motions, twist, window, axis) for axis in axes]
 
@@ -166,11 +185,10 @@ def _measure(
     window: Sequence[Velocity],
     axis: Axis,
 ) -> Stop:
-    """Return one axis of the stop that the first of these motions commands."""
-    command, end_ns = motions[0], window[-1].mono_ns
+    """Return one axis of the stop that the second of these motions commands."""
+    (run, command), end_ns = motions[:2], window[-1].mono_ns
     if any(b.pressed and command.mono_ns <= b.mono_ns <= end_ns for b in streams.bumpers):
         raise UnsuitableError("the bumper was pressed")
-    distance = _distance(streams.mileages, command.mono_ns, end_ns, axis)
     kind: Kind = "brake" if command.command is Command.BRAKE else "stop"
     brakes = [m.mono_ns for m in motions if m.command is Command.BRAKE and m.mono_ns <= end_ns]
     braked = kind == "stop" and bool(brakes)
@@ -182,19 +200,28 @@ def _measure(
         for v in window
         if v.mono_ns <= last_ns
     ]
+    distance = sign * _distance(streams.mileages, command.mono_ns, end_ns, axis)
+    if distance < -AGAINST:
+        raise UnsuitableError("velocity and counters have opposite signs")
     reaction, deceleration = slope(points, speed, axis.standing)
     return Stop(
-        axis,
-        kind,
-        axis.directions[sign],
-        speed,
-        twist,
-        reaction,
-        deceleration,
-        distance,
-        tuple(points),
-        command.t_ns,
-        braked,
+        axis=axis, kind=kind, direction=axis.directions[sign], speed=speed, twist=twist,
+        reaction=reaction, deceleration=deceleration, distance=abs(distance),
+        commanded=sign * axis.speed(Twist(run.linear, run.angular)),
+        integrated=_integrated(window, command.mono_ns, sign, axis),
+        points=tuple(points), at_ns=command.t_ns, braked=braked,
+    )  # fmt: skip
+
+
+def _integrated(window: Sequence[Velocity], begin_ns: int, sign: float, axis: Axis) -> float:
+    """Return the distance (m or rad) by the velocities from a time on."""
+    return sum(
+        sign
+        * (axis.speed(a) + axis.speed(b))
+        / 2
+        * (b.mono_ns - max(begin_ns, a.mono_ns))
+        / NS_PER_S
+        for a, b in pairwise(window)
     )
 
 
@@ -236,7 +263,7 @@ def _mean(velocities: Sequence[Velocity]) -> Twist:
 
 
 def _distance(mileages: Sequence[Mileage], begin_ns: int, end_ns: int, axis: Axis) -> float:
-    """Return the counted distance (m or rad); of a turn the sum of its steps."""
+    """Return the counted distance (m or rad) with its sign; of a turn the sum of its steps."""
     first = bisect_right(mileages, begin_ns, key=lambda m: m.mono_ns)
     last = bisect_right(mileages, end_ns, key=lambda m: m.mono_ns)
     if first == 0 or last == len(mileages):
@@ -248,4 +275,4 @@ def _distance(mileages: Sequence[Mileage], begin_ns: int, end_ns: int, axis: Axi
         raise UnsuitableError("bridge or board restarted")
     share = (begin_ns - before.mono_ns) / (after.mono_ns - before.mono_ns)
     steps = [axis.travel(*pair) for pair in pairwise(mileages[first - 1 : last + 1])]
-    return abs(sum(steps) - share * steps[0])
+    return sum(steps) - share * steps[0]

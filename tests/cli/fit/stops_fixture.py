@@ -39,8 +39,8 @@ def streams(
         made.add(at(message, seconds, begin_s))
 
     linear, angular = (0.0, sign * speed) if turns else (sign * speed, 0.0)
-    add(Motion(command=Command.RUN, linear=linear, angular=angular), -0.02)
-    add(Motion(command=command, boot=6, t_ns=AT_NS), 0.0)
+    add(Motion(command=Command.RUN, linear=linear, angular=angular, boot=6, seq=1), -0.02)
+    add(Motion(command=command, boot=6, seq=2, t_ns=AT_NS), 0.0)
     travel = 0.0
     for number in range(-15, round(until_s * 50)):
         now = number / 50 + 0.005

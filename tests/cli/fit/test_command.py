@@ -144,7 +144,8 @@ def test_the_fitted_vehicle_explains_its_recording_and_no_other_one(
 def test_a_distance_by_tape_measure_is_in_the_profile(
     path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["fit", str(path), "--drove", "0.001", "--out", "wild", *CAREFUL]) == 0
+    assert main(["fit", str(path), "--drove", "0.001", "--out", "wild", *CAREFUL]) == 1
+    assert "NOT MEASURED: true counters: distance, counted / driven is " in capsys.readouterr().out
     assert "scale" not in Path("wild/profile.toml").read_text()  # the simulator has none as wild
     with pytest.raises(SystemExit):
         main(["fit", str(path), "--drove", "-1"])

@@ -1,11 +1,15 @@
 """Proposals from synthetic stops: bounds on the safe side, and what is missing."""
 
+from collections.abc import Callable
+
 import pytest
 from msgspec.structs import replace
 
+from cli.fit.estimate import Estimate
 from cli.fit.fit import Fit, fit, needed, reckoned, refusal
 from cli.fit.streams import Streams
 from cli.settings import Everything, safety_config
+from t2.messages import Command
 from tests.cli.fit.stops_fixture import streams
 from tests.cli.fit.test_steady import drive
 
@@ -83,6 +87,67 @@ def test_no_proposal_takes_a_protection_away() -> None:
     assert any("the bound of a deceleration is too low" in each for each in weak.missing)
 
 
+def changed(change: Callable[[Streams], None]) -> Fit:
+    """Return the fit of stops that safety reckons with, after a change of their streams."""
+    (made,) = measured(forward=0.7, backward=0.7, left=1.2, right=1.2).streams
+    change(made)
+    return fit([made], TODAY)
+
+
+def faster(made: Streams) -> None:
+    made.velocities = [replace(v, linear=1.4 * v.linear) for v in made.velocities]
+
+
+def disobeyed(made: Streams) -> None:
+    made.motions = [replace(m, angular=m.angular / 1.4) for m in made.motions]
+
+
+def rolling(made: Streams) -> None:
+    """The newest stop to the right does nothing until BRAKE."""
+    begin_ns = made.motions[-1].mono_ns
+    made.motions.append(replace(made.motions[-1], command=Command.BRAKE, seq=3,
+                                mono_ns=begin_ns + 500_000_000))  # fmt: skip
+    made.velocities = [
+        replace(v, angular=-0.9) if 0 < v.mono_ns - begin_ns < 700_000_000 else v
+        for v in made.velocities
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "doubt"),
+    [
+        (faster, "velocities and counters that agree: driving to standstill 1.4"),
+        (disobeyed, "a vehicle that obeys: turning it was 1.40 times as fast as commanded"),
+        (rolling, "a steady STOP right: the one from 0.90 rad/s that needed "),
+    ],
+)
+def test_what_contradicts_the_stops_leaves_nothing_to_propose(
+    change: Callable[[Streams], None], doubt: str
+) -> None:
+    found = changed(change)
+    assert found.proposals == {}
+    assert any(each.startswith(doubt) for each in found.missing), found.missing
+    assert changed(lambda _: None).missing == []
+
+
+def test_counters_that_the_ground_contradicts_leave_nothing_to_propose() -> None:
+    (made,) = measured().streams
+    for ratio, proposes in ((0.5, False), (1.01, True)):
+        truth = Estimate(name="distance, counted / driven", unit="", values=(ratio,))
+        assert bool(fit([made], TODAY, [truth]).proposals) is proposes
+
+
+def test_stops_in_curves_alone_are_not_enough() -> None:
+    (made,) = measured().streams
+    made.velocities = [
+        replace(v, linear=v.linear or v.angular, angular=v.angular or v.linear)
+        for v in made.velocities
+    ]
+    found = fit([made], TODAY)
+    assert found.proposals == {}
+    assert len(found.missing) >= 4
+
+
 def test_proposals_with_which_safety_would_not_start_say_so() -> None:
     """The sonars see 1 m, and the vehicle stops within more than that."""
     found = measured(forward=0.3)
@@ -92,19 +157,21 @@ def test_proposals_with_which_safety_would_not_start_say_so() -> None:
 
 
 @pytest.mark.parametrize(
-    ("counted", "path", "unit"),
+    ("counted", "turned", "path", "unit"),
     [
-        (0.573, "wire.command_angular_unit", "milliradian"),
-        (1.0, "wire.command_angular_unit", None),
-        (1.2, "wire.command_angular_unit", None),
-        (0.573, "wire.feedback_angular_unit", None),
-        (1.745, "wire.feedback_angular_unit", "milliradian"),
+        (0.573, 5, "wire.command_angular_unit", "milliradian"),
+        (0.573, 4, "wire.command_angular_unit", None),  # a single one may have slipped
+        (1.0, 5, "wire.command_angular_unit", None),
+        (1.2, 5, "wire.command_angular_unit", None),
+        (0.573, 5, "wire.feedback_angular_unit", None),
+        (1.745, 5, "wire.feedback_angular_unit", "milliradian"),
     ],
 )
-def test_units(counted: float, path: str, unit: str | None) -> None:
+def test_units(counted: float, turned: int, path: str, unit: str | None) -> None:
     """The counters show the firmware's unit; the measured velocity agrees with the command."""
-    made = drive((1.0, 0, 0), (2.0, 0, 0.5), scale=counted)
+    turns = [part for n in range(turned) for part in ((1.0, 0, 0), (2.0, 0, 0.5 * (-1) ** n))]
+    made = drive(*turns, scale=counted)
     if path.startswith("wire.feedback"):
-        made.mileages = drive((1.0, 0, 0), (2.0, 0, 0.5)).mileages
+        made.mileages = drive(*turns).mileages
         made.velocities = [replace(v, angular=v.angular * counted) for v in made.velocities]
     assert fit([made], TODAY).proposals.get(path) == unit
