@@ -157,8 +157,9 @@ def of_command(stops: Sequence[Stop], kind: str, direction: str) -> list[Stop]:
 
 
 def steady_stops(stops: Sequence[Stop], kind: str, direction: str) -> list[Stop]:
-    """Return those of them in which the vehicle slowed down steadily."""
-    return [stop for stop in of_command(stops, kind, direction) if stop.is_steady]
+    """Return those of them, whole ones, in which the vehicle slowed down steadily."""
+    found = of_command(stops, kind, direction)
+    return [stop for stop in found if stop.is_steady and stop.is_whole]
 
 
 def fast_stops(stops: Sequence[Stop], direction: str, settings: Everything) -> list[Stop]:
@@ -185,7 +186,7 @@ def missing(stops: Sequence[Stop], settings: Everything) -> Iterator[str]:
 
 def doubts(found: Fit) -> Iterator[str]:
     """Yield what contradicts the measured stops, so that nothing may follow from them."""
-    stops = [stop for stop in found.stops if stop.kind == "stop"]
+    stops = [stop for stop in found.stops if stop.kind == "stop" and stop.is_whole]
     for stop in stops:
         if not stop.is_steady:
             yield (

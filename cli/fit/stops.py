@@ -19,7 +19,7 @@ in steps of 1 mm/s and 0.1 deg/s, counters of 1 mm and 0.1 deg.
 from bisect import bisect_left, bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 from math import isclose, isfinite, nan, radians, remainder, tau
 from statistics import linear_regression, mean
@@ -97,6 +97,7 @@ class Stop:
     points: tuple[Point, ...]  # the velocities from the command to standstill
     at_ns: int  # wall clock at the command
     braked: bool = False  # BRAKE followed the STOP before standstill
+    is_whole: bool = True  # False if the recording lacks its begin: it needed more than this
     commanded: float = nan  # speed of the last RUN
     integrated: float = nan  # m or rad, by the velocities, from the command to standstill
 
@@ -167,15 +168,17 @@ def _begins(motions: Sequence[Motion]) -> Iterator[Sequence[Motion]]:
 def _measured(streams: Streams, motions: Sequence[Motion]) -> list[Stop]:
     """Return the stop that the second of these motions commands, of each axis that moved."""
     run, command = motions[:2]
-    if run.boot != command.boot or run.seq + 1 != command.seq:
-        raise UnsuitableError("its begin is missing")  # an earlier command may have been lost
+    # An earlier command may have been lost, or the bridge's lease was over before it.
+    follows = (run.boot, run.seq + 1) == (command.boot, command.seq)
+    is_whole = follows and command.mono_ns - run.mono_ns <= LONGEST_GAP_S * NS_PER_S
     first = bisect_right(streams.velocities, command.mono_ns, key=lambda v: v.mono_ns)
     if first == 0:
         raise UnsuitableError(NO_VELOCITIES)
     twist = _steady(streams.velocities[:first])
     window = _until_standstill(streams.velocities[first - 1 :], motions[1:])
     axes = [axis for axis in (DRIVING, TURNING) if axis.runs(twist)]
-    return [_measure(streams, motions, twist, window, axis) for axis in axes]
+    stops = [_measure(streams, motions, twist, window, axis) for axis in axes]
+    return [replace(stop, is_whole=is_whole) for stop in stops]
 
 
 def _measure(
@@ -247,8 +250,8 @@ def _steady(velocities: Sequence[Velocity]) -> Twist:
     """Return the steady velocity up to the command: the mean of the last ones."""
     since_ns = velocities[-1].mono_ns - round(STEADY_S * NS_PER_S)
     recent = velocities[bisect_left(velocities, since_ns, key=lambda v: v.mono_ns) :]
-    half = (len(recent) + 1) // 2
-    earlier, later = _mean(recent[:half]), _mean(recent[half:] or recent)
+    middle = len(recent) // 2
+    earlier, later = _mean(recent[: middle + 1]), _mean(recent[middle:])
     axes = [axis for axis in (DRIVING, TURNING) if axis.runs(_mean(recent))]
     if not axes:
         raise UnsuitableError(f"slower than {DRIVING.slowest:g} m/s and {TURNING.slowest:g} rad/s")

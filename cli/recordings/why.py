@@ -31,6 +31,7 @@ from cli.settings import Everything, safety_config
 from common.cli_args import add_sources, file_path, reader_language, sources
 from common.config import load
 from common.freshness import NS_PER_S
+from common.motion import RUN, Twist
 from common.text import printable
 from services.safety.config import SafetyConfig
 from services.safety.core.policy import Policy
@@ -231,6 +232,7 @@ class View:
                         comparison.add(decided, other)
                 before = decided
             yield from self._agreement(run, agreement)
+            lines += self._last(run)
             yield from ["", "stops (since the start, and UTC):", *lines] if lines else ["no stop"]
             if variant:
                 yield from ["", *self._comparison(run, comparison)]
@@ -244,7 +246,9 @@ class View:
              if one.logged_ns(one.motions[0].mono_ns) <= log_ns),
             self.recording.runs[0],
         )  # fmt: skip
-        if chosen := self._chosen(run, log_ns, NS_PER_S if isinstance(at, str) else 0):
+        chosen = self._chosen(run, log_ns, NS_PER_S if isinstance(at, str) else 0)
+        if chosen is not None:
+            self.agrees = not chosen[0].differences
             yield from self._decision(run, *chosen)
 
     def _chosen(self, run: Run, log_ns: int, span_ns: int) -> tuple[Decided, Motion | None] | None:
@@ -282,7 +286,7 @@ class View:
         worst, when = names[0], self.recording.moment(run.logged_ns(decided.at_ns))
         command = decided.motion.command.upper()
         yield f"{when}  {command:5}  {worst}: {text.cause_text(decided, worst, self.language)}"
-        yield f"{INDENT}before: {text.motion_text(before.motion)}"
+        yield f"{INDENT}before: {text.motion_text(before.recorded)}"
         for each in text.shown_by(decided, worst, self.settings):
             yield f"{INDENT}input: {each}"
         yield f"{INDENT}rule: {text.rule(worst)}"
@@ -295,6 +299,15 @@ class View:
             yield f"{INDENT}not verified: the replay takes its state from the recording here"
         elif decided.differences:
             yield f"{INDENT}DIFFERS: recorded was {text.motion_text(decided.recorded)}"
+
+    def _last(self, run: Run) -> Iterator[str]:
+        """Yield that safety's motions end while the vehicle drives, where they do."""
+        last = run.motions[-1]
+        if last.command is RUN and not Twist(last.linear, last.angular).rounds_to_zero:
+            when = self.recording.moment(run.logged_ns(last.mono_ns))
+            yield f"{when}  the motions of safety end here, or the recording"
+            yield f"{INDENT}before: {text.motion_text(last)}"
+            yield f"{INDENT}rule: without further motions the bridge stops the vehicle"
 
     def _agreement(self, run: Run, found: Agreement) -> Iterator[str]:
         self.agrees = self.agrees and found.compared > 0 and not found.differing

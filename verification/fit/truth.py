@@ -25,7 +25,10 @@ def unsafe(found: Fit, model: Model) -> list[str]:
     if REACT not in found.proposals:
         return []
     wait_s = float(found.proposals[REACT]) + DECISION_PERIOD_S
-    delay_s = model.cable.to_board.delay + model.cable.to_board.jitter
+    line = model.cable.to_board
+    delay_s = (
+        line.delay + line.jitter if line.port == "both" else 0.0
+    )  # commands take the other one
     body, short = found.settings.vehicle, []
     for share in SPEEDS:
         for direction, sign in SPAN.items():
@@ -60,12 +63,15 @@ def truths(model: Model) -> Iterator[tuple[str, float]]:
     """Yield the names of estimates with their true values."""
     drive = model.drive
     force = 1 - drive.weak_wheel / WHEELS
+    # From the command to its effect in a velocity: dead time, both ways, and a step of the motors.
+    lines = [line for line in (model.cable.to_board, model.cable.to_pc) if line.port == "both"]
+    seen_s = drive.dead_time + sum(line.delay + line.jitter / 2 for line in lines) + STEP_S / 2
     if not drive.lag:
         for direction in SPAN:
             turns = direction in ("left", "right")
             deceleration = force * (drive.angular_coast if turns else drive.coast)
             yield f"STOP {direction}: deceleration", deceleration
-            yield f"STOP {direction}: reaction", drive.dead_time
+            yield f"STOP {direction}: reaction", seen_s
     yield "speed at standstill, bias", model.velocity.bias
     if model.sonar.saturation < model.vehicle.sonar_max:
         yield "sonars, greatest reading", model.sonar.saturation

@@ -130,6 +130,16 @@ def test_what_contradicts_the_stops_leaves_nothing_to_propose(
     assert changed(lambda _: None).missing == []
 
 
+def test_a_stop_without_its_begin_is_too_long_or_shows_nothing() -> None:
+    (made,) = measured(forward=0.7, backward=0.7, left=1.2, right=0.5).streams
+    long = len(fit([made], TODAY).too_long)
+    assert long > 0
+    made.motions[-1] = replace(made.motions[-1], seq=9)
+    found = fit([made], TODAY)
+    assert found.missing == ["1 more of STOP right from 0.40 rad/s or more"]
+    assert len(found.too_long) == long
+
+
 def test_counters_that_the_ground_contradicts_leave_nothing_to_propose() -> None:
     (made,) = measured().streams
     for ratio, proposes in ((0.5, False), (1.01, True)):

@@ -8,6 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from cli.__main__ import main
+from common.freshness import NS_PER_S
 from sim import requests as q
 from t2.codec import Sample
 from tests.cli.recordings.decision_fixture import Tap, drive, reset, written
@@ -48,6 +49,7 @@ def why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., tup
     def run(
         *words: str, samples: tuple[Sample, ...] | None = None, cut: int = 0
     ) -> tuple[int, str]:
+        (tmp_path / "a.mcap").unlink(missing_ok=True)
         file = written(tmp_path / "a.mcap", driven() if samples is None else samples)
         if cut:
             file.write_bytes(file.read_bytes()[:-cut])
@@ -198,3 +200,19 @@ def test_settings_that_the_robot_did_not_have(
     assert code == 1
     assert "first difference at 2." in shown
     assert "A recording contains no settings (name those of the robot with --config)" in shown
+    code, shown = why("--config", str(other), "--at", "2.6")
+    assert code == 1
+    assert "DIFFERS" in shown
+
+
+def test_motions_that_end_while_the_vehicle_drives(why: Callable[..., tuple[int, str]]) -> None:
+    """Safety died, or the recording ends: the bridge stops the vehicle, which no motion says."""
+    begin_ns = driven()[0].received_ns
+    samples = tuple(one for one in driven() if one.received_ns < begin_ns + 3 * NS_PER_S)
+    _, shown = why(samples=samples)
+    assert (
+        "the motions of safety end here, or the recording\n            before: RUN 0.300" in shown
+    )
+    assert "the bridge stops the vehicle" in shown
+    _, whole = why()
+    assert "the motions of safety end here" not in whole
