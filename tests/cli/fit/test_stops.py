@@ -290,9 +290,18 @@ def test_velocities_against_the_counters_show_nothing() -> None:
     assert find_stops(made) == ([], {"velocity and counters have opposite signs": 1})
 
 
+def test_counters_that_stand_are_no_contradiction() -> None:
+    made = streams()
+    made.mileages = [replace(m, distance=7.0) for m in made.mileages]
+    (stop,), _ = find_stops(made)
+    assert stop.distance == 0.0
+
+
 def test_what_was_commanded_and_integrated() -> None:
     (stop,), _ = find_stops(streams(sign=-1))
     assert stop.commanded == pytest.approx(0.8)
+    (turn,), _ = find_stops(streams(sign=-1, turns=True))
+    assert turn.commanded == pytest.approx(0.8)
     assert stop.integrated == pytest.approx(stop.distance, abs=0.01)
     assert not stop.is_curve
 
