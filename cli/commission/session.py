@@ -40,6 +40,10 @@ RESETS = 8  # in 4 s
 WINDOW = 50  # velocities: more than arrive within it
 LATE_S = 0.5  # from the end of the lease to the STOP, including a slow bus
 LATCH_S = 1.0  # from an emergency stop to its latch
+NO_STOP = (
+    "No STOP followed the end of its requests, RUN went on: an emergency stop has ended it. "
+    f"Does another program publish as `{SOURCE}`? Look at safety.sources.{SOURCE}.lease."
+)
 ESTOP = "estop"  # the cause, and the event of an operator's emergency stop
 TOPICS = (keys.LINK, keys.MOTION, keys.VELOCITY, keys.MILEAGE, keys.ULTRASONIC, keys.BUMPER,
           keys.SWITCHES, keys.DRIVER, keys.HEALTH, keys.EVENTS)  # fmt: skip
@@ -147,18 +151,15 @@ class CheckoutSession(SafetyClient):
                 return None
             problem, is_steady = self._move(it)
             ended_ns = clock.now_ns()
-            self._end(it.ending if problem is None else problem.ending, lease_s)
-            stood = self.until(lambda: self._rests(ended_ns), stop_s)
-            if not stood:
-                self._brake()
-                braked_ns = clock.now_ns()
-                self.until(lambda: self._rests(braked_ns), REST_S)
+            late = self._end(it.ending if problem is None else problem.ending, lease_s)
+            stood = self._comes_to_rest(ended_ns, stop_s)
         except KeyboardInterrupt:
             self._brake()
             self.until(lambda: ESTOP in self.latched(), LATCH_S)
             raise
         finally:
             self._let_go()
+        problem = problem or late or self._taken_over()
         return self._drive_of(it, ended_ns, stood, is_steady, problem)
 
     def observe(self, it: Manoeuvre) -> Drive:
@@ -187,6 +188,8 @@ class CheckoutSession(SafetyClient):
             return "An operator has pressed the emergency stop: find out why."
         for attempt in range(RESETS):
             seen = self.fresh_state()
+            if taken := self._taken_over():
+                return taken.text
             ids = [cause.id for cause in seen.causes if cause.name in seen.latched]
             if not own or ids != own[:1]:
                 return f"Safety has latched {', '.join(seen.latched) or 'nothing'}: find out why."
@@ -229,21 +232,48 @@ class CheckoutSession(SafetyClient):
         state = self.state
         if state is None or (state.source == SOURCE and state.verdict in ("run", "slow")):
             return None
-        if state.source not in (None, SOURCE):
-            return Problem(f"Another source drives, {state.source}: end it first.", "again", "slow")
+        if taken := self._taken_over():
+            return taken
         text = render(state.phrases, self.language, state.text)
         return Problem(f"Safety stopped it: {text}", "again", "slow")
 
-    def _end(self, ending: Ending, lease_s: float) -> None:
-        """End the motion; without STOP after the lease by an emergency stop."""
-        if ending == "stop":
+    def _taken_over(self) -> Problem | None:
+        """Return the problem of another source that drives: it is left alone."""
+        source = self.state.source if self.state else None
+        if source in (None, SOURCE):
+            return None
+        return Problem(f"Another source drives, {source}: end it first.", "again", "slow")
+
+    def _end(self, ending: Ending, lease_s: float) -> Problem | None:
+        """End the motion; without STOP after the lease by an emergency stop, and a problem."""
+        if self._taken_over():
+            self.requested = None
+        elif ending == "stop":
             self.fall_silent()
-            if not self.until(self._is_stopped, lease_s + LATE_S):
+            self.until(lambda: self._taken_over() or self._is_stopped(), lease_s + LATE_S)
+            if not self._is_stopped() and not self._taken_over():
                 self._brake()
+                return Problem(NO_STOP, "end")
         elif ending == "brake":
             self._brake()
         else:
             self.requested = request()
+        return None
+
+    def _comes_to_rest(self, ended_ns: int, stop_s: float) -> bool:
+        """Wait for standstill, which an emergency stop enforces; return whether it came in time.
+
+        Return False at once when another source drives: its vehicle is not stopped.
+        """
+        self.until(lambda: self._taken_over() or self._rests(ended_ns), stop_s)
+        if self._taken_over():
+            return False
+        stood = self._rests(ended_ns)
+        if not stood:
+            self._brake()
+            braked_ns = clock.now_ns()
+            self.until(lambda: self._taken_over() or self._rests(braked_ns), REST_S)
+        return stood
 
     def _brake(self) -> None:
         """Publish an emergency stop, at first at once, then until safety has latched it."""

@@ -219,6 +219,39 @@ def test_its_own_latch_stays_when_an_operator_has_pressed_too(
         assert it.run("BRAKE backward from 0.50 m/s")[-1] == "passed"
 
 
+def test_another_source_that_takes_over_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["", "go on"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        latched, steps_since = set[str](), 0
+
+        def take_over() -> None:
+            nonlocal steps_since
+            latched.update(it.session.latched())
+            steps_since += steps_since > 0 or it.speed > 0.3
+            if steps_since:
+                speed = 0.0 if steps_since < 12 else 0.3  # neutral first
+                teleop = it.inspector.stack.sources["teleop"]
+                teleop.message = m.Drive(echo=0, linear=speed, angular=0.0)
+
+        it.inspector.each_step = take_over
+        assert it.run("STOP forward from 0.50 m/s") == ["failed"]
+        assert it.finding.startswith("Another source drives, teleop: end it first.")
+        it.session.listen(3.0)
+        assert not latched
+        assert it.speed == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_run_that_goes_on_after_the_last_request_ends_the_drive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with driving(monkeypatch) as it:
+        monkeypatch.setattr(it.session, "fall_silent", lambda: None)
+        with pytest.raises(T2Error, match="No STOP followed the end of its requests"):
+            it.run("STOP forward from 0.50 m/s", "STOP backward from 0.50 m/s")
+        assert it.outcomes == ["failed"]
+        assert it.speed == 0
+
+
 def test_a_contact_ends_a_motion(monkeypatch: pytest.MonkeyPatch) -> None:
     answers = iter(["", "go on"])
     with driving(monkeypatch, answers=lambda _: next(answers)) as it:
