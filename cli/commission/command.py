@@ -62,8 +62,12 @@ def run(options: argparse.Namespace) -> int:
     work = partial(guided_drive, only=options.only, space_m=options.space or math.inf)
     if options.part is None:
         work = partial(run_steps, only=options.only)
-    report = checkout(loaded, work)
-    file.write_text(render(report), encoding="utf-8")
+    try:
+        report = checkout(loaded, work)
+    except BaseException:
+        file.unlink(missing_ok=True)  # it is empty
+        raise
+    write(file, render(report))
     outcome = "Passed" if report.passed else "NOT PASSED"
     print(f"\n{outcome}. The report: {shlex.quote(str(file))}", flush=True)
     return 0 if report.passed else 1
@@ -109,7 +113,7 @@ def guide(report: Report, session: CheckoutSession, work: Work) -> None:
         typed = prompt(f"To sign this off, type your name ({name}):")
         report.signed = name if typed.casefold() == name.casefold() else ""
     except KeyboardInterrupt:
-        report.aborted = "interrupted by the operator"
+        report.aborted = report.aborted or "interrupted by the operator"
     except T2Error as error:
         report.aborted = str(error)
         show(f"\nEnded early: {error}")
@@ -163,14 +167,23 @@ def settings(session: CheckoutSession) -> list[tuple[str, str, str]]:
     ]
 
 
+def write(file: Path, text: str) -> None:
+    """Write the report; print it if that fails."""
+    try:
+        file.write_text(text, encoding="utf-8")
+    except OSError as error:
+        print(text, flush=True)
+        raise ConfigError(f"--report {file}: cannot be written: {error.strerror}") from None
+
+
 def report_file(given: Path | None, robot: str) -> Path:
-    """Return the report's path; an existing file is never overwritten."""
+    """Create the report's file before the drive; an existing one is never overwritten."""
     file = given or Path("out") / f"checkout-{robot}-{time.strftime('%Y%m%d-%H%M%S')}.md"
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        exists = file.exists()
+        file.open("x").close()
+    except FileExistsError:
+        raise ConfigError(f"--report {file}: exists already; a report is not overwritten") from None
     except OSError as error:
         raise ConfigError(f"--report {file}: cannot be written: {error.strerror}") from None
-    if exists:
-        raise ConfigError(f"--report {file}: exists already; a report is not overwritten")
     return file
