@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from cli.commission.drive_verdict import (
+    Drive,
     Result,
     judge_drive,
     judge_standstill,
@@ -43,8 +44,10 @@ UNRECORDED = "without a recording"
 RECORDER_S = 3.0  # of health messages, one a second
 SWITCHES_S = 3.0
 COUNTERS_S = 2.0
+TURNED_DEG = 10.0  # from the first heading: the way back is another one
 MOTION = 3  # figures of a motion: commanded, measured, counted
 PATIENCE_S = 3.0  # for a stop, on top of what the settings reckon with
+RESET_HINT = "The next motion asks you for its reset; `t2 drive` can reset it, too."
 WARNING = (
     "The vehicle drives on the ground. Hold the vehicle's own stop switch, and keep everybody away "
     "from it.\nMark its place on the ground. Each motion is announced with the free space that it "
@@ -62,6 +65,8 @@ class GuidedDrive:
     report: Report
     settings: SafetyConfig
     fastest: Twist = field(default_factory=lambda: Twist(math.inf, math.inf))  # on each axis
+    under_way: str = ""  # title of the manoeuvre
+    space_m: float = math.inf  # free ahead and behind
     limited: str = ""  # why nothing is faster
     recorders: frozenset[int] = frozenset()  # ``boot`` of those that write everything
     unrecorded: bool = False  # whether the operator drives without a recording
@@ -77,7 +82,32 @@ class GuidedDrive:
             raise T2Error("not confirmed: no motion was requested")
 
     def run(self, manoeuvres: Sequence[Manoeuvre], *, returns: bool) -> None:
-        """Carry out the manoeuvres, and drive back to the beginning."""
+        """Carry out the manoeuvres, and drive back to the beginning.
+
+        Ctrl-C is an emergency stop at any moment, in a question too.
+        """
+        try:
+            self._run(manoeuvres, returns=returns)
+        except KeyboardInterrupt:
+            self._interrupted()
+            raise
+
+    def _interrupted(self) -> None:
+        """Publish an emergency stop, and report whether safety has latched it."""
+        is_latched = self.session.emergency_stop()
+        latched = ", ".join(self.session.latched()) or "nothing"
+        text = f"interrupted by the operator, by an emergency stop; safety has latched: {latched}"
+        hint = "Reset it with `t2 drive`."
+        if not is_latched:
+            text += "; the emergency stop is NOT CONFIRMED"
+            hint = "Stop the vehicle with its own switch."
+        self.report.aborted = text
+        if self.under_way:
+            verdict = Verdict("failed", f"Ended: {text}.")
+            self.report.manoeuvres.append((self.under_way, verdict))
+        show(f"\nEnded: {text}. {hint}")
+
+    def _run(self, manoeuvres: Sequence[Manoeuvre], *, returns: bool) -> None:
         start = self._counters()
         total = len(manoeuvres) + returns
         numbered = enumerate(manoeuvres, 1)
@@ -99,7 +129,9 @@ class GuidedDrive:
             show(f"{number} {it.title}: left out, {self.limited}")
         else:
             show(f"\n{number} {it.title}\n{announcement(it)}")
+            self.under_way = it.title
             result = self._with_operator(it)
+            self.under_way = ""
         self.report.manoeuvres.append((it.title, result.verdict))
         if result.verdict.outcome == "failed" and result.then == "end":
             raise T2Error(f"{it.title}: {result.verdict.text}")
@@ -112,13 +144,7 @@ class GuidedDrive:
         if reason := choice("Press Enter to begin, or type a reason to skip:"):
             return Result(Verdict("skipped", reason))
         while True:
-            try:
-                result = self._attempt(it)
-            except KeyboardInterrupt:
-                text = "Interrupted by the operator, by an emergency stop that is still latched."
-                show(f"\n{text} Reset it with `t2 drive`.")
-                self.report.manoeuvres.append((it.title, Verdict("failed", text)))
-                raise
+            result = self._attempt(it)
             show(f"{result.verdict.outcome}: {result.verdict.text}{_figures(result.verdict)}")
             if result.verdict.outcome == "passed" or result.then != "again":
                 return result
@@ -141,12 +167,20 @@ class GuidedDrive:
         if drive is None:
             why = reported(self.session)
             return Result(Verdict("failed", f"Safety does not grant motion. It reports: {why}"))
-        result, latched = judge_drive(drive, self.settings), self.session.reset_own_stop()
+        result, latched = judge_drive(drive, self.settings), self._latch_after(drive)
         if not latched:
             return result
         before = f"{result.verdict.text} " if result.verdict.outcome == "failed" else ""
-        text = f"{before}Its own emergency stop stays latched. {latched}"
+        text = f"{before}The emergency stop stays latched. {latched} {RESET_HINT}"
         return Result(Verdict("failed", text, result.verdict.data), result.then)
+
+    def _latch_after(self, drive: Drive) -> str:
+        """Reset the emergency stop of a planned BRAKE; return why one stays latched, or nothing."""
+        if not self.session.has_braked:
+            return ""
+        if drive.problem is None and drive.stood and drive.manoeuvre.ending == "brake":
+            return self.session.reset_own_stop()
+        return "It was not planned: find out why."
 
     def _limit(self, it: Manoeuvre) -> None:
         """Leave out everything that is faster than this motion on its axes."""
@@ -160,10 +194,21 @@ class GuidedDrive:
             show("\nThe counters have started again, so the way back is unknown.")
             return None
         travelled = end.distance - start.distance
+        turned = abs(math.remainder(end.heading - start.heading, math.tau))
         back = homing(travelled, self.settings)
+        where = f"By its counters it stands {abs(travelled):.2f} m from where it began"
+        reason = ""
         if back is None:
-            show(f"\nBy its counters it stands {abs(travelled):.2f} m from where it began.")
-        return back
+            show(f"\n{where}.")
+        elif turned > math.radians(TURNED_DEG):
+            reason = f"turned by {math.degrees(turned):.0f} degrees"
+        elif back.ahead > self.space_m:
+            reason = f"its way back needs {back.ahead:.1f} m"
+        if not reason:
+            return back
+        show(f"\n{where}, {reason}: the return is left out. Drive it back with `t2 drive`.")
+        self.report.left_out = [*self.report.left_out, f"the return ({reason})"]
+        return None
 
     # --- conditions to begin --------------------------------------------------------------------
 
@@ -203,10 +248,12 @@ class GuidedDrive:
                 raise T2Error(problem)
 
     def _is_recorded(self) -> bool:
-        """Return whether one of the recorders is still running."""
+        """Return whether one of the recorders writes from now on."""
+        self.session.mark()
         health = self.session.of(keys.HEALTH)
         return self.unrecorded or self.session.until(
-            lambda: any(one.value.boot in self.recorders for one in health), RECORDER_S
+            lambda: not self.recorders.isdisjoint(writing_recorders(one.value for one in health)),
+            RECORDER_S,
         )
 
     def _counters(self) -> Mileage:
@@ -226,7 +273,7 @@ def guided_drive(
     manoeuvres = [it for it in wanted if it.ahead <= space_m]
     if left_out := len(plan(settings)) - len(manoeuvres):
         report.left_out = [f"{left_out} manoeuvres by --only or --space"]
-    drive = GuidedDrive(session, report, settings)
+    drive = GuidedDrive(session, report, settings, space_m=space_m)
     drive.begin()
     drive.run(manoeuvres, returns=not only or "return" in only)
 

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from statistics import mean
 from typing import Any, TypeVar
 
@@ -13,7 +13,7 @@ from cli.commission.latches import Reset
 from cli.commission.manoeuvres import Ending, Manoeuvre
 from cli.commission.motion import too_fast
 from cli.commission.supervision import Problem, Supervision
-from cli.inspect.addressing import decode, topic_of
+from cli.inspect.addressing import chunks, decode, topic_of
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import decoded
 from common import clock
@@ -39,11 +39,13 @@ RESTING_S = 0.5  # of standstill after a manoeuvre, in which the counters settle
 RESETS = 8  # in 4 s
 WINDOW = 50  # velocities: more than arrive within it
 LATE_S = 0.5  # from the end of the lease to the STOP, including a slow bus
+LOST_S = 0.3  # without velocities or counters a motion is not supervised
 LATCH_S = 1.0  # from an emergency stop to its latch
 NO_STOP = (
     "No STOP followed the end of its requests, RUN went on: an emergency stop has ended it. "
     f"Does another program publish as `{SOURCE}`? Look at safety.sources.{SOURCE}.lease."
 )
+PRESSED = "Another emergency stop has arrived, as of an operator: find out why."
 ESTOP = "estop"  # the cause, and the event of an operator's emergency stop
 TOPICS = (keys.LINK, keys.MOTION, keys.VELOCITY, keys.MILEAGE, keys.ULTRASONIC, keys.BUMPER,
           keys.SWITCHES, keys.DRIVER, keys.HEALTH, keys.EVENTS)  # fmt: skip
@@ -59,9 +61,27 @@ class CheckoutSession(SafetyClient):
         super().__init__(opened, robot, SOURCE, language)
         self._marked_ns = 0
         self._braked_ns = 0  # when this manoeuvre's emergency stop was published; 0 without one
+        self._ordered = self._seen = 0  # emergency stops published here, and received from anybody
         self._log: defaultdict[str, list[Any]] = defaultdict(list)
         for topic in TOPICS:
             opened.listen(topic.on(robot, side="*", service="*"))
+        opened.listen(keys.estop_key(robot))
+
+    @property
+    def has_braked(self) -> bool:
+        """Whether the last manoeuvre published an emergency stop."""
+        return self._braked_ns > 0
+
+    def order_stop(self, robot: str) -> None:
+        """Publish an emergency stop once, and count it."""
+        self._ordered += 1
+        super().order_stop(robot)
+
+    def forget(self) -> None:
+        """Discard what has arrived, but count the emergency stops in it."""
+        for sample in self.inspector.queued():
+            self._count(sample)
+        super().forget()
 
     def mark(self) -> int:
         """Discard everything received until now, queued messages too; return the time."""
@@ -77,6 +97,7 @@ class CheckoutSession(SafetyClient):
 
     def receive(self, sample: Sample) -> None:
         """Log one message of the bus."""
+        self._count(sample)
         super().receive(sample)
         topic = topic_of(sample.key)
         if topic is None or sample.received_ns < self._marked_ns:
@@ -86,6 +107,10 @@ class CheckoutSession(SafetyClient):
         except MessageError:
             return
         self._log[topic.path].append(Latest(message, sample.received_ns))
+
+    def _count(self, sample: Sample) -> None:
+        # Any PUT or DELETE counts; nothing in it shows who has sent it.
+        self._seen += chunks(sample.key)[1] == keys.ESTOP_PATH
 
     def listen(self, seconds: float) -> None:
         """Receive for a time."""
@@ -142,10 +167,10 @@ class CheckoutSession(SafetyClient):
         """Carry out a manoeuvre, from standstill to standstill, under supervision.
 
         ``lease_s`` is that of the checkout, ``stop_s`` the longest stop from its command on.
-        Ctrl-C is an emergency stop. Return None if safety did not grant motion.
+        Ctrl-C publishes an emergency stop. Return None if safety did not grant motion.
         """
         self.mark()
-        self._braked_ns = 0
+        self._braked_ns = self._ordered = self._seen = 0
         try:
             if not self._becomes_ready():
                 return None
@@ -155,7 +180,6 @@ class CheckoutSession(SafetyClient):
             stood = self._comes_to_rest(ended_ns, stop_s)
         except KeyboardInterrupt:
             self._brake()
-            self.until(lambda: ESTOP in self.latched(), LATCH_S)
             raise
         finally:
             self._let_go()
@@ -172,10 +196,8 @@ class CheckoutSession(SafetyClient):
         """Reset the emergency stop of the last manoeuvre, and no other cause.
 
         Return why it stays latched, or an empty string. An operator may have pressed an emergency
-        stop, too: safety has one latch for both, so theirs shows in its event.
+        stop, too: safety has one latch for both. Theirs shows in the number of emergency stops.
         """
-        if not self._braked_ns:
-            return ""
         own = [
             cause.id
             for state in self.of(keys.SAFETY)
@@ -185,19 +207,40 @@ class CheckoutSession(SafetyClient):
         ]
         events = (event.value for event in self.of(keys.EVENTS))
         if any(event.name == ESTOP and "by" in event.about for event in events):
-            return "An operator has pressed the emergency stop: find out why."
+            return PRESSED
         for attempt in range(RESETS):
             seen = self.fresh_state()
-            if taken := self._taken_over():
-                return taken.text
-            ids = [cause.id for cause in seen.causes if cause.name in seen.latched]
-            if not own or ids != own[:1]:
-                return f"Safety has latched {', '.join(seen.latched) or 'nothing'}: find out why."
+            if problem := self._not_own(seen, own[:1]):
+                return problem
             done = self.reset(seen)
             if done.granted or attempt == RESETS - 1:
                 break
             self.listen(RESTING_S)  # safety refuses it while noise looks like motion
+        if done.granted and self._seen > self._ordered:  # pressed during the reset
+            self.emergency_stop()
+            return PRESSED
         return "" if done.granted and not done.latched else f"The reset failed: {done.text}"
+
+    def _not_own(self, seen: SafetyState, own: list[int]) -> str:
+        """Return why what is latched is not, or not only, its own emergency stop."""
+        if taken := self._taken_over():
+            return taken.text
+        self.until(lambda: self._seen >= self._ordered, LATCH_S)
+        if self._seen > self._ordered:
+            return PRESSED
+        if self._seen < self._ordered:
+            return "Its own emergency stops are not received back: another one would not be either."
+        if not own or [cause.id for cause in seen.causes if cause.name in seen.latched] != own:
+            return f"Safety has latched {', '.join(seen.latched) or 'nothing'}: find out why."
+        return ""
+
+    def emergency_stop(self) -> bool:
+        """Publish an emergency stop; return whether safety shows it as latched within a second."""
+        self._brake()
+        with suppress(KeyboardInterrupt):  # another Ctrl-C
+            self.forget()
+            self.until(lambda: ESTOP in self.latched(), LATCH_S)
+        return ESTOP in self.latched()
 
     def _becomes_ready(self) -> bool:
         """Request zero until safety grants motion; return whether it does, with no latch."""
@@ -210,13 +253,13 @@ class CheckoutSession(SafetyClient):
 
         Return what contradicts it, if anything does, and whether it reached a steady speed.
         """
-        supervision = Supervision(it)
+        supervision, began_ns = Supervision(it), clock.now_ns()
         logs = self.of(keys.MOTION), self.of(keys.VELOCITY), self.of(keys.MILEAGE)
         found: list[Problem] = []
 
         def is_over() -> bool:
-            if interference := self._interference():
-                found.append(interference)
+            if problem := self._interference() or self._lost(began_ns):
+                found.append(problem)
             elif supervision.take(*logs):
                 if problem := supervision.problem():
                     found.append(problem)
@@ -236,6 +279,18 @@ class CheckoutSession(SafetyClient):
             return taken
         text = render(state.phrases, self.language, state.text)
         return Problem(f"Safety stopped it: {text}", "again", "slow")
+
+    def _lost(self, began_ns: int) -> Problem | None:
+        """Return the problem of velocities or counters that no longer arrive here."""
+        for name, log in (
+            ("velocity", self.of(keys.VELOCITY)),
+            ("counters", self.of(keys.MILEAGE)),
+        ):
+            newest_ns = max(log[-1].received_ns, began_ns) if log else began_ns
+            if clock.now_ns() - newest_ns > LOST_S * NS_PER_S:
+                text = f"Nothing is received of the {name} for {LOST_S:g} s while it moves: run"
+                return Problem(f"{text} `t2 checkout --only link`.", "again")
+        return None
 
     def _taken_over(self) -> Problem | None:
         """Return the problem of another source that drives: it is left alone."""

@@ -1,5 +1,6 @@
 """The guided drive on the shipped services and the simulated vehicle, in simulated time."""
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,14 +18,14 @@ from cli.commission.steps import GROUND_PHRASE, RESET_PHRASE
 from cli.fit.stops import find_stops
 from cli.fit.streams import Streams
 from common.config import build
-from common.freshness import NS_PER_S
+from common.freshness import NS_PER_S, Latest
 from services.safety.config import SafetyConfig
 from sim.model import Drive, Model
 from sim.requests import Bumper
 from t2 import keys
 from t2 import messages as m
 from t2.errors import T2Error
-from tests.cli.commission.simulated_session import SimulatedInspector, simulated_session
+from tests.cli.commission.simulated_session import STEP_MS, SimulatedInspector, simulated_session
 
 SKIPPED = "no room there"
 
@@ -180,7 +181,9 @@ def test_a_contradiction_stops_the_vehicle_and_ends_the_drive(
         assert it.outcomes == ["failed"]
         assert text in it.finding
         assert it.speed == 0
-        assert not it.session.latched()  # its own emergency stop
+        assert it.session.fresh_state().latched == ("estop",)  # not planned: an operator resets it
+        assert "The emergency stop stays latched. It was not planned" in it.finding
+        assert "`t2 drive` can reset it" in it.finding
 
 
 def test_an_emergency_stop_of_an_operator_is_not_reset(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -200,23 +203,63 @@ def press(it: Fixture) -> None:
     stack.estop()
 
 
+def unnamed(it: Fixture) -> None:
+    """Press an emergency stop that no event reports, as a program with Zenoh alone does."""
+    it.inspector.stack.estop()
+
+
+@pytest.mark.parametrize("stop", [press, unnamed])
+@pytest.mark.parametrize("after_ms", [0, 20, 50, 200, 400])
 def test_its_own_latch_stays_when_an_operator_has_pressed_too(
-    monkeypatch: pytest.MonkeyPatch,
+    after_ms: int, stop: Callable[[Fixture], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answers = iter(["", "go on", "", RESET_PHRASE])
     with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        waited_ms = 0
 
         def once_latched() -> None:
+            nonlocal waited_ms
             if it.session.latched() == ("estop",):
-                it.inspector.each_step = lambda: None
-                press(it)
+                waited_ms += STEP_MS
+                if waited_ms > after_ms:
+                    it.inspector.each_step = lambda: None
+                    stop(it)
 
         it.inspector.each_step = once_latched
         assert it.run("BRAKE forward from 0.50 m/s") == ["failed"]
-        assert "Its own emergency stop stays latched. An operator has pressed the" in it.finding
+        assert "The emergency stop stays latched. Another emergency stop has" in it.finding
         assert it.session.fresh_state().latched == ("estop",)
         # The next manoeuvre asks for the reset.
         assert it.run("BRAKE backward from 0.50 m/s")[-1] == "passed"
+
+
+def test_its_own_latch_stays_when_emergency_stops_are_not_received(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answers = iter(["", "go on"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        monkeypatch.setattr(it.session, "_count", lambda sample: None)
+        assert it.run("BRAKE forward from 0.50 m/s") == ["failed"]
+        assert "Its own emergency stops are not received back" in it.finding
+        assert it.session.fresh_state().latched == ("estop",)
+
+
+def test_another_source_ends_the_attempts_to_reset(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["", "go on"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        real = it.session.fresh_state
+
+        def of_teleop() -> m.SafetyState:
+            braked = it.session.has_braked
+            it.session.states["001"] = state = replace(
+                real(), source="teleop" if braked else "checkout"
+            )
+            return state
+
+        monkeypatch.setattr(it.session, "fresh_state", of_teleop)
+        assert it.run("BRAKE forward from 0.50 m/s") == ["failed"]
+        assert "stays latched. Another source drives, teleop" in it.finding
+        assert real().latched == ("estop",)
 
 
 def test_another_source_that_takes_over_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,6 +293,7 @@ def test_a_run_that_goes_on_after_the_last_request_ends_the_drive(
             it.run("STOP forward from 0.50 m/s", "STOP backward from 0.50 m/s")
         assert it.outcomes == ["failed"]
         assert it.speed == 0
+        assert it.session.fresh_state().latched == ("estop",)
 
 
 def test_a_contact_ends_a_motion(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -261,18 +305,165 @@ def test_a_contact_ends_a_motion(monkeypatch: pytest.MonkeyPatch) -> None:
         assert it.session.fresh_state().latched == ("contact",)
 
 
-def test_ctrl_c_is_an_emergency_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt() -> None:
-        raise KeyboardInterrupt
+def interrupt(*_: object) -> None:
+    raise KeyboardInterrupt
 
+
+def while_it_moves(it: Fixture) -> None:
+    it.when(0.3, interrupt)
+
+
+def at_standstill(it: Fixture) -> None:
+    begin_ns = it.inspector.stack.net.now_ns
+
+    def each_step() -> None:
+        if it.inspector.stack.net.now_ns > begin_ns + 5 * NS_PER_S:
+            it.inspector.each_step = lambda: None
+            interrupt()
+
+    it.inspector.each_step = each_step
+
+
+def at_the_first_question(it: Fixture) -> None:
+    it.operator.answers = interrupt  # type: ignore[assignment]
+
+
+def at_the_second_question(it: Fixture) -> None:
+    questions: list[str] = []
+
+    def answer(question: str) -> str:
+        questions.append(question)
+        if len(questions) == 2:
+            interrupt()
+        return ""
+
+    it.operator.answers = answer
+
+
+def after_the_motion(it: Fixture) -> None:
+    it.session._let_go = interrupt  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize(
+    ("moment", "titles", "outcomes"),
+    [
+        (while_it_moves, ("STOP forward from 0.50 m/s",), ["failed"]),
+        (at_standstill, ("Standstill",), ["failed"]),
+        (at_the_first_question, ("STOP forward from 0.50 m/s",), ["failed"]),
+        (
+            at_the_second_question,
+            ("STOP forward from 0.20 m/s", "STOP backward from 0.20 m/s"),
+            ["passed", "failed"],
+        ),
+        (after_the_motion, ("STOP forward from 0.50 m/s",), ["failed"]),
+    ],
+)
+def test_ctrl_c_is_an_emergency_stop_at_any_moment(
+    moment: Callable[[Fixture], None],
+    titles: tuple[str, ...],
+    outcomes: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     with driving(monkeypatch) as it:
-        it.when(0.3, interrupt)
+        moment(it)
+        with pytest.raises(KeyboardInterrupt):
+            it.run(*titles)
+        it.session.listen(0.5)
+        assert it.speed == 0
+        assert it.session.fresh_state().latched == ("estop",)
+        assert it.outcomes == outcomes
+        assert "safety has latched: estop" in it.finding
+        assert it.drive.report.aborted.endswith("safety has latched: estop")
+        assert "Reset it with `t2 drive`." in it.operator.text
+
+
+def test_an_emergency_stop_that_is_not_latched_is_reported_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with driving(monkeypatch) as it:
+        monkeypatch.setattr(it.session, "order_stop", lambda robot: None)
+        at_the_first_question(it)
         with pytest.raises(KeyboardInterrupt):
             it.run("STOP forward from 0.50 m/s")
-        assert it.speed == 0
-        assert it.session.latched() == ("estop",)
-        assert it.finding.startswith("Interrupted by the operator")
-        assert "Reset it with `t2 drive`." in it.operator.text
+        assert "latched: nothing; the emergency stop is NOT CONFIRMED." in it.finding
+        assert "Stop the vehicle with its own switch." in it.operator.text
+
+
+@pytest.mark.parametrize(
+    ("lost", "name"), [(("velocity", "mileage"), "counters"), (("velocity",), "velocity")]
+)
+def test_a_motion_without_measurements_is_braked(
+    lost: tuple[str, ...], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = iter(["", "go on"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        real, begin = it.session.receive, it.inspector.stack.vehicle.truth
+
+        def lose() -> None:
+            it.session.receive = (  # type: ignore[method-assign]
+                lambda sample: None if sample.key.endswith(lost) else real(sample)
+            )
+
+        it.when(0.05, lose)
+        assert it.run("STOP forward from 0.80 m/s") == ["failed"]
+        assert it.finding.startswith(f"Nothing is received of the {name} for 0.3 s while it mov")
+        assert it.session.fresh_state().latched == ("estop",)
+        end = it.inspector.stack.vehicle.truth
+        assert math.dist((begin.x, begin.y), (end.x, end.y)) < 0.4
+
+
+@pytest.mark.parametrize(
+    ("space_m", "turned", "outcome", "text"),
+    [
+        (math.inf, 0.0, "passed", ""),
+        (0.8, 0.0, "", "its way back needs "),
+        (math.inf, math.radians(11), "", "turned by 11 degrees: the return is left out."),
+        (math.inf, math.radians(9), "passed", ""),
+    ],
+)
+def test_the_return_needs_space_and_the_first_heading(
+    space_m: float, turned: float, outcome: str, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with driving(monkeypatch) as it:
+        it.drive.space_m = space_m
+        real, given = it.drive._counters, iter([0.0, turned])
+        monkeypatch.setattr(
+            GuidedDrive,
+            "_counters",
+            lambda _: replace(now := real(), heading=now.heading + next(given)),
+        )
+        assert it.run("STOP forward from 0.50 m/s", returns=True)[1:] == [outcome] * bool(outcome)
+        assert text in it.operator.text
+        assert bool(it.drive.report.left_out) is bool(text)
+
+
+@pytest.mark.parametrize(
+    ("counts", "is_recorded"),
+    [((5, 5, 5), False), ((5, 9, 14), True), ((), False)],
+)
+def test_a_recorder_must_go_on_writing(
+    counts: tuple[int, ...], is_recorded: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with driving(monkeypatch) as it:
+        it.drive.unrecorded, it.drive.recorders = False, frozenset({it.inspector.process.boot})
+        one = m.Health(
+            service="recorder", version="", uptime=1.0, rates={}, counters={}, lateness=0.0, rss=0,
+            boot=it.inspector.process.boot,
+        )  # fmt: skip
+        for recorded_ in (1, 2):  # before
+            it.session.of(keys.HEALTH).append(
+                Latest(replace(one, counters={"recorded": recorded_}), 0)
+            )
+        left, begin_ns = list(counts), it.inspector.stack.net.now_ns
+
+        def each_step() -> None:
+            waited_ns = it.inspector.stack.net.now_ns - begin_ns
+            if left and waited_ns > (len(counts) - len(left) + 0.5) * 0.9 * NS_PER_S:
+                beat = replace(one, counters={"recorded": left.pop(0)})
+                it.inspector.process.post(keys.HEALTH.on("001", service="recorder"), beat)
+
+        it.inspector.each_step = each_step
+        assert it.drive._is_recorded() is is_recorded
 
 
 def test_skipped_and_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
