@@ -287,7 +287,8 @@ def test_another_source_that_takes_over_is_left_alone(monkeypatch: pytest.Monkey
 def test_a_run_that_goes_on_after_the_last_request_ends_the_drive(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    with driving(monkeypatch) as it:
+    answers = iter(["", "go on", "no"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
         monkeypatch.setattr(it.session, "fall_silent", lambda: None)
         with pytest.raises(T2Error, match="No STOP followed the end of its requests"):
             it.run("STOP forward from 0.50 m/s", "STOP backward from 0.50 m/s")
