@@ -25,7 +25,7 @@ from math import isclose, isfinite, nan, radians, remainder, tau
 from statistics import linear_regression, mean
 from typing import Literal
 
-from cli.fit.streams import Streams
+from cli.fit.streams import Streams, between
 from common.freshness import NS_PER_S
 from common.motion import STANDING_MPS, STANDING_RADPS, Twist
 from t2.messages import Command, Mileage, Motion, Velocity
@@ -98,7 +98,7 @@ class Stop:
     at_ns: int  # wall clock at the command
     braked: bool = False  # BRAKE followed the STOP before standstill
     is_whole: bool = True  # False if the recording lacks its begin: it needed more than this
-    commanded: float = nan  # speed of the last RUN
+    commanded: float = nan  # greatest speed in the 0.2 s before, in which the speed was measured
     integrated: float = nan  # m or rad, by the velocities, from the command to standstill
 
     @property
@@ -207,10 +207,12 @@ def _measure(
     if distance < -AGAINST:
         raise UnsuitableError("velocity and counters have opposite signs")
     reaction, deceleration = slope(points, speed, axis.standing)
+    since_ns = min(run.mono_ns, command.mono_ns - round(STEADY_S * NS_PER_S))
+    before = between(streams.motions, since_ns, run.mono_ns)
     return Stop(
         axis=axis, kind=kind, direction=axis.directions[sign], speed=speed, twist=twist,
         reaction=reaction, deceleration=deceleration, distance=abs(distance),
-        commanded=sign * axis.speed(Twist(run.linear, run.angular)),
+        commanded=max(sign * axis.speed(Twist(each.linear, each.angular)) for each in before),
         integrated=_integrated(window, command.mono_ns, sign, axis),
         points=tuple(points), at_ns=command.t_ns, braked=braked,
     )  # fmt: skip

@@ -290,6 +290,17 @@ def test_velocities_against_the_counters_show_nothing() -> None:
     assert find_stops(made) == ([], {"velocity and counters have opposite signs": 1})
 
 
+@pytest.mark.parametrize(("before_s", "commanded"), [(0.2, 0.9), (0.201, 0.5)])
+def test_a_vehicle_that_was_being_slowed_down_obeyed(before_s: float, commanded: float) -> None:
+    """Safety commands less from one motion to the next: the speed is of the 0.2 s before."""
+    made = streams()
+    made.motions[0] = replace(made.motions[0], linear=0.5)
+    earlier = Motion(command=Command.RUN, linear=0.9, boot=6)
+    made.motions.insert(0, at(earlier, -before_s))  # type: ignore[arg-type]
+    (stop,), _ = find_stops(made)
+    assert stop.commanded == pytest.approx(commanded)
+
+
 def test_counters_that_stand_are_no_contradiction() -> None:
     made = streams()
     made.mileages = [replace(m, distance=7.0) for m in made.mileages]
