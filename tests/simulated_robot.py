@@ -90,6 +90,10 @@ class SimulatedTime:
         self._turns.append(turn)
         return turn
 
+    def reorder(self, step: int) -> None:
+        """Keep the order of the threads that wait (1), or reverse it (-1)."""
+        self._turns = self._turns[::step]
+
     def grant(self) -> None:
         """Grant the next turn."""
         while True:
@@ -161,7 +165,13 @@ class SimulatedStack(Stack):
     def __init__(self, world: str = "office") -> None:
         super().__init__(plan=load_plan(world, Vehicle()), step_ns=TICK_MS * MS)
         self.clock = SimulatedTime(self)
+        self.library = self.process("sdk")
         self.answers: list[bool] = []  # to resets
+
+    def suspend(self, duration_ms: int) -> None:
+        """Suspend the library's program, when a thread of it calls this."""
+        self.library.stall(duration_ms)
+        self.run(duration_ms)  # no other thread has its turn
 
     def start(self, target: Callable[[], object]) -> SimulatedThread:
         """Start a thread."""
@@ -190,7 +200,7 @@ class SimulatedSession:
 
     def __init__(self, stack: SimulatedStack) -> None:
         self._stack = stack
-        self._process = stack.process("sdk")
+        self._process = stack.library
 
     def declare_subscriber(self, key: str, handler: Callable[[Any], None]) -> object:
         def take(envelope: Envelope) -> None:

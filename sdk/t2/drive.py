@@ -351,6 +351,7 @@ class Drive:
         with stream.reading() as queue:
             while True:
                 pose = stream.after(queue, 1.0)
+                self._check_pause(self._target)  # after one, everything seems silent
                 self._end_cancelled()
                 self.check()
                 if pose is None:
@@ -404,7 +405,8 @@ class Drive:
 
     def _tick(self) -> None:
         cancelled, target = self._cancelled, self._target
-        self._note_pause(target)
+        self._check_pause(target)
+        self._ticked_s = now_s()
         is_over = now_s() >= target.end_s
         # A motion that is held up requests zero, and a stop ends it all the same.
         if cancelled or (is_over and not self._motion.locked()):
@@ -417,10 +419,10 @@ class Drive:
         self._publisher.tick(request(target.linear, target.angular))
         self._sent += 1
 
-    def _note_pause(self, target: Target) -> None:
+    def _check_pause(self, target: Target) -> None:
         """End the drive when this program was held up while it moved the vehicle."""
-        before_s, self._ticked_s = self._ticked_s, now_s()
-        held_s = self._ticked_s - before_s
+        before_s = self._ticked_s
+        held_s = now_s() - before_s
         moved = self._motion.locked() or (target.moves and target.end_s > before_s)
         if moved and held_s > HELD_S:
             self._error = self._error or Late(

@@ -262,6 +262,21 @@ def test_requests_that_arrive_too_late_are_named(
         robot.drive("nav").__enter__()
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_suspended_program_is_told_so_whichever_thread_wakes_first(
+    robot: t2.Robot, stack: SimulatedStack, order: int
+) -> None:
+    def suspend() -> None:
+        await_motion(robot, 0.02)
+        stack.suspend(1500)  # longer than HELD_S
+        stack.clock.reorder(order)
+
+    suspending = stack.start(suspend)
+    with pytest.raises(t2.Late, match="this program was held up for"), robot.drive("nav") as drive:
+        drive.forward(5.0, speed=0.05)
+    suspending.join()
+
+
 def test_a_pose_that_is_set_ends_a_motion(robot: t2.Robot, stack: SimulatedStack) -> None:
     def set_pose() -> None:
         await_motion(robot, 0.02)
