@@ -9,6 +9,7 @@ from common.cli_args import add_sources, sources
 from common.config import flatten, load
 from common.errors import ConfigError
 from services.dashboard.config import Dashboard
+from services.localization.config import Localization
 from services.metrics.config import Metrics
 from services.odom.config import Odom
 from services.recorder.config import Recorder
@@ -26,6 +27,7 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     vehicle: settings.Vehicle = settings.Vehicle()
     safety: Safety = Safety()
     odom: Odom = Odom()
+    localization: Localization = Localization()
     teleop: Teleop = Teleop()
     dashboard: Dashboard = Dashboard()
     recorder: Recorder = Recorder()

@@ -42,7 +42,7 @@ QUOTES = tuple("\"'\u2018\u2019\u201c\u201d\u201e\u00ab")
 # Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
     "robot", "host", "bus", "board", "wire", "log", "vehicle",
-    "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
+    "safety", "odom", "localization", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
 )  # fmt: skip
 
 

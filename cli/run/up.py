@@ -91,6 +91,7 @@ def everything(options: argparse.Namespace) -> Commands:
         del made["router"]
     if options.no_sim:
         del made["sim"]
+    made["localization"] = command("services.localization", *passed)
     if find_spec("mcap"):
         made["recorder"] = command("services.recorder", *passed)
     if options.ros2:

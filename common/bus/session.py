@@ -22,7 +22,7 @@ from common.log import Logger
 from common.loop import Post
 from common.settings import BusSettings, is_encrypted
 from t2.errors import LinkError
-from t2.keys import FAST, MOTION, TOPICS
+from t2.keys import FAST, FIX, MOTION, TOPICS
 from t2.text_file import pem_problem
 
 RETRY_PERIOD_S = 0.5  # between two attempts to connect
@@ -314,9 +314,9 @@ def downsampling_rules(robot: str, rate_hz: float) -> list[dict[str, Any]]:
     """Return the rules that limit each stream of a robot to ``rate_hz`` on a laptop's link.
 
     The state, events, answers and everything *from* laptops are not limited. Zenoh applies a limit
-    per rule, not per key: a rule is for one robot.
+    per rule, not per key: a rule is for one robot, and for no topic with several sources.
     """
-    streams = [topic for topic in TOPICS if topic.service is FAST or topic is MOTION]
+    streams = [it for it in TOPICS if it is MOTION or (it.service is FAST and it is not FIX)]
     rules: list[dict[str, Any]] = []
     for topic in streams:
         if topic.rate_hz > rate_hz:

@@ -463,6 +463,80 @@ PHRASES: dict[str, Words] = {
         "Pose set to x {x:.3f} m, y {y:.3f} m, {heading:.3f} rad.",
         "位姿已设置：x {x:.3f} m，y {y:.3f} m，{heading:.3f} rad。",
     ),
+    # where the vehicle is in the map
+    "map.placed": (
+        "The position is known to {sigma:.2f} m and {degrees:.0f} degrees (standard deviations).",
+        "位置已知，标准差为 {sigma:.2f} m 和 {degrees:.0f} 度。",
+    ),
+    "map.unplaced": (
+        "The position is not known: place the vehicle (`t2 call localization/place`).",
+        "位置未知：请设定车辆位置（`t2 call localization/place`）。",
+    ),
+    "map.restart": (
+        "Odometry began anew, and the position is not known any more: place the vehicle "
+        "(`t2 call localization/place`).",
+        "里程计已重新开始，位置不再可知：请重新设定车辆位置（`t2 call localization/place`）。",
+    ),
+    "map.uncertain": (
+        "The position is lost: it is known only to {sigma:.2f} m and {degrees:.0f} degrees. Place "
+        "the vehicle (`t2 call localization/place`), or wait for a fix.",
+        "位置已丢失：标准差达 {sigma:.2f} m 和 {degrees:.0f} 度。请设定车辆位置"
+        "（`t2 call localization/place`），或等待定位修正。",
+    ),
+    "map.contradicted": (
+        "The position is lost: {count} fixes of {source} in a row contradict it, and agree with "
+        "each other. Find out which one is wrong, and place the vehicle "
+        "(`t2 call localization/place`).",
+        "位置已丢失：{source} 连续 {count} 次定位修正与其矛盾，且彼此一致。请查明何者有误，并设定车辆位置"
+        "（`t2 call localization/place`）。",
+    ),
+    "fix.unknown_odometry": (
+        "It names an odometry message that is older than 2 s, or of another start of odometry.",
+        "所指的里程计消息早于 2 s，或属于里程计的另一次启动。",
+    ),
+    "fix.covariance": (
+        "Its covariance is not positive definite.", "其协方差矩阵不是正定的。",
+    ),
+    "fix.repeated": (
+        "It names no newer odometry message than the fix before.",
+        "所指的里程计消息不比上一次定位修正新。",
+    ),
+    "fix.frozen": (
+        "It repeats the last pose although the vehicle has moved.",
+        "车辆已移动，但其位姿与上一次相同。",
+    ),
+    "fix.unplaced": (
+        "The vehicle is not placed, and the settings do not let this source place it.",
+        "车辆位置未设定，且设置不允许该来源设定位置。",
+    ),
+    "fix.no_heading": (
+        "The vehicle is not placed, and a fix without a heading cannot place it.",
+        "车辆位置未设定，无航向的定位修正无法设定位置。",
+    ),
+    "fix.placing": (
+        "It places the vehicle once {count} fixes in a row agree.",
+        "连续 {count} 次定位修正一致后，将据此设定车辆位置。",
+    ),
+    "fix.late": (
+        "It was measured before the last placement, or too long ago.",
+        "其测量早于上一次位置设定，或时间过久。",
+    ),
+    "fix.far": (
+        "It is {sigmas:.1f} standard deviations from the pose.", "与当前位姿相差 {sigmas:.1f} 倍标准差。",
+    ),
+    "fix.refused": (
+        "{count} fixes of {source} in a row were refused.", "{source} 连续 {count} 次定位修正被拒绝。",
+    ),
+    "place.done": (
+        "The vehicle is placed at x {x:.2f} m, y {y:.2f} m, {degrees:.0f} degrees.",
+        "车辆位置已设定：x {x:.2f} m，y {y:.2f} m，{degrees:.0f} 度。",
+    ),
+    "place.no_odometry": (
+        "Odometry is silent: the vehicle cannot be placed.", "收不到里程计：无法设定车辆位置。",
+    ),
+    "place.moving": (
+        "The vehicle moves: stop it, then place it.", "车辆正在移动：请先停车，再设定位置。",
+    ),
     # commands of ROS nodes
     "cmd_vel.taken": ("Taken.", "已接受。"),
     "cmd_vel.unreadable": ("A command cannot be read: {reason}.", "无法读取指令：{reason}。"),
@@ -742,6 +816,32 @@ EVENTS: tuple[EventRow, ...] = (
     EventRow(
         "odom", "slip_over", "info",
         ("Counters and velocities agree again.", "编码器计数与速度已恢复一致。"), NOTHING,
+    ),
+    EventRow(
+        "localization", "placed", "info",
+        ("The position in the map is known.", "地图中的位置已知。"), NOTHING,
+    ),
+    EventRow(
+        "localization", "unplaced", "warning",
+        ("The position in the map is not known.", "地图中的位置未知。"),
+        ("place the vehicle: `t2 call localization/place`", "请设定车辆位置：`t2 call localization/place`"),
+    ),
+    EventRow(
+        "localization", "lost", "warning",
+        ("The position in the map is lost.", "地图中的位置已丢失。"),
+        ("as in the text", "按文中所述处理"),
+    ),
+    EventRow(
+        "localization", "fixes_refused", "warning",
+        ("Several fixes of a source in a row were refused.", "某来源连续多次定位修正被拒绝。"),
+        (
+            "`t2 echo localization/pose --field sources` shows why",
+            "`t2 echo localization/pose --field sources` 显示原因",
+        ),
+    ),
+    EventRow(
+        "localization", "fixes_back", "info",
+        ("Fixes of this source are used again.", "该来源的定位修正已恢复使用。"), NOTHING,
     ),
     EventRow(
         "teleop", "gamepad", "info", ("Gamepad: {device}.", "手柄：{device}。"),

@@ -15,7 +15,10 @@ from t2 import messages as m
 
 ROOT = "t2/v1"
 
-SERVICES = ("bridge", "safety", "odom", "teleop", "dashboard", "recorder", "metrics", "ros2")
+SERVICES = (
+    "bridge", "safety", "odom", "localization", "teleop", "dashboard", "recorder", "metrics",
+    "ros2",
+)  # fmt: skip
 
 MessageT = TypeVar("MessageT", bound=m.Message)
 RequestT = TypeVar("RequestT", bound=Struct)
@@ -99,6 +102,9 @@ SWITCHES = Topic(
 )
 LINK = Topic("tel/bridge/link", m.Link, 5, FAST, "bridge", "the link to the board")
 ODOMETRY = Topic("tel/odom/odometry", m.Odometry, 25, FAST, "odom", "pose and twist")
+MAP_POSE = Topic(
+    "tel/localization/pose", m.MapPose, 25, FAST, "localization", "pose in the map, and its fixes"
+)
 SAFETY = Topic(
     "tel/safety/state",
     m.SafetyState,
@@ -120,6 +126,9 @@ LIMIT = Topic(
     "a lidar, a fleet manager, a pendant, ...",
     "a speed limit, a protective stop, or a sign of life of an emergency stop",
 )
+FIX = Topic(
+    "@cmd/fix/{source}", m.Fix, 10, FAST, "tags, gnss, amcl, ...", "a measured pose in the map"
+)
 MOTION = Topic("@cmd/motion", m.Motion, 50, COMMAND, "safety", "the motion that safety allows")
 
 # The services that make a robot, in the order of a request: others run on laptops, too, under the
@@ -135,13 +144,16 @@ SET_SWITCHES = Call(
 SET_LED = Call("srv/bridge/led", m.LedRequest, m.Done, "bridge", "set one lamp channel")
 RESET = Call("srv/safety/reset", m.ResetRequest, m.ResetDone, "safety", "clear the named causes")
 SET_POSE = Call("srv/odom/reset", m.PoseRequest, m.Done, "odom", "start odometry at a pose")
+PLACE = Call(
+    "srv/localization/place", m.PlaceRequest, m.Done, "localization", "say where the vehicle is"
+)
 
 TOPICS: tuple[Topic[m.Message], ...] = (
     VELOCITY, MILEAGE, ULTRASONIC, BUMPER, DRIVER, SWITCHES, LINK,
-    ODOMETRY, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, MOTION,
+    ODOMETRY, MAP_POSE, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, FIX, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
-    SET_SWITCHES, SET_LED, RESET, SET_POSE,
+    SET_SWITCHES, SET_LED, RESET, SET_POSE, PLACE,
 )  # type: ignore[assignment]  # fmt: skip
 
 

@@ -25,6 +25,8 @@ Level = Literal["info", "warning", "error"]
 Action = Literal["slow", "stop", "brake"]
 Direction = Literal["forward", "backward"]
 ReleaseRequest = Literal["none", "forward", "backward"]  # off a pressed bumper
+# Where the vehicle is in the map: not known yet, known, or not known well enough any more.
+MapState = Literal["unplaced", "placed", "lost"]
 LimitEffect = Literal["none", "slow", "stop", "brake"]
 # Of a source of speed limits: without effect, STOP, or BRAKE and a latch, as of a pendant.
 Silence = Literal["ignore", "stop", "latch"]
@@ -52,14 +54,15 @@ if TYPE_CHECKING:
     EventName = Literal[
         "barred", "black_box", "black_box_lost", "board_restarted", "cmd_vel_refused", "contact",
         "disk_full", "disk_room", "drive_link_lost", "drive_link_up", "driver_fault", "estop",
-        "estop_denied", "estop_keepalive", "estop_reader", "estop_unconfirmed", "flapping",
-        "gamepad", "gamepad_silent", "guard_gone", "link_lost", "link_up", "overruled",
-        "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
+        "estop_denied", "estop_keepalive", "estop_reader", "estop_unconfirmed", "fixes_back",
+        "fixes_refused", "flapping",
+        "gamepad", "gamepad_silent", "guard_gone", "link_lost", "link_up", "lost", "overruled",
+        "placed", "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
         "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
         "release_refused", "reset", "reset_refused", "reset_request", "reset_unconfirmed",
         "runaway", "second_authority", "silent", "slip", "slip_over", "source", "stop",
         "switches_unverified", "take_over", "terminal_slow", "uncommanded_motion", "unheard",
-        "velocity_back",
+        "unplaced", "velocity_back",
     ]  # fmt: skip
 else:
     EventName = Name
@@ -209,6 +212,45 @@ class Odometry(Message, frozen=True, kw_only=True):
     child_frame_id: Name = "base_link"
 
 
+class FixState(Struct, frozen=True, kw_only=True):
+    """The newest fix of one source, see ``Fix``."""
+
+    source: Name
+    age: Number | None  # s since it was received; None without any
+    used: int  # fixes since the start of the service
+    refused: int
+    in_a_row: int  # refused ones since the last one that was used
+    text: Text = ""  # why the newest one was refused; empty if it was used
+    phrases: Phrases = ()  # the same, for other languages
+
+
+class PlaneFrame(Struct, frozen=True, kw_only=True):
+    """Pose of a frame in another one."""
+
+    x: Number  # m
+    y: Number  # m
+    heading: Number  # rad
+
+
+class MapPose(Message, frozen=True, kw_only=True):
+    """Pose in ``map`` by odometry and fixes; None while the vehicle is not placed."""
+
+    state: MapState
+    x: Number | None = None  # m
+    y: Number | None = None  # m
+    heading: Number | None = None  # rad, wrapped to -pi..pi
+    pose_covariance: Covariance3 | None = None  # 3x3 row by row over x, y, heading, axes of ``map``
+    odom: PlaneFrame | None = None  # the origin of ``odom`` in ``map``
+    odom_boot: int  # header of the odometry that this pose follows from
+    odom_seq: int
+    placement: int  # number of placements since the start of the service
+    text: Text  # how certain the pose is, or why it is not known, and the next step
+    phrases: Phrases = ()  # the same, for other languages
+    sources: Annotated[tuple[FixState, ...], Few] = ()  # those in the settings
+    frame_id: Name = "map"
+    child_frame_id: Name = "base_link"
+
+
 class Cause(Struct, frozen=True, kw_only=True):
     """One reason why the vehicle may not move as asked."""
 
@@ -301,6 +343,21 @@ class Limit(SourceMessage, frozen=True, kw_only=True):
     reason: Reason = ""  # for the operator, such as "person at 2 m"
 
 
+class Fix(Message, frozen=True, kw_only=True):
+    """A pose of the vehicle in ``map``, measured by other means: tags, GNSS, a lidar.
+
+    It names the newest odometry that had been received when it was measured, so that no clocks are
+    compared.
+    """
+
+    x: Number  # m
+    y: Number  # m
+    heading: Number | None = None  # rad; None if it is not measured
+    covariance: Covariance3  # 3x3 row by row over x, y, heading; of the heading if it is measured
+    odom_boot: int  # ``Odometry.boot``
+    odom_seq: int  # ``Odometry.seq``
+
+
 class Motion(Message, frozen=True, kw_only=True):
     """The motion that safety allows; the bridge obeys only this, for 200 ms."""
 
@@ -388,6 +445,17 @@ class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     x: Number = 0.0  # m
     y: Number = 0.0  # m
     heading: Number = 0.0  # rad
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+
+
+class PlaceRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Say where the standing vehicle is in ``map``, and how well it is known."""
+
+    x: Number  # m
+    y: Number  # m
+    heading: Number  # rad
+    sigma: Annotated[float, Meta(ge=0.001, le=100.0)] = 0.1  # m, standard deviation of x and y
+    heading_sigma: Annotated[float, Meta(ge=0.001, le=4.0)] = 0.1  # rad
     echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 

@@ -8,10 +8,10 @@ from common import clock
 from common.bus.bus import Arrival, Caller
 from common.freshness import NS_PER_S
 from common.heartbeat import Echoes
+from common.pose import Pose
 from common.service import Node
 from services.odom.config import OdomConfig
 from services.odom.core.estimator import Estimator
-from services.odom.core.pose import Pose
 from t2 import keys
 from t2 import messages as m
 from t2.words import done

@@ -21,7 +21,10 @@ from verification.system.frame import (
     wheelhouse,
 )
 
-UNITS = [f"t2-{name}.service" for name in ("router", "safety", "bridge", "odom", "recorder")]
+UNITS = [
+    f"t2-{name}.service"
+    for name in ("router", "safety", "bridge", "odom", "localization", "recorder")
+]
 ROUTER, SAFETY, BRIDGE, ODOM, _ = UNITS
 INSTALL = ("sh", "/wheelhouse/t2-install.sh")
 SETTINGS = "/etc/t2/t2.toml"

@@ -27,18 +27,11 @@ from collections import deque
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest, fresh
+from common.pose import Covariance, Pose
 from common.standstill import comparable
 from services.odom.config import Odom
 from services.odom.core.noise import COUNTER_STEP_M, COUNTER_STEP_RAD, HOLD_S, NoiseModel
-from services.odom.core.pose import (
-    ArcSegment,
-    Covariance,
-    Pose,
-    PoseEstimate,
-    fitted,
-    halved,
-    total,
-)
+from services.odom.core.pose import ArcSegment, PoseEstimate, fitted, halved, total
 from t2 import messages as m
 
 SEGMENTS_MAX = 512  # five seconds without counters; above that, segments are merged in pairs

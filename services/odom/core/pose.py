@@ -1,15 +1,7 @@
-"""Pose, its covariance, and their motion along arcs.
+"""Motion of the pose and its covariance along arcs.
 
-Between two samples the motion is an arc of length ``distance`` and heading change ``turn``. Its
-chord has the length ``distance * k(turn)`` and is rotated by half the turn from the old heading:
-
-    k(turn) = sin(turn / 2) / (turn / 2)
-    x' = x + distance * k(turn) * cos(heading + turn / 2)
-    y' = y + distance * k(turn) * sin(heading + turn / 2)
-    heading' = heading + turn
-
-This is exact for a constant curvature, straight on and turning on the spot included. The covariance
-is propagated by the derivatives of these equations.
+Between two samples the motion is an arc of length ``distance`` and heading change ``turn``
+(``common/pose.py``). The covariance is propagated by the derivatives of its equations.
 
 Between two counter samples, the counters give the length and the turn of the trajectory, the
 velocities give its shape. ``fitted`` combines both.
@@ -17,74 +9,10 @@ velocities give its shape. ``fitted`` combines both.
 
 import math
 from collections.abc import Sequence
-from typing import Self
 
 from msgspec import Struct
 
-SMALL_TURN = 1e-4  # rad; below it, the difference in the derivative loses its digits
-
-
-class Pose(Struct, frozen=True):
-    """A pose in ``odom``: metres, radians, heading wrapped to -pi..pi."""
-
-    x: float
-    y: float
-    heading: float
-
-    def moved(self, distance: float, turn: float) -> "Pose":
-        """Return the pose after an arc: m forward and rad counter-clockwise."""
-        chord = distance * chord_ratio(turn)[0]
-        direction = self.heading + turn / 2
-        return Pose(
-            self.x + chord * math.cos(direction),
-            self.y + chord * math.sin(direction),
-            math.remainder(self.heading + turn, math.tau),
-        )
-
-
-def chord_ratio(turn: float) -> tuple[float, float]:
-    """Return the ratio of chord to arc length, and its derivative by the turn."""
-    if abs(turn) < SMALL_TURN:
-        return 1.0 - turn * turn / 24, -turn / 12
-    ratio = math.sin(turn / 2) / (turn / 2)
-    return ratio, (math.cos(turn / 2) - ratio) / turn
-
-
-class Covariance(Struct, frozen=True):
-    """Covariance of x, y, heading (m², m rad, rad²); six numbers keep it symmetric."""
-
-    xx: float
-    xy: float
-    yy: float
-    xh: float
-    yh: float
-    hh: float
-
-    def carried(self, dx: float, dy: float) -> Self:
-        """Return the covariance after a translation (dx, dy) in ``odom``."""
-        return type(self)(
-            self.xx - 2 * dy * self.xh + dy * dy * self.hh,
-            self.xy - dy * self.yh + dx * self.xh - dx * dy * self.hh,
-            self.yy + 2 * dx * self.yh + dx * dx * self.hh,
-            self.xh - dy * self.hh,
-            self.yh + dx * self.hh,
-            self.hh,
-        )
-
-    def plus(self, variance: float, x: float, y: float, heading: float) -> Self:
-        """Return the covariance plus an independent error along (x, y, heading)."""
-        return type(self)(
-            self.xx + variance * x * x,
-            self.xy + variance * x * y,
-            self.yy + variance * y * y,
-            self.xh + variance * x * heading,
-            self.yh + variance * y * heading,
-            self.hh + variance * heading * heading,
-        )
-
-    def rows(self) -> tuple[float, ...]:
-        """Return the 3x3 matrix, row by row."""
-        return (self.xx, self.xy, self.xh, self.xy, self.yy, self.yh, self.xh, self.yh, self.hh)
+from common.pose import Covariance, Pose, chord_ratio
 
 
 class ProcessNoise(Struct, frozen=True):

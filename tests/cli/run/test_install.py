@@ -46,7 +46,7 @@ def test_all_units_except_the_simulator(tmp_path: Path) -> None:
     assert t2_install(tmp_path) == 0
     written = files(tmp_path)
     services = {Path(name).name for name in written if name.endswith(".service")}
-    names = ("router", "bridge", "safety", "odom", "recorder", "dashboard", "ros2")
+    names = ("router", "bridge", "safety", "odom", "localization", "recorder", "dashboard", "ros2")
     assert services == {f"t2-{name}.service" for name in names}
     assert not any("@PREFIX@" in text for text in written.values())
     start = f"ExecStart={PREFIX}/bin/python -P -m services.safety --config /etc/t2/t2.toml"

@@ -23,7 +23,7 @@ def test_a_second_stack_starts_nothing_and_killed_services_start_again(tmp_path:
     log = tmp_path / "log"
     words = sets(*ports(), "log.format=json", f"recorder.folder={tmp_path}")
     with running(t2("up", *words), log) as up:
-        wait_until(lambda: all(starts(log, name) for name in STACK), "all six", PATIENCE_S)
+        wait_until(lambda: all(starts(log, name) for name in STACK), "all of them", PATIENCE_S)
         first = children(up.pid)
         assert set(first) == STACK
 
@@ -81,9 +81,9 @@ def options(*words: str) -> Namespace:
 @pytest.mark.parametrize(
     ("words", "names"),
     [
-        ((), "router sim bridge safety odom recorder"),
-        (("--no-sim",), "router bridge safety odom recorder"),
-        (("--no-router", "--ros2"), "sim bridge safety odom recorder ros2"),
+        ((), "router sim bridge safety odom localization recorder"),
+        (("--no-sim",), "router bridge safety odom localization recorder"),
+        (("--no-router", "--ros2"), "sim bridge safety odom localization recorder ros2"),
         (("--only", "bridge"), "bridge"),
     ],
 )

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
+from common.pose import Pose
 from services.odom.config import Odom
 from services.odom.core.estimator import Estimator
-from services.odom.core.pose import Pose
 from t2.messages import Mileage, Odometry, Velocity
 
 TICK_NS = NS_PER_S // 50

@@ -7,11 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from common.freshness import NS_PER_S
+from common.pose import Pose
 from services.odom.config import Odom
 from services.odom.core import estimator
 from services.odom.core.estimator import SEGMENTS_MAX, START, Estimator, SlipDetector
 from services.odom.core.noise import HOLD_S
-from services.odom.core.pose import ArcSegment, Pose
+from services.odom.core.pose import ArcSegment
 from t2.messages import Velocity
 from tests.odom.core.odom_fixture import (
     EXACT,

@@ -7,13 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from common.pose import Covariance, Pose
 from services.odom.core.pose import (
     ArcSegment,
-    Covariance,
-    Pose,
     PoseEstimate,
     ProcessNoise,
-    chord_ratio,
     fitted,
     halved,
     total,
@@ -32,32 +30,6 @@ ways = st.lists(segments, max_size=8)
 CERTAIN = Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 CLOSE = pytest.approx((0.0, 0.0), abs=1e-9)
 QUARTER = math.pi / 2
-
-
-@pytest.mark.parametrize("turn", [9e-5, -9e-5, 1.1e-4, 0.01])
-def test_the_chord_of_a_small_turn(turn: float) -> None:
-    ratio, derivative = chord_ratio(turn)
-    assert (1.0 - ratio) / turn**2 == pytest.approx(1 / 24, rel=1e-3)
-    assert derivative / turn == pytest.approx(-1 / 12, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("start", "distance", "turn", "end"),
-    [
-        ((1.0, 2.0, QUARTER), 3.0, 0.0, (1.0, 5.0, QUARTER)),  # straight on
-        ((0.0, 0.0, 0.0), QUARTER, QUARTER, (1.0, 1.0, QUARTER)),  # a quarter circle to the left
-        ((0.0, 0.0, 0.0), -QUARTER, QUARTER, (-1.0, -1.0, QUARTER)),  # backward
-        ((1.0, 1.0, 0.0), 0.0, 2.0, (1.0, 1.0, 2.0)),  # turning on the spot
-        ((0.0, 0.0, 0.0), math.tau, math.tau, (0.0, 0.0, 0.0)),  # a full circle
-    ],
-)
-def test_known_arcs(
-    start: tuple[float, float, float],
-    distance: float,
-    turn: float,
-    end: tuple[float, float, float],
-) -> None:
-    assert apart(Pose(*start).moved(distance, turn), Pose(*end)) == CLOSE
 
 
 @given(headings, distances, turns, st.floats(0.0, 1.0))
