@@ -24,6 +24,8 @@ import t2.third_party
 import verification.harness.waiting
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
+from services.localization.config import FixSource, Localization, LocalizationConfig
+from services.localization.localization import LocalizationService
 from sim.config import load_plan
 from t2 import keys
 from t2 import messages as m
@@ -33,7 +35,8 @@ from verification.search.stack import Stack
 
 ENCODE = msgspec.msgpack.encode
 TICK_MS = 10
-CALLS = {call.on(ROBOT): call for call in (keys.RESET, keys.SET_POSE, keys.SET_LED)}
+TAGS = Localization(sources={"tags": FixSource()})
+CALLS = {call.on(ROBOT): call for call in (keys.RESET, keys.SET_POSE, keys.SET_LED, keys.PLACE)}
 MODULES = (
     cli.demo.lap, t2.drive, t2.publisher, t2.robot, t2.stream, t2.third_party,
     verification.harness.waiting,
@@ -166,6 +169,11 @@ class SimulatedStack(Stack):
         super().__init__(plan=load_plan(world, Vehicle()), step_ns=TICK_MS * MS)
         self.clock = SimulatedTime(self)
         self.library = self.process("sdk")
+        localization: Any = self.process("localization")
+        localization.config = LocalizationConfig(localization=TAGS)
+        with self.time():
+            LocalizationService(localization)
+        self.processes["localization"] = localization
         self.answers: list[bool] = []  # to resets
 
     def suspend(self, duration_ms: int) -> None:
@@ -210,7 +218,11 @@ class SimulatedSession:
         return object()
 
     def declare_publisher(self, key: str, **_: object) -> object:
-        (topic,) = (it for it in (keys.DRIVE, keys.LIMIT) if matches(it.on(ROBOT, source="*"), key))
+        (topic,) = (
+            it
+            for it in (keys.DRIVE, keys.LIMIT, keys.FIX)
+            if matches(it.on(ROBOT, source="*"), key)
+        )
 
         def put(payload: bytes) -> None:
             self._process.post(key, msgspec.msgpack.decode(payload, type=topic.message))

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from t2.errors import Latched as Latched
     from t2.errors import Late as Late
     from t2.errors import LinkError as LinkError
+    from t2.errors import Lost as Lost
     from t2.errors import NoData as NoData
     from t2.errors import NotAllowed as NotAllowed
     from t2.errors import NotConfirmed as NotConfirmed
@@ -52,8 +53,8 @@ _EXPORTS = {
     "connection": ("connect", "robots"),
     "drive": ("Drive",),
     "errors": (
-        "Blocked", "Incompatible", "Latched", "Late", "LinkError", "NoData", "NotAllowed",
-        "NotConfirmed", "Overruled", "PoseSet", "Refused", "Stopped", "T2Error",
+        "Blocked", "Incompatible", "Latched", "Late", "LinkError", "Lost", "NoData",
+        "NotAllowed", "NotConfirmed", "Overruled", "PoseSet", "Refused", "Stopped", "T2Error",
     ),
     "recording": ("Recording",),
     "robot": ("Robot",),

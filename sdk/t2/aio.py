@@ -16,6 +16,7 @@ from t2.messages import (
     Direction,
     Event,
     Link,
+    MapPose,
     Message,
     Mileage,
     Odometry,
@@ -271,6 +272,7 @@ class AsyncRobot:
         self.name: str = twin.name
         self.endpoint: str = twin.endpoint
         self.odometry: AsyncStream[Odometry] = AsyncStream(twin.odometry)
+        self.localization: AsyncStream[MapPose] = AsyncStream(twin.localization)
         self.safety: AsyncStream[SafetyState] = AsyncStream(twin.safety)
         self.velocity: AsyncStream[Velocity] = AsyncStream(twin.velocity)
         self.mileage: AsyncStream[Mileage] = AsyncStream(twin.mileage)
@@ -306,6 +308,12 @@ class AsyncRobot:
 
     @awaited(Robot.set_pose)
     def set_pose(self) -> None: ...  # noqa: D102
+
+    @awaited(Robot.place)
+    def place(self) -> None: ...  # noqa: D102
+
+    @awaited(Robot.fix)
+    def fix(self) -> None: ...  # noqa: D102
 
     async def led(self, channel: int, mode: int, **settings: int) -> None:
         """Set one lamp channel as ``Robot.led`` does."""

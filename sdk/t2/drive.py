@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import zenoh
 
@@ -14,6 +14,7 @@ from t2.errors import (
     Blocked,
     Latched,
     Late,
+    Lost,
     NoData,
     NotAllowed,
     Overruled,
@@ -21,13 +22,17 @@ from t2.errors import (
     Stopped,
     T2Error,
 )
-from t2.messages import Odometry, SafetyState
+from t2.messages import MapPose, Odometry, PlaneFrame, SafetyState
 from t2.motion import (
+    CORRECTION,
+    FASTEST,
     STILL,
     Arc,
+    Frame,
     Motion,
     OnStop,
     Path,
+    Place,
     Progress,
     Straight,
     Target,
@@ -41,6 +46,7 @@ from t2.stream import check_process, now_s
 
 if TYPE_CHECKING:
     from t2.robot import Robot
+    from t2.stream import Stream
 
 NEUTRAL = 3  # zero requests before a drive: safety obeys a program after the first one
 READY_S = 2.0  # from the first neutral request until we are in control
@@ -106,7 +112,7 @@ class Drive:
     ...     pose = drive.turn(-math.pi / 8, on_stop="wait")  # rad
     ...     pose = drive.arc(0.5, math.pi / 8)  # m, rad
     ...     pose = drive.follow([(0.3, 0.0), (0.3, 0.3)])  # m in odom
-    ...     pose = drive.goto(0.2, 0.2, heading=0.0)  # m, m, rad in odom
+    ...     pose = drive.goto(0.2, 0.2, heading=0.0)  # m, m, rad; frame="map" for the map
     ...     drive.velocity(-0.1, 0.2, seconds=0.5)  # m/s, rad/s; returns at once
     ...     time.sleep(0.2)  # something else
     ...     drive.check()
@@ -282,13 +288,27 @@ class Drive:
         speed: float = SPEED,
         patience: float = PATIENCE_S,
         *,
+        heading: float | None = None,
+        frame: Frame = "odom",
         on_stop: OnStop = "raise",
     ) -> Odometry:
-        """Drive forward along straight lines through points (x, y) in ``odom``, m.
+        """Drive forward along straight lines through points (x, y), m; then turn to a heading, rad.
 
-        It cuts corners by up to 0.2 m, and turns on the spot where the next line is not ahead.
+        It cuts corners by up to 0.2 m, and turns on the spot where the next line is not ahead. With
+        ``frame="map"`` points and heading are in the map, and the vehicle comes back to the lines
+        after each correction of its pose; raises ``Lost`` while the pose is not known well enough.
+        The result is in ``odom`` all the same.
         """
-        return self._go(Path(self._pose(), points, speed, TURN_SPEED), patience, on_stop)
+        check_word(frame, Frame)
+        if heading is not None:
+            finite(heading)  # before it drives
+        path = Path(place_of(self._stream(frame).latest()), points, speed, TURN_SPEED)
+        pose = self._go(path, patience, on_stop, frame)
+        if heading is None:
+            return pose
+        now = place_of(self._stream(frame).latest())
+        angle = math.remainder(heading - now.heading, math.tau)
+        return self.turn(angle, patience=patience, on_stop=on_stop)
 
     def goto(
         self,
@@ -298,34 +318,39 @@ class Drive:
         speed: float = SPEED,
         patience: float = PATIENCE_S,
         *,
+        frame: Frame = "odom",
         on_stop: OnStop = "raise",
     ) -> Odometry:
-        """Drive to a place in ``odom``, m, straight there; then turn to a heading in rad."""
-        if heading is not None:
-            finite(heading)  # before it drives
-        pose = self.follow([(x, y)], speed, patience, on_stop=on_stop)
-        if heading is None:
-            return pose
-        angle = math.remainder(heading - pose.heading, math.tau)
-        return self.turn(angle, patience=patience, on_stop=on_stop)
+        """Drive to a place, m, straight there; then turn to a heading in rad. As ``follow``."""
+        return self.follow([(x, y)], speed, patience, heading=heading, frame=frame, on_stop=on_stop)
 
     def _pose(self) -> Odometry:
         return self._robot.odometry.latest()
 
-    def _go(self, motion: Motion, patience: float, on_stop: OnStop) -> Odometry:
+    def _stream(self, frame: Frame) -> "Stream[Any]":
+        return self._robot.odometry if frame == "odom" else self._robot.localization
+
+    def _go(
+        self, motion: Motion, patience: float, on_stop: OnStop, frame: Frame = "odom"
+    ) -> Odometry:
         """Follow a motion until little is left; raise ``Blocked`` without progress."""
         check_word(on_stop, OnStop)
         progress = Progress(motion, patience, WAIT_S, now_s())
-        left = motion.left(self._pose())
+        before = self._stream(frame).latest()
+        left = motion.left(place_of(before))
 
-        def arrived(pose: Odometry) -> bool:
-            nonlocal left
-            left = motion.left(pose)
+        def arrived(pose: Odometry | MapPose) -> bool:
+            nonlocal left, before
+            place = place_of(pose)
+            left = motion.left(place)
             if left <= motion.near:
                 return True
-            linear, angular = motion.velocity(pose, left)
+            linear, angular = motion.velocity(place, left)
             state = self._robot.safety.latest()
             waits = on_stop == "wait" and (is_stopped(state) or is_blocked(state))
+            if is_corrected(before, pose):
+                progress.restart(left, now_s())
+            before = pose
             if progress.ends(left, motion.turning, now_s(), waits=waits):
                 raise Blocked(f"The vehicle does not get on: {state.text}", state.causes)
             self.velocity(linear, angular, seconds=attended_s(), on_stop=on_stop)
@@ -335,18 +360,19 @@ class Drive:
             raise T2Error("a motion of this drive is under way; wait for its end, or cancel it")
         self._target = STILL  # an old one must not be judged as the motion
         try:
-            self._until(arrived)
+            self._until(arrived, frame)
             self.stop()
             return self._pose()
-        except Stopped as stop:
-            stop.left, stop.unit = max(left, 0.0), motion.unit
+        except T2Error as error:
+            error.left, error.unit = max(left, 0.0), motion.unit
             raise
         finally:
             self._target = STILL
             self._motion.release()
 
-    def _until(self, arrived: Callable[[Odometry], bool]) -> None:
-        stream = self._robot.odometry
+    def _until(self, arrived: Callable[[Any], bool], frame: Frame = "odom") -> None:
+        """Call a function with each pose in a frame, until it returns true."""
+        stream = self._stream(frame)
         start = stream.latest()
         with stream.reading() as queue:
             while True:
@@ -356,10 +382,13 @@ class Drive:
                 self.check()
                 if pose is None:
                     self._target = STILL
-                    raise NoData("odometry fell silent during a motion; see `t2 doctor`")
-                if (pose.boot, pose.epoch) != (start.boot, start.epoch):
+                    service = "odometry" if frame == "odom" else "localization"
+                    raise NoData(f"{service} fell silent during a motion; see `t2 doctor`")
+                try:
+                    check_continuity(start, pose)
+                except T2Error:
                     self._target = STILL
-                    raise PoseSet("odometry restarted, or its pose was set, during a motion")
+                    raise
                 if arrived(pose):
                     return
 
@@ -473,6 +502,35 @@ def dropped(source: str, robot: str) -> NotAllowed:
         f"the router drops the requests of {source!r}: this certificate may not drive robot "
         f"{robot} as this source (`t2 keys list`), or the robot's safety.sources lacks it"
     )
+
+
+def place_of(pose: Odometry | MapPose) -> Place:
+    """Return where the vehicle is; raise ``Lost`` while that is not known in the map."""
+    if isinstance(pose, Odometry):
+        return pose
+    if pose.state != "placed" or pose.x is None or pose.y is None or pose.heading is None:
+        raise Lost(pose.text)
+    return PlaneFrame(x=pose.x, y=pose.y, heading=pose.heading)
+
+
+def check_continuity(start: Odometry | MapPose, now: Odometry | MapPose) -> None:
+    """Raise ``PoseSet`` when a pose does not continue the one at the start of a motion."""
+    if isinstance(start, Odometry) and isinstance(now, Odometry):
+        if (now.boot, now.epoch) != (start.boot, start.epoch):
+            raise PoseSet("odometry restarted, or its pose was set, during a motion")
+    elif isinstance(start, MapPose) and isinstance(now, MapPose):
+        place_of(now)
+        if (now.boot, now.placement) != (start.boot, start.placement):
+            raise PoseSet("the vehicle was placed anew during a motion")
+
+
+def is_corrected(before: Odometry | MapPose, now: Odometry | MapPose) -> bool:
+    """Return whether localization moved the pose farther than the vehicle can drive."""
+    if isinstance(now, Odometry):
+        return False
+    a, b = place_of(before), place_of(now)
+    driven = FASTEST * (now.mono_ns - before.mono_ns) / 1e9
+    return math.dist((a.x, a.y), (b.x, b.y)) > CORRECTION + driven
 
 
 def is_stopped(state: SafetyState) -> bool:

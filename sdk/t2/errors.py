@@ -6,7 +6,23 @@ from t2.messages import Cause, SafetyState
 
 
 class T2Error(Exception):
-    """Base of all errors of this library."""
+    """Base of all errors of this library.
+
+    ``left`` is what is left of the motion that ends with it, in ``unit``: m, or rad of a turn; None
+    without a motion.
+    """
+
+    left: float | None = None
+    unit: str = ""
+
+    def __str__(self) -> str:
+        left = "" if self.left is None else f" Left of the motion: {self.left:.2f} {self.unit}."
+        return self.what + left
+
+    @property
+    def what(self) -> str:
+        """What happened, and what to do."""
+        return super().__str__()
 
 
 class LinkError(T2Error):
@@ -48,30 +64,35 @@ class Overruled(T2Error):
         super().__init__(by)  # the arguments, so that it survives pickling
         self.by: str = by
 
-    def __str__(self) -> str:
-        return f"overruled by {self.by}, which has a higher priority"
+    @property
+    def what(self) -> str:
+        """What happened."""
+        return f"overruled by {self.by}, which has a higher priority."
 
 
 class PoseSet(T2Error):
-    """Odometry restarted, or its pose was set, during a motion."""
+    """Odometry restarted, or its pose was set, during a motion.
+
+    In ``map``: the vehicle was placed anew, or localization restarted.
+    """
+
+
+class Lost(T2Error):
+    """The pose in the map is not known, or not well enough: place the vehicle."""
 
 
 class Stopped(T2Error):
-    """Safety stops the vehicle; ``causes`` are the reasons, the worst first.
-
-    ``left`` is what is left of the motion, in ``unit``: m, or rad of a turn; None without a motion.
-    """
+    """Safety stops the vehicle; ``causes`` are the reasons, the worst first."""
 
     def __init__(self, text: str, causes: Sequence[Cause]) -> None:
         super().__init__(text, causes)
         self.text: str = text
         self.causes: tuple[Cause, ...] = tuple(causes)
-        self.left: float | None = None
-        self.unit: str = ""
 
-    def __str__(self) -> str:
-        left = "" if self.left is None else f" Left of the motion: {self.left:.2f} {self.unit}."
-        return self.text + left
+    @property
+    def what(self) -> str:
+        """Safety's text."""
+        return self.text
 
 
 class Latched(Stopped):

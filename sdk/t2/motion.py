@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple, Protocol, get_args
 
-from t2.messages import MAX_NUMBER, Odometry
+from t2.messages import MAX_NUMBER
 
 ACCELERATION, TURNING = 0.3, 0.8  # m/s^2, rad/s^2: how a motion slows down towards its end
 SLOWEST, SLOWEST_TURN = 0.05, 0.1  # m/s, rad/s: an end that is reached
@@ -17,7 +17,10 @@ KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
 AHEAD = 0.3  # m along a path, of the point that is aimed at
 FACING, TURNED = 0.8, 0.1  # rad: off the aim, a path is left for a turn on the spot, until turned
 
+CORRECTION, FASTEST = 0.1, 1.5  # m, m/s: a pose that moves by more was corrected by localization
+
 OnStop = Literal["raise", "wait"]
+Frame = Literal["odom", "map"]
 
 
 class Target(NamedTuple):
@@ -37,6 +40,17 @@ class Target(NamedTuple):
 STILL = Target(0.0, 0.0)
 
 
+class Place(Protocol):
+    """A pose in a plane: m, m, rad."""
+
+    @property
+    def x(self) -> float: ...  # noqa: D102
+    @property
+    def y(self) -> float: ...  # noqa: D102
+    @property
+    def heading(self) -> float: ...  # noqa: D102
+
+
 class Motion(Protocol):
     """A motion by odometry; ``near`` is the distance from the end, in m or rad, that is enough."""
 
@@ -45,10 +59,10 @@ class Motion(Protocol):
     speed: float  # the greatest, in this unit per s
     turning: float  # rad that are left of a turn on the spot within the motion; 0 without one
 
-    def left(self, pose: Odometry) -> float:
+    def left(self, pose: Place) -> float:
         """Return how much is left; called for each pose."""
 
-    def velocity(self, pose: Odometry, left: float) -> tuple[float, float]:
+    def velocity(self, pose: Place, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
 
 
@@ -64,11 +78,15 @@ class Progress:
         self._least = self._least_turning = math.inf
         self._progress_s = self._waited_s = now_s
 
+    def restart(self, left: float, now_s: float) -> None:
+        """Count progress from here on: the pose was corrected."""
+        self._least, self._least_turning = left, math.inf
+        self._progress_s = self._waited_s = now_s
+
     def ends(self, left: float, turning: float, now_s: float, *, waits: bool) -> bool:
         """Return whether nothing was achieved for too long; ``waits``: for the end of a stop."""
         if left < self._least - self._step:
-            self._least, self._least_turning = left, math.inf
-            self._progress_s = self._waited_s = now_s
+            self.restart(left, now_s)
         elif 0 < turning < self._least_turning - STEP_TURN:
             self._least_turning = turning
             self._progress_s = self._waited_s = now_s
@@ -84,18 +102,18 @@ class Straight:
     unit = "m"
     turning: float = 0.0
 
-    def __init__(self, start: Odometry, distance: float, speed: float) -> None:
+    def __init__(self, start: Place, distance: float, speed: float) -> None:
         self._start, self.speed = start, resolved(speed)
         self._distance, self._sign = abs(finite(distance)), math.copysign(1.0, distance)
 
-    def left(self, pose: Odometry) -> float:
+    def left(self, pose: Place) -> float:
         """Return the distance that is left, m."""
         start = self._start
         way = (pose.x - start.x) * math.cos(start.heading)
         way += (pose.y - start.y) * math.sin(start.heading)
         return self._distance - self._sign * way
 
-    def velocity(self, pose: Odometry, left: float) -> tuple[float, float]:
+    def velocity(self, pose: Place, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
         correction = KEEP_HEADING * math.remainder(self._start.heading - pose.heading, math.tau)
         bounded = max(-MAX_CORRECTION, min(MAX_CORRECTION, correction))
@@ -109,18 +127,18 @@ class Turn:
     unit = "rad"
     turning: float = 0.0
 
-    def __init__(self, start: Odometry, angle: float, speed: float) -> None:
+    def __init__(self, start: Place, angle: float, speed: float) -> None:
         self._angle, self._sign = abs(finite(angle)), math.copysign(1.0, angle)
         self.speed = resolved(speed, RESOLUTION_TURN, "rad/s")
         self._heading, self._turned = start.heading, 0.0
 
-    def left(self, pose: Odometry) -> float:
+    def left(self, pose: Place) -> float:
         """Return the angle that is left, rad; call it for each pose."""
         self._turned += math.remainder(pose.heading - self._heading, math.tau)
         self._heading = pose.heading
         return self._angle - self._sign * self._turned
 
-    def velocity(self, _: Odometry, left: float) -> tuple[float, float]:
+    def velocity(self, _: Place, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
         return 0.0, self._sign * slowing(left, self.speed, TURNING, SLOWEST_TURN)
 
@@ -131,7 +149,7 @@ class Arc(Turn):
     near = NEAR
     unit = "m"
 
-    def __init__(self, start: Odometry, radius: float, angle: float, speed: float) -> None:
+    def __init__(self, start: Place, radius: float, angle: float, speed: float) -> None:
         self._radius = positive(radius, "radius")
         self._slowest = RESOLUTION_TURN * self._radius  # m/s
         if speed < self._slowest:
@@ -142,31 +160,31 @@ class Arc(Turn):
         super().__init__(start, angle, 1.0)
         self.speed = resolved(speed)  # m/s
 
-    def left(self, pose: Odometry) -> float:
+    def left(self, pose: Place) -> float:
         """Return the distance that is left, m; call it for each pose."""
         return super().left(pose) * self._radius
 
-    def velocity(self, _: Odometry, left: float) -> tuple[float, float]:
+    def velocity(self, _: Place, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
         linear = slowing(left, self.speed, ACCELERATION, max(SLOWEST, self._slowest))
         return linear, self._sign * linear / self._radius
 
 
 class Path:
-    """Straight lines from the start through points in ``odom``, m; pure pursuit."""
+    """Straight lines from the start through points, m; pure pursuit."""
 
     near = NEAR
     unit = "m"
 
     def __init__(
-        self, start: Odometry, points: Iterable[tuple[float, float]], speed: float, turning: float
+        self, start: Place, points: Iterable[tuple[float, float]], speed: float, turning: float
     ) -> None:
         self.speed, self._turning = resolved(speed), turning
         corners = [(start.x, start.y), *((finite(x), finite(y)) for x, y in points)]
         self._lines = [(a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b]
         self.turning: float = 0.0
 
-    def left(self, pose: Odometry) -> float:
+    def left(self, pose: Place) -> float:
         """Return the distance that is left along the lines, m; call it for each pose."""
         while self._lines:
             left = self._left_of_line(pose)
@@ -175,11 +193,11 @@ class Path:
             del self._lines[0]  # passed
         return 0.0
 
-    def _left_of_line(self, pose: Odometry) -> float:
+    def _left_of_line(self, pose: Place) -> float:
         (ax, ay), (bx, by), length = self._lines[0]
         return ((bx - pose.x) * (bx - ax) + (by - pose.y) * (by - ay)) / length
 
-    def _aim(self, pose: Odometry) -> tuple[float, float]:
+    def _aim(self, pose: Place) -> tuple[float, float]:
         """Return the point ``AHEAD`` along the lines, or the next sharp corner, or the end."""
         ahead = AHEAD + self._lines[0][2] - self._left_of_line(pose)
         before = None
@@ -193,7 +211,7 @@ class Path:
             before = direction
         return self._lines[-1][1]
 
-    def velocity(self, pose: Odometry, left: float) -> tuple[float, float]:
+    def velocity(self, pose: Place, left: float) -> tuple[float, float]:
         """Return the velocity to request: m/s, rad/s."""
         x, y = self._aim(pose)
         off = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.heading, math.tau)

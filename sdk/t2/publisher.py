@@ -5,21 +5,25 @@ from collections import defaultdict
 from collections.abc import Iterator
 from itertools import count
 from secrets import randbits
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import zenoh
 
 from t2.client import Access, DriveRequests
 from t2.codec import encode, encoding
-from t2.messages import Drive, SafetyState, SourceMessage
-from t2.stream import Stream
+from t2.errors import NotAllowed
+from t2.messages import Drive, Fix, Message, SafetyState, SourceMessage
+from t2.stream import Stream, now_s
+
+M = TypeVar("M", bound=Message)
 
 PERIOD_S = 0.05  # 20 Hz, which safety's lease of 0.3 s requires
 # A program is one publisher at a router: safety would take the next drive of a source for a second
 # one. Made on first use: forks that connect afterwards are publishers of their own.
 BOOTS: defaultdict[str, int] = defaultdict(lambda: randbits(56))  # by router
 SEQS: defaultdict[str, Iterator[int]] = defaultdict(lambda: count(1))  # by key
+MATCH_S = 1.0  # until the router has announced the subscriber
 FRESH_S = 0.5  # age of safety's state; older, and safety counts as silent
 QOS: dict[str, Any] = {
     "priority": zenoh.Priority.INTERACTIVE_HIGH,
@@ -64,14 +68,7 @@ class SourcePublisher:
         if state is not None and state is not self._seen:
             self._seen = state
             self._access.received(state, self.matches)
-        filled = msgspec.structs.replace(
-            message,
-            seq=next(self._seqs),
-            boot=self.boot,
-            t_ns=time.time_ns(),
-            mono_ns=time.monotonic_ns(),
-            echo=self._access.echo,
-        )
+        filled = stamped(message, self.boot, next(self._seqs), echo=self._access.echo)
         self._publisher.put(encode(filled))
 
     def close(self) -> None:
@@ -98,3 +95,42 @@ class DrivePublisher(SourcePublisher):
         self._requests.stop()
         while self.tick(None):
             time.sleep(PERIOD_S)
+
+
+class FixPublisher:
+    """Sends the fixes of one source; the router tells whether somebody receives them."""
+
+    def __init__(self, session: zenoh.Session, key: str) -> None:
+        self.boot: int = BOOTS[str(session.info.routers_zid())]
+        self._key, self._seqs = key, SEQS[key]
+        self._publisher: Any = session.declare_publisher(
+            key,
+            encoding=encoding(Fix),
+            priority=zenoh.Priority.DATA_HIGH,
+            congestion_control=zenoh.CongestionControl.DROP,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+
+    def put(self, fix: Fix) -> None:
+        """Send a fix; its header is filled in. Raises ``NotAllowed``."""
+        end_s = now_s() + MATCH_S
+        while not self._publisher.matching_status.matching:
+            if now_s() > end_s:
+                raise NotAllowed(
+                    f"the router does not pass fixes on {self._key}: a certificate of role device "
+                    "needs this source (`t2 keys list`)"
+                )
+            time.sleep(PERIOD_S)
+        self._publisher.put(encode(stamped(fix, self.boot, next(self._seqs))))
+
+
+def stamped(message: M, boot: int, seq: int, **fields: Any) -> M:
+    """Return a message with its header."""
+    return msgspec.structs.replace(
+        message,
+        seq=seq,
+        boot=boot,
+        t_ns=time.time_ns(),
+        mono_ns=time.monotonic_ns(),
+        **fields,
+    )

@@ -4,6 +4,7 @@ import concurrent.futures.thread  # noqa: F401 - before our function for the end
 import re
 import threading
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, TypeVar
 
@@ -33,7 +34,7 @@ from t2.errors import (
     T2Error,
 )
 from t2.motion import check_word, finite
-from t2.publisher import PERIOD_S, DrivePublisher
+from t2.publisher import PERIOD_S, DrivePublisher, FixPublisher
 from t2.stream import LIVE_S, Stream, check_process, now_s, stack_version
 from t2.third_party import Keepalive, SpeedLimit
 
@@ -46,6 +47,7 @@ CALL_S = 2.0
 SLOW_S = 5.0  # for an answer over a slow link
 SOURCES = re.compile(r"safety\.sources\.([^.]+)\.priority")
 MATCH_S = 1.0  # until the router has announced the service
+COVARIANCE = 9  # numbers
 STANDSTILL_S = 2.0  # a release is refused until the vehicle stands
 SOURCE = re.compile("[a-z][a-z0-9_-]{0,31}")
 SWITCH = "use the vehicle's own switch"
@@ -99,8 +101,10 @@ class Robot:
         self._drives: list[Drive] = []
         self._limits: dict[str, SpeedLimit] = {}
         self._keepalives: dict[str, Keepalive] = {}
+        self._fixes: dict[str, FixPublisher] = {}
         self._streams: list[Stream[Any]] = []
         self.odometry: Stream[m.Odometry] = self._stream("odometry", keys.ODOMETRY)
+        self.localization: Stream[m.MapPose] = self._stream("pose in the map", keys.MAP_POSE)
         self.safety: Stream[m.SafetyState] = self._stream("safety", keys.SAFETY)
         self.velocity: Stream[m.Velocity] = self._stream("velocity", keys.VELOCITY)
         self.mileage: Stream[m.Mileage] = self._stream("mileage", keys.MILEAGE)
@@ -300,6 +304,64 @@ class Robot:
         echo = self.safety.latest().heartbeat
         request = m.PoseRequest(x=finite(x), y=finite(y), heading=finite(heading), echo=echo)
         self._call(keys.SET_POSE, request)
+
+    def place(
+        self, x: float, y: float, heading: float, sigma: float = 0.1, heading_sigma: float = 0.1
+    ) -> None:
+        """Say where the standing vehicle is in ``map``: m, m, rad, and standard deviations.
+
+        Raises ``Refused``.
+        """
+        echo = self.safety.latest().heartbeat
+        request = m.PlaceRequest(
+            x=finite(x),
+            y=finite(y),
+            heading=finite(heading),
+            sigma=finite(sigma),
+            heading_sigma=finite(heading_sigma),
+            echo=echo,
+        )
+        self._call(keys.PLACE, request)
+
+    def fix(
+        self,
+        source: str,
+        x: float,
+        y: float,
+        heading: float | None,
+        covariance: Sequence[float],
+        *,
+        odometry: m.Odometry,
+    ) -> None:
+        """Send a pose of the vehicle in ``map`` that this program has measured: m, m, rad.
+
+        ``odometry`` is the newest message that had been received when it was measured, so that the
+        fix counts for that moment. ``covariance`` has 9 numbers, 3x3 row by row over x, y, heading.
+        ``localization.latest().sources`` shows what became of it. Raises ``NotAllowed``,
+        ``NoData`` without localization, and ``ValueError``.
+        """
+        known = [each.source for each in self.localization.latest().sources]
+        if source not in known:
+            names = ", ".join(known) or "none"
+            raise NotAllowed(
+                f"localization.sources does not list {source!r}; it lists {names}: add it to the "
+                "robot's settings"
+            )
+        if len(covariance) != COVARIANCE:
+            raise ValueError(f"a covariance has {COVARIANCE} numbers, not {len(covariance)}")
+        if source not in self._fixes:
+            key = self._source_key(keys.FIX, source)
+            self._fixes[source] = FixPublisher(self._session, key)
+        self._fixes[source].put(
+            m.Fix(
+                x=finite(x),
+                y=finite(y),
+                heading=None if heading is None else finite(heading),
+                covariance=tuple(finite(each) for each in covariance),
+                odom_boot=odometry.boot,
+                odom_seq=odometry.seq,
+            )
+        )
 
     def _call(self, call: keys.Call[Any, A], request: msgspec.Struct) -> A:
         self.safety.check()
