@@ -32,11 +32,23 @@ from common.settings import Shared
 from common.systemd import CHECK_PERIOD_S, Systemd
 from t2 import keys
 from t2.errors import LinkError, T2Error
-from t2.messages import MAX_TEXT, Durations, Event, EventName, Field, Health, Level, Phrase
+from t2.messages import (
+    MAX_TEXT,
+    Durations,
+    Event,
+    EventName,
+    Field,
+    Health,
+    Level,
+    Phrase,
+    Setting,
+    Settings,
+)
 from t2.words import render
 
 STOP_TIMEOUT_S = 2.0  # limit for ``is_stopped`` after the first signal
 QUERY_PERIOD_S = 0.02  # one query of each key
+SETTINGS_PERIOD_S = 10.0  # of the published settings
 NICENESS = 10  # of services that do not drive
 
 
@@ -60,9 +72,17 @@ class Node(Generic[C]):
         self.is_stopped: Callable[[], bool] = lambda: True  # polled while stopping
         self.on_exit: Callable[[], None] = lambda: None  # on every exit path, crashes included
         self.reactions: Callable[[], dict[str, Durations]] = dict  # part of the health message
-        self._loaded = loaded
+        # As they are published and answered; readers decode them, and refuse a longer text.
+        self._settings = Settings(
+            settings={
+                path: Setting(value=setting.value, origin=setting.origin[:MAX_TEXT])
+                for path, setting in loaded.settings.items()
+            }
+        )
         self._events = self.bus.publisher(keys.EVENTS, service=name)
         self._health = self.bus.publisher(keys.HEALTH, service=name)
+        self._settings_to = self.bus.publisher(keys.SETTINGS, service=name)
+        self._settings_due_ns: int | None = None  # None: without a subscriber
         self._started_ns = self._reported_ns = clock.now_ns()
         self._counted: Counter[str] = Counter()
 
@@ -103,21 +123,17 @@ class Node(Generic[C]):
         getattr(self.log, level)(text, event_name=name, **about)
 
     def announce(self) -> None:
-        """Declare the liveliness token, the info queryables and the health timer."""
+        """Declare the liveliness token, the info queryables, and the timers of health, settings."""
         robot, bus = self.config.robot.id, self.bus
         bus.live(keys.live_key(robot, self.name, f"{bus.boot:x}"))
         # Encoded once, so that a flood of queries costs little.
         schema = msgspec.json.encode(keys.schemas({each.topic for each in bus.publishers}))
-        settings = msgspec.json.encode(
-            {
-                path: {"value": setting.value, "origin": setting.origin}
-                for path, setting in self._loaded.settings.items()
-            }
-        )
+        settings = msgspec.json.encode(self._settings.settings)
         parts = {"schema": lambda: schema, "config": lambda: settings, "last": self._last}
         for part, make in parts.items():
             bus.answer(keys.info_key(robot, self.name, part), make, "application/json")
         self.loop.every(1.0, self._report)
+        self.loop.every(1.0, self._publish_settings)
 
     def _answer_queries(self) -> None:
         for bus in self.buses:
@@ -141,6 +157,14 @@ class Node(Generic[C]):
                 reactions=self.reactions(),
             )
         )
+
+    def _publish_settings(self, now_ns: int) -> None:
+        """Publish them once there is a subscriber, so that a recording begins with them."""
+        if not self._settings_to.passed_on:
+            self._settings_due_ns = None
+        elif self._settings_due_ns is None or now_ns >= self._settings_due_ns:
+            self._settings_due_ns = now_ns + round(SETTINGS_PERIOD_S * NS_PER_S)
+            self._settings_to.put(self._settings)
 
     def _last(self) -> bytes:
         return msgspec.json.encode({p.key: p.last for p in self.bus.publishers if p.last})

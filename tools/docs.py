@@ -68,7 +68,7 @@ def kinds() -> list[type[Struct]]:
     """Return every struct of the interface: messages, then requests and replies."""
     of_topics = [topic.message for topic in keys.TOPICS]
     of_calls = [kind for call in keys.CALLS for kind in (call.request, call.reply)]
-    parts: list[type[Struct]] = [m.Relay, m.Cause, m.Limits, m.Release, m.Durations]
+    parts: list[type[Struct]] = [m.Relay, m.Cause, m.Limits, m.Release, m.Durations, m.Setting]
     return list(dict.fromkeys([m.Message, *of_topics, *parts, *of_calls]))
 
 

@@ -11,7 +11,7 @@ from msgspec import Struct
 from t2 import messages
 
 FIELD = re.compile(
-    r"    (?P<name>\w+): (?:Annotated\[(?=.+, Few\]))?(?P<type>.+?)(?:, Few\])?"
+    r"    (?P<name>\w+): (?:Annotated\[(?=.+, (?:Few|Many)\]))?(?P<type>.+?)(?:, (?:Few|Many)\])?"
     r"(?: = (?P<default>.+?))?(?:  # (?P<why>.+))?$"
 )
 

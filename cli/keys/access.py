@@ -209,12 +209,13 @@ def ros(settings: Ros2) -> Rights:
 
 
 def publishing(services: Sequence[str]) -> dict[Verb, Sequence[str]]:
-    """Return the rights to publish as these services: health, events, presence, replies."""
-    health = tuple(keys.HEALTH.on(ANY, service=name) for name in services)
+    """Return the rights to publish as these services: state, events, presence, replies."""
+    telemetry = (keys.HEALTH, keys.SETTINGS)
+    state = tuple(topic.on(ANY, service=name) for topic in telemetry for name in services)
     events = tuple(keys.EVENTS.on(ANY, service=name) for name in services)
     kept = tuple(f"{event}/{KEPT_KEY}" for event in events)
     return {
-        "write": (*health, *events, *kept),
+        "write": (*state, *events, *kept),
         "keep": events,
         "serve": (*(keys.info_key(ANY, name, ANY) for name in services), *kept),
         "live": (*(keys.live_key(ANY, name, ANY) for name in services), *kept),

@@ -114,6 +114,14 @@ SAFETY = Topic(
     "verdict, causes, and the driving source",
 )
 HEALTH = Topic("tel/{service}/health", m.Health, 1, SLOW, "every service", "health of a service")
+SETTINGS = Topic(
+    "tel/{service}/settings",
+    m.Settings,
+    0.1,
+    SLOW,
+    "every service",
+    "effective settings, 1.9 kB of the bridge, 3.1 kB of safety; the first when a reader appears",
+)
 EVENTS = Topic("evt/{service}", m.Event, 0, EVENT, "every service", "transitions")
 DRIVE = Topic(
     "@cmd/drive/{source}", m.Drive, 20, COMMAND, "teleop, web, nav, ...", "a request to move"
@@ -150,7 +158,7 @@ PLACE = Call(
 
 TOPICS: tuple[Topic[m.Message], ...] = (
     VELOCITY, MILEAGE, ULTRASONIC, BUMPER, DRIVER, SWITCHES, LINK,
-    ODOMETRY, MAP_POSE, SAFETY, HEALTH, EVENTS, DRIVE, LIMIT, FIX, MOTION,
+    ODOMETRY, MAP_POSE, SAFETY, HEALTH, SETTINGS, EVENTS, DRIVE, LIMIT, FIX, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
     SET_SWITCHES, SET_LED, RESET, SET_POSE, PLACE,

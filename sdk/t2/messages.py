@@ -67,6 +67,8 @@ if TYPE_CHECKING:
 else:
     EventName = Name
 Few: Meta = Meta(max_length=128)
+Many: Meta = Meta(max_length=1000)
+Empty: Meta = Meta(max_length=0)
 Counts = Annotated[dict[Name, int], Few]
 
 Ranges = Annotated[tuple[Number | None, ...], Meta(min_length=8, max_length=8)]
@@ -405,6 +407,24 @@ class Health(Message, frozen=True, kw_only=True):
     rss: int  # bytes
     priority: int = 0  # of SCHED_FIFO; 0 for normal priority
     reactions: Annotated[dict[Name, Durations], Few] = {}  # reaction times, by name
+
+
+# A setting is a scalar, a list of scalars, or a table without rows; a row of a table is a setting.
+Scalar = bool | int | Number | Text
+SettingValue = Scalar | Annotated[tuple[Scalar, ...], Few] | Annotated[dict[Name, Name], Empty]
+
+
+class Setting(Struct, frozen=True, kw_only=True):
+    """One effective setting, as ``info/{service}/config`` has it."""
+
+    value: SettingValue  # a boolean, a number, a text, a list of these, or an empty map
+    origin: Text  # a file, a variable of the environment, an option, or ``default``
+
+
+class Settings(Message, frozen=True, kw_only=True):
+    """The effective settings of a service and their sources."""
+
+    settings: Annotated[dict[Name, Setting], Many]  # by path, such as ``vehicle.max_linear``
 
 
 # --- srv ------------------------------------------------------------------------------------

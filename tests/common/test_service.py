@@ -14,13 +14,15 @@ import pytest
 import zenoh
 
 from common.bus.bus import Bus
+from common.bus.publisher import Publisher
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.cli_args import EXIT_CONFIG, EXIT_LINK, VERSION
 from common.config import Sources, load
+from common.freshness import NS_PER_S
 from common.service import Node, run, serve
 from common.settings import Shared
 from t2 import codec, keys
-from t2.messages import MAX_TEXT, Event, Health
+from t2.messages import MAX_TEXT, Event, Health, Settings
 from tests.cli.processes import running
 from tests.common.bus_fixture import BusFixture
 from tests.common.systemd_manager import Manager
@@ -67,16 +69,18 @@ def test_what_cannot_be_opened_ends_it(shared_router: str, tmp_path: Path) -> No
 
 
 class Witness:
-    """Receives health, events and liveliness tokens of a service."""
+    """Receives health, settings, events and liveliness tokens of a service."""
 
     def __init__(self, robot: str) -> None:
         self.health: list[Health] = []
+        self.settings: list[Settings] = []
         self.events: list[Event] = []
         self.tokens: list[tuple[str, bool]] = []
         self.robot = robot
 
     def declare(self, bus: Bus) -> None:
         bus.subscribe(keys.HEALTH, lambda a: self.health.append(a.message), service="*")
+        bus.subscribe(keys.SETTINGS, lambda a: self.settings.append(a.message), service="*")
         bus.subscribe(keys.EVENTS, lambda a: self.events.append(a.message), depth=99, service="*")
         bus.watch_live(
             keys.live_key(self.robot, "*", "*"), lambda key, on: self.tokens.append((key, on))
@@ -140,13 +144,23 @@ def test_its_events_reach_who_was_not_there_yet(lived: Lived) -> None:
 def test_its_schemas_settings_and_last_values_are_looked_up(lived: Lived) -> None:
     buses, _, _ = lived
     schemas, settings = info(buses, "schema"), info(buses, "config")
-    assert set(schemas) == {"tel/bridge/bumper", "tel/{service}/health", "evt/{service}"}
+    own = {"tel/{service}/health", "tel/{service}/settings", "evt/{service}"}
+    assert set(schemas) == {"tel/bridge/bumper", *own}
     assert "pressed" in json.dumps(schemas["tel/bridge/bumper"])
     assert settings["robot.id"] == {"value": buses.robot, "origin": f"--set robot.id={buses.robot}"}
     assert settings["bus.lease"] == {"value": 1.0, "origin": "default"}
     last = msgspec.convert(info(buses, "last"), dict[str, dict[str, object]])
     assert last[keys.BUMPER.on(buses.robot)]["pressed"] is True
     assert last[keys.HEALTH.on(buses.robot, service="specimen")]["service"] == "specimen"
+
+
+def test_its_settings_are_published_as_they_are_answered(lived: Lived) -> None:
+    buses, _, witness = lived
+    wait_until(lambda: witness.settings, "the settings")
+    (published, *_) = witness.settings
+    assert json.loads(msgspec.json.encode(published.settings)) == info(buses, "config")
+    assert published.settings["bus.listen"].value == ("tcp/127.0.0.1:7447",)
+    assert published.boot == witness.health[0].boot
 
 
 def test_a_bug_of_ours_ends_it_though_its_session_is_open(
@@ -263,6 +277,38 @@ def test_a_long_text_of_an_event_is_cut(node: Node[Shared]) -> None:
         MAX_TEXT,
         {"problem": "x" * MAX_TEXT, "folder": "y" * MAX_TEXT},
     )
+    node.loop.close()
+
+
+def test_settings_are_published_to_a_new_subscriber_and_every_ten_seconds(
+    node: Node[Shared], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    timers: list[Callable[[int], object]] = []
+    monkeypatch.setattr(node.loop, "every", lambda _, handler: timers.append(handler))
+    node.announce()
+    (publisher,) = (each for each in node.bus.publishers if each.topic is keys.SETTINGS)
+    sent: list[int] = []
+    for second, is_subscribed in enumerate([False] * 3 + [True] * 25 + [False] + [True] * 2):
+        before = publisher.last
+        monkeypatch.setattr(Publisher, "passed_on", is_subscribed)
+        for timer in timers:
+            timer((1000 + second) * NS_PER_S)
+        sent += [second] if publisher.last is not before else []
+    assert sent == [3, 13, 23, 29]
+    node.loop.close()
+
+
+def test_a_long_origin_of_a_setting_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = ["bus.connect=tcp/127.0.0.1:1", "robot.id=" + " " * MAX_TEXT + "001"]
+    node = Node("teleop", load(Shared, Sources(environ={}, sets=given)))
+    timers: list[Callable[[int], object]] = []
+    monkeypatch.setattr(node.loop, "every", lambda _, handler: timers.append(handler))
+    monkeypatch.setattr(Publisher, "passed_on", True)
+    node.announce()
+    for timer in timers:
+        timer(0)
+    (sent,) = (each.last for each in node.bus.publishers if isinstance(each.last, Settings))
+    assert codec.decode(codec.encode(sent), Settings).settings["robot.id"].value == "001"
     node.loop.close()
 
 

@@ -8,7 +8,14 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from cli.keys.access import RouterSettings, Verb, access_control, rights, ros
+from cli.keys.access import (
+    LAPTOP_SERVICES,
+    RouterSettings,
+    Verb,
+    access_control,
+    rights,
+    ros,
+)
 from cli.keys.members import Member, Members, Role, read
 from common.errors import ConfigError
 from services.ros2 import names
@@ -76,9 +83,14 @@ def test_a_member_publishes_as_its_own_services_only(role: str) -> None:
     given = ROLES[role]
     for service in ON_BOARD:
         assert not may(given, "write", keys.HEALTH.on(MINE, service=service))
+        assert not may(given, "write", keys.SETTINGS.on(MINE, service=service))
+        assert may(given, "read", keys.SETTINGS.on(MINE, service=service))
         assert not may(given, "write", keys.EVENTS.on(MINE, service=service))
         assert not may(given, "serve", keys.info_key(MINE, service, "config"))
         assert not may(given, "live", keys.live_key(MINE, service, "1"))
+    for service in LAPTOP_SERVICES:
+        assert may(given, "write", keys.HEALTH.on(MINE, service=service))
+        assert may(given, "write", keys.SETTINGS.on(MINE, service=service))
     verbs: tuple[Verb, ...] = ("write", "serve", "live")
     for verb in verbs:  # keys of a fixed length: a long one keeps the router busy
         assert given[verb]
