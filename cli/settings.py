@@ -37,10 +37,13 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
 
 
 def safety_config(config: Everything) -> SafetyConfig:
-    """Return the sections of safety."""
-    return SafetyConfig(
-        host=config.host, board=config.board, vehicle=config.vehicle, safety=config.safety
-    )
+    """Return the sections of safety; raise ``ConfigError`` if they contradict each other."""
+    try:
+        return SafetyConfig(
+            host=config.host, board=config.board, vehicle=config.vehicle, safety=config.safety
+        )
+    except ValueError as error:
+        raise ConfigError(str(error)) from None
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -77,7 +77,7 @@ def load(root: type[R], sources: Sources) -> Loaded[R]:
     for file in sources.files:
         given |= _from_file(file)
     given |= _from_environ(root, sources.environ)
-    given |= _from_sets(root, sources.sets)
+    given |= from_sets(root, sources.sets)
     names = {part.name for part in msgspec.structs.fields(root)}
     known = names | set(SECTIONS)
     for path, setting in given.items():
@@ -178,7 +178,8 @@ def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> Given:
     return given
 
 
-def _from_sets(root: type[Struct], sets: Sequence[str]) -> Given:
+def from_sets(root: type[Struct], sets: Sequence[str]) -> Given:
+    """Return the settings of options ``--set PATH=VALUE``; raise ``ConfigError``."""
     given: Given = {}
     for text in sets:
         path, equals, value = (part.strip() for part in text.partition("="))

@@ -6,6 +6,7 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from math import isfinite
@@ -22,13 +23,25 @@ from cli.fit.stops import Stop, counted, find_stops
 from cli.fit.streams import KINDS, Streams
 from cli.inspect import output
 from cli.inspect.addressing import chunks
-from cli.inspect.session import one_robot, positive, robot_sources
+from cli.inspect.session import one_robot, positive
 from cli.recordings.info import open_recording
+from cli.recordings.recorded_settings import (
+    NONE_RECORDED,
+    Chosen,
+    Found,
+    differing,
+    found_in,
+    listed,
+    named,
+    newest,
+    restored,
+)
 from cli.settings import Everything, safety_config
-from common.cli_args import add_sources, file_path
-from common.config import flatten, load
+from common.cli_args import add_sources, file_path, sources
+from common.config import Sources, flatten
 from common.errors import ConfigError
 from common.freshness import NS_PER_S
+from t2 import keys
 from t2.errors import T2Error
 from t2.messages import Message
 
@@ -36,6 +49,7 @@ RED, PLAIN = "\x1b[31m", "\x1b[0m"
 HEAD = ("parameter", "unit", "estimate", "95 % interval", "n", "setting", "today", "proposal")
 STOPS = ("stop at (UTC)", "command", "unit", "speed", "reaction s", "deceleration", "distance",
          "needed", "reckoned")  # fmt: skip
+SECTIONS = ("host", "board", "wire", "vehicle", "safety", "odom")
 LIMITS = (
     "A slope, a wet floor, a load or worn tyres change stops: the table shows what was recorded. "
     "Record on the worst ground that the vehicle will drive on."
@@ -67,10 +81,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Show the estimates and write the files; return 0 if nothing is missing or wrong."""
-    settings = load(Everything, robot_sources(options)).config
+    given = sources(options)
+    of_files = named(given, SECTIONS) if options.config else None  # before recordings are read
     if options.out and options.out.exists():
         raise ConfigError(f"--out {options.out}: exists already; choose another folder")
-    robot, streams, remarks = read(options.files, options.robot)
+    robot, streams, remarks, published = read(options.files, options.robot)
+    chosen = of_files or today(published, given)
+    settings = chosen.config
     try:
         found = fit(streams, settings, of_ground_truth(streams, options.drove, options.turned))
     except ValueError as error:
@@ -81,7 +98,8 @@ def run(options: argparse.Namespace) -> int:
     print(output.table(HEAD, list(rows(found))), "", sep="\n")
     if options.stops and found.stops:
         print(output.table(STOPS, [as_cells(stop, settings) for stop in found.stops]), "", sep="\n")
-    text, checked, explained = [*remarks, *lines(found)], None, True
+    used = [f"Settings: {chosen.origin}.", *(f"Settings: {each}." for each in chosen.remarks)]
+    text, checked, explained = [*used, *remarks, *lines(found)], None, True
     if options.check:
         checked, differences = check(options.check, robot, found)
         text += ["", f"The model under the commands of {options.check}:"]
@@ -102,7 +120,7 @@ def check(
     file: Path, robot: str, found: Fit
 ) -> tuple[tuple[Streams, Course], Sequence[Difference]]:
     """Return a recording with the model's course under its commands, and the differences."""
-    _, (streams, *_), _ = read([file], robot)
+    _, (streams, *_), *_ = read([file], robot)
     stops, _ = find_stops(streams)
     try:
         course, differences = compare(streams, stops, model(found))
@@ -114,16 +132,19 @@ def check(
 # --- recordings -----------------------------------------------------------------------------------
 
 
-def read(files: Sequence[Path], robot: str | None) -> tuple[str, Sequence[Streams], Sequence[str]]:
-    """Return the robot, its streams for each start of its computer, and remarks on the files.
+def read(
+    files: Sequence[Path], robot: str | None
+) -> tuple[str, Sequence[Streams], Sequence[str], Sequence[Found]]:
+    """Return the robot, its streams for each start of its computer, remarks, and its settings.
 
     Raise ``T2Error`` for several robots (``robot`` chooses one), and without anything to measure.
     """
     robots: set[str] = set()
     by_host: defaultdict[int, Streams] = defaultdict(Streams)
     remarks: list[str] = []
+    published: list[Found] = []
     for file in files:
-        for name, message in _messages(file, remarks):
+        for name, message in _messages(file, remarks, published):
             if robot in (None, name):
                 robots.add(name)
                 by_host[message.host].add(message)
@@ -140,17 +161,34 @@ def read(files: Sequence[Path], robot: str | None) -> tuple[str, Sequence[Stream
         problem = problems[0] if problems else f"has no message{of} to measure"
         raise T2Error(f"{names}: {problem}")
     remarks += [f"Left out, another start of the robot's computer: {each}." for each in problems]
-    return robots.pop(), usable, remarks
+    (name,) = robots
+    return name, usable, remarks, [one for one in published if one.robot == name]
 
 
-def _messages(file: Path, remarks: list[str]) -> Iterator[tuple[str, Message]]:
-    """Yield robot and message of what matters in a recording; remark on a damaged one."""
+def _messages(
+    file: Path, remarks: list[str], published: list[Found]
+) -> Iterator[tuple[str, Message]]:
+    """Yield robot and message of what is measured; add remarks on the file, and settings."""
     with open_recording(file) as reader:
         for entry in reader:
             if entry.kind in KINDS and (message := entry.message) is not None:
                 yield chunks(entry.key)[0], message
+            elif (found := found_in(entry, file)) and found.service in keys.ON_BOARD:
+                published.append(found)
     if reader.cut or reader.damaged:
         remarks.append(f"{file}: truncated or damaged; what it holds is used.")
+
+
+def today(published: Sequence[Found], given: Sources) -> Chosen:
+    """Return the newest settings in recordings, without any those of files and environment."""
+    if not published:
+        chosen = named(given, SECTIONS)
+        return replace(chosen, origin=f"{chosen.origin}: {NONE_RECORDED}")
+    chosen = restored(newest(published), SECTIONS, given.sets)
+    if several := differing(published, SECTIONS):
+        disagree = f"the newest, because the recordings disagree about {listed(several)}"
+        return replace(chosen, remarks=[disagree, *chosen.remarks])
+    return chosen
 
 
 def write(folder: Path, found: Fit, sources: Sequence[str], html: Callable[[], str]) -> None:

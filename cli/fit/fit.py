@@ -21,6 +21,7 @@ from cli.fit.estimate import LEAST, Estimate
 from cli.fit.stops import DRIVING, TURNING, Axis, Stop, find_stops
 from cli.fit.streams import Streams
 from cli.settings import Everything, safety_config
+from common.errors import ConfigError
 from common.settings import Safe, Section
 from common.standstill import stopping_s
 from services.safety.config import DECISION_PERIOD_S, SafetyConfig
@@ -242,7 +243,7 @@ def refusal(found: Fit) -> str:
     safety = replace(found.settings.safety, **sections["safety"])
     try:
         safety_config(replace(found.settings, vehicle=vehicle, safety=safety))
-    except ValueError as error:
+    except ConfigError as error:
         return str(error)
     return ""
 

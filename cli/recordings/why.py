@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from cli.inspect import output
@@ -26,10 +27,11 @@ from cli.recordings.decision_replay import (
     new_stops,
 )
 from cli.recordings.info import open_recording
+from cli.recordings.recorded_settings import NONE_RECORDED, Found, found_in, named, newest, restored
 from cli.recordings.safety_inputs import UNSURE_NS, Recorded, Run, is_input, runs
-from cli.settings import Everything, safety_config
+from cli.settings import safety_config
 from common.cli_args import add_sources, file_path, reader_language, sources
-from common.config import load
+from common.config import Sources
 from common.freshness import NS_PER_S
 from common.motion import RUN, Twist
 from common.text import printable
@@ -72,10 +74,10 @@ def parse_time(word: str) -> float | str:
 def run(options: argparse.Namespace) -> int:
     """Show the stops or one decision; return 1 if a motion did not come out again."""
     given = sources(options)
-    settings = safety_config(load(Everything, replace(given, sets=())).config)
-    changed = safety_config(load(Everything, given).config) if given.sets else None
+    chosen = from_sources(given) if options.config else None  # before the file is read
     recording = read(options.file, options.robot)
-    view = View(recording, settings, changed, given.sets, reader_language())
+    used = [chosen or of_run(recording, run.boot, given) for run in recording.runs]
+    view = View(recording, used, given.sets, reader_language())
     lines = list(view.at(options.at) if options.at is not None else view.stops())
     print(printable("\n".join(lines), "\n"), flush=True)
     return 0 if view.agrees else 1
@@ -94,6 +96,7 @@ class Recording:
     ended_ns: int = 0
     is_cut: bool = False  # truncated or damaged
     runs: list[Run] = field(default_factory=list)
+    settings: list[Found] = field(default_factory=list)  # of each run of safety
 
     def since_start(self, log_ns: int) -> float:
         """Return a time of the recording in seconds since its start."""
@@ -126,11 +129,14 @@ def read(file: Path, robot: str | None) -> Recording:
     """Read the messages of one robot; raise ``T2Error`` if they show no decisions."""
     found = Recording(file)
     robots: dict[str, list[Recorded]] = {}
+    settings: list[Found] = []
     with open_recording(file) as reader:
         for entry in reader:
             found.began_ns = found.began_ns or entry.log_ns
             found.ended_ns = max(found.ended_ns, entry.log_ns)
             name, path = chunks(entry.key)
+            if (shown := found_in(entry, file)) and shown.service == "safety":
+                settings.append(shown)
             if not is_input(path, entry.kind):
                 continue
             message = None if path == keys.ESTOP_PATH else entry.message
@@ -142,12 +148,50 @@ def read(file: Path, robot: str | None) -> Recording:
     if robot is None and len(names) > 1:
         raise T2Error(f"{file}: recording of {', '.join(names)}: choose one with --robot")
     found.robot = robot or (names[0] if names else "")
+    found.settings = [one for one in settings if one.robot == found.robot]
     recorded = sorted([*robots.get(found.robot, ()), *fleet], key=lambda one: one.log_ns)
     try:
         found.runs = runs(recorded)
     except T2Error as error:
         raise T2Error(f"{file}: robot {found.robot or '-'}: {error}") from None
     return found
+
+
+# --- settings -----------------------------------------------------------------------------------
+
+SECTIONS = ("host", "board", "vehicle", "safety")  # that safety decides by
+
+
+class Used(Struct, frozen=True):
+    """The settings of a replay."""
+
+    config: SafetyConfig
+    changed: SafetyConfig | None  # with the options ``--set``
+    lines: Sequence[str]  # where they come from
+    are_recorded: bool = False
+
+
+def from_sources(given: Sources) -> Used:
+    """Return the settings of files, environment and options; raise ``ConfigError``."""
+    base = named(replace(given, sets=()), SECTIONS)
+    changed = safety_config(named(given, SECTIONS).config) if given.sets else None
+    return Used(safety_config(base.config), changed, [f"settings: {base.origin}"])
+
+
+def of_run(recording: Recording, boot: int, given: Sources) -> Used:
+    """Return the settings that this run of safety has recorded, otherwise those of another run.
+
+    Without any, those of files and environment. Raise ``ConfigError``.
+    """
+    mine = [one for one in recording.settings if one.message.boot == boot]
+    if not (found := newest(mine or recording.settings)):
+        used = from_sources(given)
+        return replace(used, lines=[f"{used.lines[0]}: {NONE_RECORDED}"])
+    base = restored(found, SECTIONS)
+    changed = safety_config(restored(found, SECTIONS, given.sets).config) if given.sets else None
+    of = "" if mine else ", of another run: this one has none"
+    lines = [f"settings: {base.origin}{of}", *(f"settings: {each}" for each in base.remarks)]
+    return Used(safety_config(base.config), changed, lines, are_recorded=True)
 
 
 # --- output -------------------------------------------------------------------------------------
@@ -209,8 +253,7 @@ class View:
     """The text of a recording's decisions."""
 
     recording: Recording
-    settings: SafetyConfig
-    changed: SafetyConfig | None
+    used: Sequence[Used]  # of each run
     sets: Sequence[str]
     language: Language
     agrees: bool = True
@@ -218,20 +261,21 @@ class View:
     def stops(self) -> Iterator[str]:
         """Yield each stop of each run, and how many motions agree."""
         yield from self._head()
-        for run in self.recording.runs:
+        for run, used in zip(self.recording.runs, self.used, strict=True):
+            yield from used.lines
             lines: list[str] = []
             before: Decided | None = None
             agreement, comparison = Agreement(), Comparison()
-            variant = Variant(self.changed) if self.changed else None
-            for decided in Replay(self.settings, run).decisions():
+            variant = Variant(used.changed) if used.changed else None
+            for decided in Replay(used.config, run).decisions():
                 agreement.add(decided)
-                lines += self._stop(run, before, decided)
+                lines += self._stop(run, used.config, before, decided)
                 if variant:
                     other = variant.decide(decided)
                     if decided.is_compared:
                         comparison.add(decided, other)
                 before = decided
-            yield from self._agreement(run, agreement)
+            yield from self._agreement(run, used, agreement)
             lines += self._last(run)
             yield from ["", "stops (since the start, and UTC):", *lines] if lines else ["no stop"]
             if variant:
@@ -241,24 +285,28 @@ class View:
         """Yield the whole decision at a time."""
         log_ns = self.recording.log_ns(at)
         yield from self._head()
-        run = next(
-            (one for one in reversed(self.recording.runs)
-             if one.logged_ns(one.motions[0].mono_ns) <= log_ns),
-            self.recording.runs[0],
+        runs = list(zip(self.recording.runs, self.used, strict=True))
+        run, used = next(
+            (pair for pair in reversed(runs)
+             if pair[0].logged_ns(pair[0].motions[0].mono_ns) <= log_ns),
+            runs[0],
         )  # fmt: skip
-        chosen = self._chosen(run, log_ns, NS_PER_S if isinstance(at, str) else 0)
+        yield from used.lines
+        chosen = self._chosen(run, used, log_ns, NS_PER_S if isinstance(at, str) else 0)
         if chosen is not None:
             self.agrees = not chosen[0].differences
-            yield from self._decision(run, *chosen)
+            yield from self._decision(run, used.config, *chosen)
 
-    def _chosen(self, run: Run, log_ns: int, span_ns: int) -> tuple[Decided, Motion | None] | None:
+    def _chosen(
+        self, run: Run, used: Used, log_ns: int, span_ns: int
+    ) -> tuple[Decided, Motion | None] | None:
         """Return the newest decision at a time, with the motion of the changed settings.
 
         A time of day is a whole second: the first stop in it, otherwise its first decision.
         """
-        variant = Variant(self.changed) if self.changed else None
+        variant = Variant(used.changed) if used.changed else None
         chosen, before = None, None
-        for decided in Replay(self.settings, run).decisions():
+        for decided in Replay(used.config, run).decisions():
             at_ns = run.logged_ns(decided.at_ns)
             if chosen is not None and at_ns > log_ns + max(span_ns, SHOWN_NS):
                 break
@@ -278,7 +326,9 @@ class View:
         if len(recording.runs) > 1:
             yield f"Safety started {len(recording.runs)} times: each run is shown by itself."
 
-    def _stop(self, run: Run, before: Decided | None, decided: Decided) -> Iterator[str]:
+    def _stop(
+        self, run: Run, settings: SafetyConfig, before: Decided | None, decided: Decided
+    ) -> Iterator[str]:
         """Yield the lines of a stop that begins with this decision."""
         names = new_stops(before, decided)
         if not names or before is None:
@@ -287,12 +337,12 @@ class View:
         command = decided.motion.command.upper()
         yield f"{when}  {command:5}  {worst}: {text.cause_text(decided, worst, self.language)}"
         yield f"{INDENT}before: {text.motion_text(before.recorded)}"
-        for each in text.shown_by(decided, worst, self.settings):
+        for each in text.shown_by(decided, worst, settings):
             yield f"{INDENT}input: {each}"
         yield f"{INDENT}rule: {text.rule(worst)}"
         if worst == "blocked":
-            planner = Policy(self.settings).planner
-            yield f"{INDENT}zone: {text.zone(decided, planner, self.settings)}"
+            planner = Policy(settings).planner
+            yield f"{INDENT}zone: {text.zone(decided, planner, settings)}"
         for name in names[1:]:
             yield f"{INDENT}also: {name}: {text.cause_text(decided, name, self.language)}"
         if not decided.is_compared:
@@ -309,12 +359,13 @@ class View:
             yield f"{INDENT}before: {text.motion_text(last)}"
             yield f"{INDENT}rule: without further motions the bridge stops the vehicle"
 
-    def _agreement(self, run: Run, found: Agreement) -> Iterator[str]:
+    def _agreement(self, run: Run, used: Used, found: Agreement) -> Iterator[str]:
         self.agrees = self.agrees and found.compared > 0 and not found.differing
         if found.since_ns is None:
+            doubt = "" if used.are_recorded else "; were these the settings of the robot?"
             yield (
                 f"replay: none of {found.motions} motions could be compared: the replayed state "
-                "never agreed for 0.5 s; were these the settings of the robot? (--config FILE)"
+                f"never agreed for 0.5 s{doubt}"
             )
             return
         since = self.recording.moment(run.logged_ns(found.since_ns)).strip()
@@ -331,9 +382,9 @@ class View:
             one = found.first
             yield (
                 f"first difference at {self.recording.moment(run.logged_ns(one.at_ns)).strip()}: "
-                f"{text.difference_text(one)}. A recording contains no settings (name "
-                "those of the robot with --config), no message that the recorder lost, and not the "
-                f"order of messages within {UNSURE_NS / 1e6:.0f} ms"
+                f"{text.difference_text(one)}. A recording contains no message that the recorder "
+                f"lost, and not the order of messages within {UNSURE_NS / 1e6:.0f} ms"
+                + ("" if used.are_recorded else "; these may not be the settings of the robot")
             )
 
     def _comparison(self, run: Run, found: Comparison) -> Iterator[str]:
@@ -351,28 +402,30 @@ class View:
                     f"{text.motion_text(other)}"
                 )
 
-    def _decision(self, run: Run, decided: Decided, other: Motion | None) -> Iterator[str]:
+    def _decision(
+        self, run: Run, settings: SafetyConfig, decided: Decided, other: Motion | None
+    ) -> Iterator[str]:
         """Yield everything about one decision."""
         state = decided.state
         yield f"decision at {self.recording.moment(run.logged_ns(decided.at_ns)).strip()}"
         rows = [
             (each.name, _seconds(each.age_s), _seconds(each.limit_s),
              "TOO OLD" if each.is_late else "", each.value)
-            for each in text.inputs(decided, self.settings)
+            for each in text.inputs(decided, settings)
         ]  # fmt: skip
         yield from ["", output.table(("input", "age s", "limit s", "", "value"), rows)]
         causes = text.held(decided, self.language)
         head = ("cause", "action", "since s", "good", "text")
         yield from ["", output.table(head, causes) if causes else "no cause is held"]
         yield ""
-        planner = Policy(self.settings).planner
+        planner = Policy(settings).planner
         requested = planner.requested(state, decided.at_ns)
         if requested is None:
             yield "request: none"
         else:
             slower = f", slowed by limit {requested.limited_by}" if requested.limited_by else ""
             yield f"request: {requested.source}: {text.speed(requested.twist)}{slower}"
-        if plan := text.zone(decided, planner, self.settings):
+        if plan := text.zone(decided, planner, settings):
             yield f"plan: {plan}"
         yield f"motion: {text.motion_text(decided.motion)}, verdict {state.verdict.name}"
         yield f"recorded: {text.motion_text(decided.recorded)}{_remark(decided)}"

@@ -1,5 +1,6 @@
 """``t2 fit`` on recordings of synthetic stops."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,16 @@ from common.cli_args import EXIT_CONFIG
 from common.config import Sources, load
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
+from services.bridge.config import BridgeConfig
+from services.odom.config import OdomConfig
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
+from services.safety.config import SafetyConfig
 from sim.config import load_model
-from t2 import codec
-from t2.messages import Command, Message
+from t2 import codec, keys
+from t2.messages import Command, Message, Settings
 from tests.cli.fit.stops_fixture import streams
+from tests.cli.recordings.settings_fixture import settings_of
 from tests.recorder.samples import bare
 
 PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
@@ -31,13 +36,19 @@ SPEEDS = (0.3, 0.5, 0.6, 0.7, 0.8, 0.9)
 ALL = (*SPEEDS, *(-speed for speed in SPEEDS))
 
 
-def record(path: Path, *robots: Streams, host: int = 0) -> Path:
-    """Record the streams of robot 001, and of 002."""
+def record(
+    path: Path, *robots: Streams, host: int = 0, settings: Mapping[str, Settings] | None = None
+) -> Path:
+    """Record the streams of robot 001, and of 002, and the settings of services of 001."""
     messages: list[tuple[str, Message]] = [
         (f"t2/v1/00{number}/{key}", replace(each, host=host))
         for number, streams in enumerate(robots, 1)
         for name, key in PATHS.items()
         for each in getattr(streams, name)
+    ]
+    messages += [
+        (keys.SETTINGS.on("001", service=service), replace(each, mono_ns=messages[0][1].mono_ns))
+        for service, each in (settings or {}).items()
     ]
     writer = RecordingWriter(path, Encoder(Vehicle()))
     for key, each in sorted(messages, key=lambda one: one[1].mono_ns):
@@ -195,3 +206,101 @@ def test_what_it_cannot_evaluate(tmp_path: Path, capsys: pytest.CaptureFixture[s
     ):
         assert main(["fit", *map(str, words)]) == code
         assert error in capsys.readouterr().err
+
+
+# --- settings -------------------------------------------------------------------------------------
+
+
+def of_robot(**others: Any) -> dict[str, Settings]:
+    """Return the settings of a careful robot, as its services publish them."""
+    vehicle: dict[str, Any] = {"vehicle__deceleration": 0.5, "vehicle__angular_deceleration": 0.5}
+    safety = {"safety__react": 0.4} | vehicle | others
+    return {
+        "bridge": settings_of(BridgeConfig(), **vehicle),
+        "odom": settings_of(OdomConfig()),
+        "safety": settings_of(SafetyConfig(), **safety),
+    }
+
+
+def today(printed: str, setting: str) -> str:
+    """Return the value of a setting in the column "today"."""
+    (row,) = (line.split() for line in printed.splitlines() if f" {setting} " in line)
+    return row[row.index(setting) + 1]
+
+
+def test_the_settings_of_the_recording_are_those_of_today(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(record(tmp_path / "a.mcap", driven(*ALL), settings=of_robot()))
+    assert main(["fit", path, "--out", "a"]) == 0
+    printed = capsys.readouterr().out
+    assert (today(printed, "safety.react"), today(printed, "vehicle.deceleration")) == (
+        "0.4",
+        "0.5",
+    )
+    assert "\nSettings: those of bridge, odom, safety in the recording.\n" in printed
+    assert "NOT SAFE" not in printed
+    assert "Settings: those of bridge" in Path("a/fit.html").read_text()
+
+    Path("other.toml").write_text("[safety]\nreact = 0.2\n")
+    assert main(["fit", path, "--out", "b", "--config", "other.toml"]) == 1
+    printed = capsys.readouterr().out
+    assert printed.startswith("NOT SAFE: ")
+    assert (today(printed, "safety.react"), today(printed, "vehicle.deceleration")) == (
+        "0.2",
+        "0.6",
+    )
+    assert "\nSettings: other.toml.\n" in printed
+
+    assert main(["fit", path, "--out", "c", "--set", "safety.react=0.3"]) == 0
+    printed = capsys.readouterr().out
+    assert (today(printed, "safety.react"), today(printed, "vehicle.deceleration")) == (
+        "0.3",
+        "0.5",
+    )
+    assert (
+        "Settings: those of bridge, odom, safety in the recording and --set safety.react=0.3.\n"
+        in printed
+    )
+
+
+def test_recordings_without_settings(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["fit", str(path), "--out", "a"])
+    assert (
+        "Settings: the defaults: no settings in the recording; name those of the robot with "
+        "--config.\n" in capsys.readouterr().out
+    )
+
+
+def test_recordings_with_several_settings(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The newest is used, in whatever order the files are named."""
+    old = record(tmp_path / "old.mcap", driven(*ALL), settings=of_robot(safety__react=0.2))
+    late = driven(0.5, first_s=900.0)
+    new = record(tmp_path / "new.mcap", late, settings=of_robot(safety__foreign=1))
+    for number, files in enumerate(((old, new), (new, path, old))):
+        assert main(["fit", *map(str, files), "--out", str(number)]) == 0
+        printed = capsys.readouterr().out
+        assert today(printed, "safety.react") == "0.4"
+        assert (
+            "Settings: the newest, because the recordings disagree about safety.react.\n" in printed
+        )
+        assert "Settings: ignored, unknown to this version of T2: safety.foreign.\n" in printed
+
+
+def test_a_recorded_value_out_of_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    settings = of_robot(safety__react=9.0)
+    path = str(record(tmp_path / "a.mcap", driven(0.5), settings=settings))
+    assert main(["fit", path]) == EXIT_CONFIG
+    assert (
+        "a.mcap: tel/safety/settings: safety.react = 9.0: Expected `float` <= 2.0; allowed is "
+        "0.0..2.0 s\n" in capsys.readouterr().err
+    )
+
+
+def test_settings_that_contradict_each_other(
+    path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fit", str(path), "--set", "vehicle.sonar_max=0.6"]) == EXIT_CONFIG
+    assert "sonar_max 0.6 m is too near" in capsys.readouterr().err

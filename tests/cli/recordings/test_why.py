@@ -3,15 +3,18 @@
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
 
 from cli.__main__ import main
+from common.cli_args import EXIT_CONFIG
 from common.freshness import NS_PER_S
 from sim import requests as q
 from t2.codec import Sample
 from tests.cli.recordings.decision_fixture import Tap, drive, reset, written
+from tests.cli.recordings.settings_fixture import as_sample, boots, settings_of
 from verification.search.bus import MS
 from verification.search.stack import Stack
 
@@ -42,18 +45,25 @@ def driven() -> tuple[Sample, ...]:
 
 @pytest.fixture
 def why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str]]:
-    """Write samples to a file, run the command on it, and return exit code and output."""
+    """Write samples to a file, run the command on it, and return exit code and output.
+
+    ``names_file``: with the settings of the simulated robot as ``--config``.
+    """
     settings = tmp_path / "robot.toml"
     settings.write_text(limits())
 
     def run(
-        *words: str, samples: tuple[Sample, ...] | None = None, cut: int = 0
+        *words: str,
+        samples: tuple[Sample, ...] | None = None,
+        cut: int = 0,
+        names_file: bool = True,
     ) -> tuple[int, str]:
         (tmp_path / "a.mcap").unlink(missing_ok=True)
         file = written(tmp_path / "a.mcap", driven() if samples is None else samples)
         if cut:
             file.write_bytes(file.read_bytes()[:-cut])
-        code = main(["why", str(file), "--config", str(settings), *words])
+        config = ("--config", str(settings)) if names_file else ()
+        code = main(["why", str(file), *config, *words])
         shown = capsys.readouterr()
         return code, shown.out + shown.err
 
@@ -199,7 +209,7 @@ def test_settings_that_the_robot_did_not_have(
     code, shown = why("--config", str(other))
     assert code == 1
     assert "first difference at 2." in shown
-    assert "A recording contains no settings (name those of the robot with --config)" in shown
+    assert "; these may not be the settings of the robot" in shown
     code, shown = why("--config", str(other), "--at", "2.6")
     assert code == 1
     assert "DIFFERS" in shown
@@ -216,3 +226,82 @@ def test_motions_that_end_while_the_vehicle_drives(why: Callable[..., tuple[int,
     assert "the bridge stops the vehicle" in shown
     _, whole = why()
     assert "the motions of safety end here" not in whole
+
+
+# --- settings -----------------------------------------------------------------------------------
+
+
+def with_settings(boot: int | None = None, robot: str = "001", **others: Any) -> tuple[Sample, ...]:
+    """Return the samples with the settings that safety had, in the middle; None removes one."""
+    (running,) = boots(driven())
+    config = Stack(step_ns=5 * MS).processes["safety"].config
+    message = settings_of(config, running if boot is None else boot, **others)
+    middle = len(driven()) // 2
+    shown = as_sample(message, driven()[middle].wall_ns, robot=robot)
+    return (*driven()[:middle], shown, *driven()[middle:])
+
+
+def test_the_settings_of_the_recording_are_used(why: Callable[..., tuple[int, str]]) -> None:
+    code, shown = why(samples=with_settings(), names_file=False)
+    assert code == 0
+    assert "\nsettings: those of safety in the recording\nreplay: 474 of 474 motions agree" in shown
+    _, one = why("--at", "4", samples=with_settings(), names_file=False)
+    assert "\nsettings: those of safety in the recording\ndecision at" in one
+    assert "motion: STOP, verdict stop\nrecorded: STOP (agrees)" in one
+
+
+def test_recorded_settings_decide(why: Callable[..., tuple[int, str]]) -> None:
+    """Another speed limit than the robot had: its motions do not come out again."""
+    slow = with_settings(vehicle__max_linear=0.25)
+    code, shown = why(samples=slow, names_file=False)
+    assert (code, "first difference at 2." in shown) == (1, True)
+    assert "these may not be the settings" not in shown
+    code, shown = why(samples=slow)
+    assert code == 0
+    assert "robot.toml\nreplay: 474 of 474 motions agree" in shown
+    assert "in the recording" not in shown
+
+
+def test_other_settings_than_the_recorded_ones(why: Callable[..., tuple[int, str]]) -> None:
+    change = "vehicle.max_linear=0.25"
+    code, shown = why("--set", change, samples=with_settings(), names_file=False)
+    assert code == 0
+    assert "settings: those of safety in the recording\nreplay: 474 of 474" in shown
+    assert f"with {change}: 69 of 474 motions differ" in shown
+
+
+def test_a_recording_without_settings(why: Callable[..., tuple[int, str]]) -> None:
+    for samples in (driven(), with_settings(robot="002")):
+        _, shown = why(samples=samples, names_file=False)
+        assert (
+            "settings: the defaults: no settings in the recording; name those of the robot with "
+            "--config\n" in shown
+        )
+
+
+def test_a_run_of_safety_without_settings_has_those_of_another_one(
+    why: Callable[..., tuple[int, str]],
+) -> None:
+    code, shown = why(samples=with_settings(boot=7), names_file=False)
+    assert code == 0
+    assert (
+        "settings: those of safety in the recording, of another run: this one has none\n"
+        "replay: 474 of 474" in shown
+    )
+
+
+def test_recorded_settings_of_another_version(why: Callable[..., tuple[int, str]]) -> None:
+    samples = with_settings(safety__foreign=1, safety__react=None)
+    code, shown = why(samples=samples, names_file=False)
+    assert code == 0
+    assert "settings: ignored, unknown to this version of T2: safety.foreign\n" in shown
+    assert "settings: not recorded, so the defaults of this version of T2: safety.react\n" in shown
+
+
+def test_a_recorded_value_out_of_range(why: Callable[..., tuple[int, str]]) -> None:
+    samples = with_settings(vehicle__max_linear=99.0)
+    code, shown = why(samples=samples, names_file=False)
+    assert code == EXIT_CONFIG
+    assert "a.mcap: tel/safety/settings: vehicle.max_linear = 99.0: Expected" in shown
+    assert "allowed is 0.05..3.0 m/s" in shown
+    assert why(samples=samples)[0] == 0

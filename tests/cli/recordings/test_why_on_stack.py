@@ -47,3 +47,4 @@ def test_the_motions_of_a_real_stack_come_out_again(
     assert found, shown
     assert int(found[1]) >= AGREEING * int(found[2]) > 50, shown
     assert "BRAKE  contact: The bumper was hit." in shown
+    assert "\nsettings: those of safety in the recording\n" in shown
