@@ -5,10 +5,11 @@ import math
 import shlex
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+from cli.commission.board_link import Times, check_alone, measure_watchdog
 from cli.commission.drive_command import guided_drive
 from cli.commission.manoeuvres import GROUPS
 from cli.commission.report import Report, Row, Verdict, render
@@ -17,7 +18,7 @@ from cli.commission.steps import STEPS, Step, choice, prompt, show
 from cli.inspect.session import one_robot, positive, robot_sources
 from cli.settings import Everything
 from common.cli_args import VERSION, add_sources, file_path, reader_language
-from common.config import Loaded, load
+from common.config import Loaded, Setting, load
 from common.errors import ConfigError
 from t2 import keys
 from t2.errors import T2Error
@@ -33,8 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "part",
         nargs="?",
-        choices=["drive"],
-        help="drive: manoeuvres on the ground, for a recording",
+        choices=["drive", "watchdog"],
+        help="drive: manoeuvres on the ground, for a recording; watchdog: wheels off the ground, "
+        "without the stack, whether the board stops by itself when commands end",
     )
     parser.add_argument(
         "--only", action="append", choices=[*NAMES, *GROUPS], metavar="STEP", default=[],
@@ -63,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
     if options.part is None:
         work = partial(run_steps, only=options.only)
     try:
-        report = checkout(loaded, work)
+        alone = options.part == "watchdog"
+        report = watchdog(loaded, Times()) if alone else checkout(loaded, work)
     except BaseException:
         file.unlink(missing_ok=True)  # it is empty
         raise
@@ -75,8 +78,10 @@ def run(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> None:
     """Refuse options of another part with ``ConfigError``."""
-    if options.part is None and options.space:
+    if options.part != "drive" and options.space:
         raise ConfigError("--space: is an option of `t2 checkout drive`")
+    if options.part == "watchdog" and options.only:
+        raise ConfigError("--only: is no option of `t2 checkout watchdog`")
     names: Sequence[str] = GROUPS if options.part == "drive" else NAMES
     for name in options.only:
         if name not in names:
@@ -92,18 +97,33 @@ def checkout(loaded: Loaded[Everything], work: Work) -> Report:
             *versions(session),
         ]
         report = Report(robot=session.robot, date=now(), facts=facts, settings=settings(session))
-        guide(report, session, work)
+        guide(report, partial(work, report, session))
     return report
 
 
-def guide(report: Report, session: CheckoutSession, work: Work) -> None:
+def watchdog(loaded: Loaded[Everything], times: Times) -> Report:
+    """Measure the board's own watchdog without the stack, and return the report."""
+    config = loaded.config
+    check_alone(config)
+    board = f"{config.board.address}:{config.board.port}"
+    report = Report(
+        robot=config.robot.id,
+        date=now(),
+        facts=[("board", board), ("T2 of this tool", VERSION)],
+        settings=of_sections(loaded.settings, ("board", "wire")),
+    )
+    guide(report, partial(measure_watchdog, report, config, times))
+    return report
+
+
+def guide(report: Report, work: Callable[[], None]) -> None:
     """Do the work with the operator; the report includes what was done before an abort."""
     show(f"Checkout of robot {report.robot}, board {dict(report.facts)['board']}.")
     name = firmware = ""
     try:
         name = prompt("Your name:")
         firmware = prompt("The firmware version, from the board's label:")
-        work(report, session)
+        work()
         show("")
         others = [each for each in report.manoeuvres if each[1].outcome != "passed"]
         if report.manoeuvres:
@@ -160,9 +180,19 @@ def versions(session: CheckoutSession) -> list[Row]:
 def settings(session: CheckoutSession) -> list[tuple[str, str, str]]:
     """Return path, value and origin of the services' settings that matter here."""
     return [
-        (path, str(setting.value), setting.origin)
+        row
         for service, sections in SECTIONS.items()
-        for path, setting in session.settings(service).items()
+        for row in of_sections(session.settings(service), sections)
+    ]
+
+
+def of_sections(
+    found: Mapping[str, Setting], sections: Sequence[str]
+) -> list[tuple[str, str, str]]:
+    """Return path, value and origin of the settings of these sections."""
+    return [
+        (path, str(setting.value), setting.origin)
+        for path, setting in found.items()
         if path.split(".")[0] in sections
     ]
 

@@ -1,0 +1,122 @@
+"""Verdict on the board's own watchdog: whether wheels that turn stop when commands end. Pure.
+
+The manual documents no watchdog. Two kinds of tries look for one:
+
+========== ============================================= =======================================
+try        after the last RUN                            slowing down is seen in
+========== ============================================= =======================================
+fed        queries go on, as those of the bridge         the velocities
+silent     no frame is sent for a time; then one query   the velocities, which the board sends
+           of the counters                               unasked; without them in the counters
+========== ============================================= =======================================
+
+A board that stops in the silent tries only has a watchdog that queries feed.
+"""
+
+from collections.abc import Iterator, Sequence
+from statistics import mean
+
+from msgspec import Struct
+
+from cli.commission.report import Row, Verdict, failed, judged
+
+RECENT_S = 0.2  # of velocities whose mean counts
+SLOWER, SLOW = 0.9, 0.5  # of the speed before: still turning, and slowing down for certain
+DROVE_ON = 0.8  # of the way at that speed
+SPREAD_S = 0.3  # a try that waits for so much longer than others needed must stop, too
+
+Point = tuple[float, float]  # s since the last command, m/s
+
+NO_WATCHDOG = (
+    "it has no watchdog. When the computer loses power, only the stop switch stops the vehicle, or "
+    "a relay (docs/relay.md)"
+)
+
+
+class Try(Struct, frozen=True, kw_only=True):
+    """One try, from the last motion command on."""
+
+    fed: bool  # whether queries went on
+    waited: float  # s without a motion command
+    slowed: float | None  # s until the wheels slowed down; None if they drove on
+    travelled: float  # m by the counters, until their query after that
+
+
+def slowed_s(points: Sequence[Point], speed: float) -> float | None:
+    """Return when the wheels began to slow down, s; None while they do not.
+
+    It is the first velocity after the last one of about the speed before: noise does not count.
+    """
+    recent = [v for s, v in points if s > points[-1][0] - RECENT_S]
+    if not recent or mean(recent) > SLOW * speed:
+        return None
+    turning = [n for n, (_, v) in enumerate(points) if v > SLOWER * speed]
+    return points[turning[-1] + 1 if turning else 0][0]
+
+
+def silent_try(points: Sequence[Point], speed: float, waited: float, travelled: float) -> Try:
+    """Return a try without queries; ``points`` are the velocities that arrived meanwhile."""
+    slowed = None
+    if points and points[-1][0] > waited - RECENT_S:
+        slowed = slowed_s(points, speed)
+    elif travelled < DROVE_ON * speed * waited:
+        slowed = travelled / speed
+    return Try(fed=False, waited=waited, slowed=slowed, travelled=travelled)
+
+
+def judge_watchdog(fed: Sequence[Try], silent: Sequence[Try]) -> Verdict:
+    """Return what the tries show; ``failed`` if they contradict each other."""
+    data = list(map(_row, (*fed, *silent)))
+    problems = [*_contradictions(fed, "with queries"), *_contradictions(silent, "in silence")]
+    stops, stops_silent = _stops(fed), _stops(silent)
+    if stops and not stops_silent and _drove_on_s(silent) > max(stops) + SPREAD_S:
+        problems.append("The wheels stopped while queries went on, but drove on in silence.")
+    if problems:
+        text = "The board has no watchdog that can be relied on."
+        return judged([*problems, text], "", data)
+    on_s, silent_s = _drove_on_s(fed), _drove_on_s(silent)
+    if stops:
+        text = f"The board stops by itself {_after(stops)} after the last motion command"
+        text += f"; in silence {_after(stops_silent)}." if stops_silent else "."
+    elif stops_silent:
+        text = (
+            f"The board drives on for at least {on_s:g} s without a motion command while queries "
+            f"go on: they feed its watchdog. In silence it stops by itself {_after(stops_silent)} "
+            "after the last frame."
+        )
+    else:
+        text = (
+            f"The board drives on for at least {on_s:g} s without a motion command, and for "
+            f"{silent_s:g} s without any frame: {NO_WATCHDOG}."
+        )
+    return judged([], text, data) if fed and silent else failed("No try was complete.")
+
+
+def _contradictions(tries: Sequence[Try], how: str) -> Iterator[str]:
+    """Yield what shows that the board does not stop each time."""
+    stops = _stops(tries)
+    if stops and (drove_on_s := _drove_on_s(tries)) > max(stops) + SPREAD_S:
+        yield (
+            f"It stopped {_after(stops)} after the last command in {len(stops)} of {len(tries)} "
+            f"tries {how}, and drove on for {drove_on_s:g} s in another one."
+        )
+
+
+def _stops(tries: Sequence[Try]) -> list[float]:
+    return [each.slowed for each in tries if each.slowed is not None]
+
+
+def _drove_on_s(tries: Sequence[Try]) -> float:
+    """Return the longest time without a stop, s."""
+    return max((each.waited for each in tries if each.slowed is None), default=0.0)
+
+
+def _after(stops: Sequence[float]) -> str:
+    several = "tries" if len(stops) > 1 else "try"
+    return f"{mean(stops):.2f} s ({min(stops):.2f} to {max(stops):.2f} in {len(stops)} {several})"
+
+
+def _row(it: Try) -> Row:
+    how = "queries go on" if it.fed else f"silence of {it.waited:g} s"
+    seen = f"drives on for {it.waited:g} s" if it.slowed is None else f"slows at {it.slowed:.2f} s"
+    return how, f"{seen}, {it.travelled:.3f} m"
