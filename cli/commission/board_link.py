@@ -120,9 +120,8 @@ def check_alone(config: Everything) -> None:
 def board_link(config: Everything) -> Iterator["BoardLink"]:
     """Open the link for the context. On each way out BRAKE is sent, which no signal interrupts."""
     with closing(BoardLink(config)) as link:
-        # Ctrl-Z would leave the wheels turning, and so would Ctrl-\\.
-        quits = signal.default_int_handler
-        with _handling({signal.SIGTSTP: signal.SIG_IGN, signal.SIGQUIT: quits}):
+        ends = dict.fromkeys(ENDING, signal.default_int_handler)
+        with _handling({**ends, signal.SIGTSTP: signal.SIG_IGN}):  # Ctrl-Z: the wheels would turn
             try:
                 yield link
             finally:

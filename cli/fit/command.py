@@ -15,6 +15,7 @@ from pathlib import Path
 from cli.fit.answers import answers, restarts_s
 from cli.fit.check import Course, Difference, compare
 from cli.fit.check import lines as difference_lines
+from cli.fit.closed import Closed, ClosedDrive, check_distinct, closed_drive
 from cli.fit.files import model, profile, settings_file
 from cli.fit.fit import Fit, fit, needed, reckoned, refusal
 from cli.fit.page import page
@@ -74,6 +75,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--turned", type=positive, metavar="TURNS",
         help="it turned so often in one direction, by a mark on the ground",
     )  # fmt: skip
+    parser.add_argument(
+        "--closed", action="store_true",
+        help="each recording ended where it began, place and heading, by a mark on the ground",
+    )  # fmt: skip
     parser.add_argument("--stops", action="store_true", help="show a row for each stop, too")
     parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
     add_sources(parser)
@@ -92,6 +97,9 @@ def run(options: argparse.Namespace) -> int:
         found = fit(streams, settings, of_ground_truth(streams, options.drove, options.turned))
     except ValueError as error:
         raise T2Error(f"--drove, --turned: {error}") from None
+    drives = closed_drives(options.files, robot, settings) if options.closed else []
+    closed = Closed(drives, settings.odom)
+    found.proposals |= closed.proposals
     warning = not_safe(found.too_long[0], settings) if found.too_long else ""
     if warning:
         print(red(warning), end="\n\n")
@@ -99,7 +107,7 @@ def run(options: argparse.Namespace) -> int:
     if options.stops and found.stops:
         print(output.table(STOPS, [as_cells(stop, settings) for stop in found.stops]), "", sep="\n")
     used = [f"Settings: {chosen.origin}.", *(f"Settings: {each}." for each in chosen.remarks)]
-    text, checked, explained = [*used, *remarks, *lines(found)], None, True
+    text, checked, explained = [*used, *remarks, *lines(found), *closed.lines()], None, True
     if options.check:
         checked, differences = check(options.check, robot, found)
         text += ["", f"The model under the commands of {options.check}:"]
@@ -113,7 +121,7 @@ def run(options: argparse.Namespace) -> int:
     )  # fmt: skip
     write(folder, found, [file.name for file in options.files], html)
     print(f"Written: {shlex.quote(str(folder))}: fit.toml, profile.toml, fit.html", flush=True)
-    return 1 if found.missing or warning or not explained else 0
+    return 1 if found.missing or warning or closed.gross or not explained else 0
 
 
 def check(
@@ -127,6 +135,22 @@ def check(
     except ValueError as error:
         raise T2Error(f"--check {file}: {error}") from None
     return (streams, course), differences
+
+
+def closed_drives(files: Sequence[Path], robot: str, settings: Everything) -> list[ClosedDrive]:
+    """Return the drives of recordings that ended where they began; raise ``T2Error``."""
+    drives = []
+    for file in files:
+        _, (streams, *others), remarks = read([file], robot)
+        if others or remarks:
+            problem = remarks[0] if remarks else "the robot's computer restarted"
+            raise T2Error(f"--closed {file}: {problem}")
+        try:
+            drives.append(closed_drive(file.name, streams, settings.odom))
+            check_distinct(drives)
+        except ValueError as error:
+            raise T2Error(f"--closed {file}: {error}") from None
+    return drives
 
 
 # --- recordings -----------------------------------------------------------------------------------

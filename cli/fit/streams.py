@@ -13,7 +13,7 @@ from statistics import median
 from typing import TypeVar
 
 from common.freshness import NS_PER_S
-from t2.messages import Bumper, Link, Message, Mileage, Motion, Ultrasonic, Velocity
+from t2.messages import Bumper, Link, Message, Mileage, Motion, Odometry, Ultrasonic, Velocity
 
 M = TypeVar("M", bound=Message)
 
@@ -21,6 +21,7 @@ COARSEST_S = 0.03  # between two velocities; 50 Hz have 0.02 s
 FIELDS: dict[type[Message], str] = {
     Motion: "motions", Velocity: "velocities", Mileage: "mileages", Bumper: "bumpers",
     Ultrasonic: "ultrasonics", Link: "links",
+    Odometry: "odometries",
 }  # fmt: skip
 KINDS = {kind.__name__ for kind in FIELDS}
 
@@ -35,6 +36,7 @@ class Streams:
     bumpers: list[Bumper] = field(default_factory=list)
     ultrasonics: list[Ultrasonic] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
+    odometries: list[Odometry] = field(default_factory=list)
 
     def add(self, message: Message) -> None:
         """Add a message."""

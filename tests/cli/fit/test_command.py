@@ -15,19 +15,20 @@ from common.config import Sources, load
 from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from services.bridge.config import BridgeConfig
-from services.odom.config import OdomConfig
+from services.odom.config import Odom, OdomConfig
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
 from services.safety.config import SafetyConfig
 from sim.config import load_model
 from t2 import codec, keys
 from t2.messages import Command, Message, Settings
+from tests.cli.fit.closed_fixture import closed_streams
 from tests.cli.fit.stops_fixture import streams
 from tests.cli.recordings.settings_fixture import settings_of
 from tests.recorder.samples import bare
 
 PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
-         "mileages": "tel/bridge/mileage"}  # fmt: skip
+         "mileages": "tel/bridge/mileage", "odometries": "tel/odom/odometry"}  # fmt: skip
 CAREFUL = (
     *("--set", "safety.react=0.4", "--set", "vehicle.deceleration=0.5"),
     *("--set", "vehicle.angular_deceleration=0.5"),
@@ -161,6 +162,37 @@ def test_a_distance_by_tape_measure_is_in_the_profile(
     with pytest.raises(SystemExit):
         main(["fit", str(path), "--drove", "-1"])
     assert "argument --drove: -1 must be more than 0" in capsys.readouterr().err
+
+
+def test_noises_of_odometry_from_closed_drives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    noise = Odom(distance_noise=0.03, turn_noise=0.06, drift_noise=0.03)
+    made = [
+        closed_streams(seed, noise=noise, begin_s=100.0 * seed, period_s=0.02) for seed in (1, 2)
+    ]
+    files = [str(record(tmp_path / f"{n}.mcap", one, host=1)) for n, one in enumerate(made)]
+    assert main(["fit", *files, "--closed", "--out", "fitted"]) == 1  # no stop was measured
+    printed = capsys.readouterr().out
+    assert "Closed drive 0.mcap: 20" in printed
+    assert "3 more closed drives are missing until a noise may be smaller." in printed
+    proposed = load(Everything, Sources((Path("fitted/fit.toml"),), {}, ())).config.odom
+    assert proposed.distance_noise > 0.03
+    assert proposed.turn_noise == pytest.approx(2 * proposed.distance_noise, abs=0.002)
+    assert proposed.drift_noise == proposed.distance_noise
+    assert main(["fit", *files, files[0], "--closed"]) == 1
+    assert "0.mcap and 0.mcap are of the same time: name one" in capsys.readouterr().err
+    assert main(["fit", *files]) == 1
+    assert "losed drive" not in capsys.readouterr().out
+
+
+def test_a_closed_drive_whose_end_is_not_recorded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = record(tmp_path / "whole.mcap", closed_streams(1, period_s=0.02), host=1)
+    (tmp_path / "cut.mcap").write_bytes(whole.read_bytes()[:-4000])
+    assert main(["fit", "cut.mcap", "--closed"]) == 1
+    assert "--closed cut.mcap: cut.mcap: truncated or damaged" in capsys.readouterr().err
 
 
 def test_robots_are_not_mixed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
