@@ -12,7 +12,7 @@ from functools import partial
 from math import isfinite
 from pathlib import Path
 
-from cli.fit.answers import answers, restarts_s
+from cli.fit.answers import answers, order, restarts_s
 from cli.fit.check import Course, Difference, compare
 from cli.fit.check import lines as difference_lines
 from cli.fit.closed import Closed, ClosedDrive, check_distinct, closed_drive
@@ -300,7 +300,15 @@ def of_streams(streams: Streams) -> Iterator[str]:
     for each in answers(streams):
         yield (
             f"{each.stream}: {each.messages} messages, {each.rate:.1f} Hz, "
-            f"{each.lost:.2%} lost, longest gap {each.longest_gap:.3f} s."
+            f"{each.lost:.2%} lost, longest gap {each.longest_gap:.3f} s, "
+            f"jitter {each.jitter * 1000:.1f} ms."
+        )
+    if found := order(streams):
+        after = ", ".join(f"{name} {s * 1000:.1f} ms" for name, s in found.delays.items())
+        late = ", ".join(f"{name} in {number}" for name, number in found.late.items())
+        yield (
+            f"Order of the answers after their queries: {after}; {found.usual:.1%} of "
+            f"{found.cycles} cycles{f', late: {late}' if late else ''}."
         )
     if streams.links:
         ports = streams.links[-1].ports.items()

@@ -3,10 +3,10 @@
 import pytest
 from msgspec.structs import replace
 
-from cli.fit.answers import answers, hits_s, restarts_s, round_trips_s
+from cli.fit.answers import answers, hits_s, order, restarts_s, round_trips_s
 from cli.fit.streams import Streams
 from common.freshness import NS_PER_S
-from t2.messages import Bumper, Mileage, Velocity
+from t2.messages import Bumper, Mileage, RangeStatus, Ultrasonic, Velocity
 from tests.factories import link
 
 STEP_NS = NS_PER_S // 50
@@ -58,3 +58,52 @@ def test_round_trips() -> None:
     made = Streams()
     made.links = [replace(link(), round_trip=0.002), replace(link(), round_trip=None)]
     assert round_trips_s(made) == (0.002,)
+
+
+def test_jitter_is_the_spread_of_the_gaps() -> None:
+    made = velocities(*range(100))
+    made.velocities = [
+        replace(v, mono_ns=v.mono_ns + n % 2 * NS_PER_S // 1000)
+        for n, v in enumerate(made.velocities)
+    ]
+    assert answers(made)[0].jitter == pytest.approx(0.002)  # gaps of 19 and 21 ms
+    assert answers(velocities(*range(100)))[0].jitter == 0.0
+
+
+def polled(*, late_every: int = 0, trip_s: float = 0.002) -> Streams:
+    """Return answers as the bridge polls: the bumper each tick, counters and sonars seldom."""
+    made, ms = Streams(), NS_PER_S // 1000
+    for tick in range(500):
+        begin_ns, head = tick * STEP_NS, {"seq": tick, "boot": 1}
+        if tick % 10 == 0:
+            made.add(replace(link(), round_trip=trip_s, mono_ns=begin_ns, **head))
+        begin_ns -= tick % 3 * ms // 2  # ticks come a little early
+        late_ms = 5 if late_every and tick % late_every == 0 else 0
+        made.add(Bumper(pressed=False, mono_ns=begin_ns + (1 + late_ms) * ms, **head))
+        if tick % 2 == 0:
+            made.add(Mileage(distance=0, heading=0, epoch=0, mono_ns=begin_ns + 2 * ms, **head))
+        if tick % 5 in (0, 2):
+            status: tuple[RangeStatus, ...] = ("no_echo",) * 8
+            ranges = Ultrasonic(ranges=(None,) * 8, status=status, **head)
+            made.add(replace(ranges, mono_ns=begin_ns + 3 * ms))
+    return made
+
+
+def test_the_order_of_the_answers_after_their_queries() -> None:
+    found = order(polled())
+    assert found
+    assert list(found.delays) == ["bumper", "mileage", "ultrasonic"]
+    assert found.delays["mileage"] == pytest.approx(0.0015, abs=0.0006)
+    assert (found.cycles, found.usual, found.late) == (350, 1.0, {})
+
+
+def test_an_answer_that_is_late_is_named() -> None:
+    found = order(polled(late_every=30))
+    assert found
+    assert found.late == {"bumper": 17}
+    assert found.usual == pytest.approx(1 - 17 / 350)
+
+
+def test_an_order_that_a_recording_does_not_show() -> None:
+    assert order(polled(trip_s=0.015)) is None  # the answer may belong to the query before
+    assert order(velocities(*range(9))) is None
