@@ -310,6 +310,8 @@ def of_streams(streams: Streams) -> Iterator[str]:
             f"Order of the answers after their queries: {after}; {found.usual:.1%} of "
             f"{found.cycles} cycles{f', late: {late}' if late else ''}."
         )
+    elif streams.links:
+        yield "Order of the answers: not shown, without round trips of at most 10 ms."
     if streams.links:
         ports = streams.links[-1].ports.items()
         yield f"Ports of the answers: {', '.join(f'{name} {port}' for name, port in ports)}."
