@@ -2,21 +2,32 @@
 
 import re
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Thread
+from types import SimpleNamespace
 
 import pytest
+from msgspec.structs import replace
 
 from cli.__main__ import main
 from cli.commission import command
-from cli.commission.board_link import BRAKES, Times
+from cli.commission.board_link import BRAKE, BRAKES, Times, board_link
 from cli.commission.steps import PHRASE
 from cli.demo.score import read
+from cli.settings import Everything
+from common.settings import Board as BoardSettings
+from sim.__main__ import Process
+from sim.config import Config, load_plan
+from sim.model import Firmware as FirmwareModel
+from sim.model import Model
 from sim.requests import Bumper, Driver, Firmware, Mute
+from sim.simulation import Simulation
 from t2.messages import Command
 from tests.cli.processes import sets, t2
 from verification.harness.bus import set_options
@@ -167,6 +178,52 @@ def test_each_signal_brakes_while_the_board_holds_run(
     assert board.ends_braked()
     assert board.control.truth().linear == 0.0
     assert "Ended early: interrupted by the operator" in report.read_text()
+
+
+def test_no_signal_interrupts_the_brake(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer:
+        peer.bind(("127.0.0.1", 0))
+        peer.settimeout(5.0)
+        settings = BoardSettings(port=peer.getsockname()[1], listen_ports=tuple(udp_ports(2)))
+        sleep = SimpleNamespace(sleep=lambda _: signal.raise_signal(signal.SIGINT))
+        monkeypatch.setattr("cli.commission.board_link.time", sleep)
+        with board_link(Everything(board=settings)):
+            pass
+        assert [peer.recv(100) for _ in range(2 * BRAKES)] == [BRAKE] * 2 * BRAKES
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+class FedBoard(Simulation):
+    """A board whose watchdog is fed by each frame."""
+
+    def receive(self, payload: bytes, port: int, now_ns: int) -> None:
+        super().receive(payload, port, now_ns)
+        self._command = replace(self._command, mono_ns=now_ns)
+
+
+def test_a_watchdog_that_queries_feed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sim.__main__.Simulation", FedBoard)
+    port, *listen = udp_ports(3)
+    settings = BoardSettings(port=port, listen_ports=tuple(listen))
+    model = Model(firmware=FirmwareModel(watchdog=0.8))
+    plan, trace = load_plan("empty", model.vehicle), tmp_path / "trace.jsonl"
+    sets_ = [f"board.port={port}", f"board.listen_ports={listen}",
+             f"bus.connect=['tcp/127.0.0.1:{free_port()}']"]  # fmt: skip
+    with trace.open("wb", buffering=0) as file:
+        process = Process(Config(board=settings), model, plan, file)
+        thread = Thread(target=process.run)
+        thread.start()
+        try:
+            board = Board(sets_, Control(0), trace)
+            measure = Measure(board, tmp_path / "report.md", monkeypatch)
+            assert measure() == 0
+        finally:
+            process.loop.stop()
+            thread.join()
+            process.close()
+    text = measure.report.read_text()
+    assert "they feed its watchdog. In silence it stops by itself" in text
+    assert board.ends_braked()
 
 
 def test_a_bridge_that_runs_is_not_disturbed(

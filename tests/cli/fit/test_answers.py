@@ -4,6 +4,7 @@ import pytest
 from msgspec.structs import replace
 
 from cli.fit.answers import answers, hits_s, order, restarts_s, round_trips_s
+from cli.fit.command import of_streams
 from cli.fit.streams import Streams
 from common.freshness import NS_PER_S
 from t2.messages import Bumper, Mileage, RangeStatus, Ultrasonic, Velocity
@@ -107,3 +108,15 @@ def test_an_answer_that_is_late_is_named() -> None:
 def test_an_order_that_a_recording_does_not_show() -> None:
     assert order(polled(trip_s=0.015)) is None  # the answer may belong to the query before
     assert order(velocities(*range(9))) is None
+
+
+def test_jitter_and_order_are_printed() -> None:
+    made = polled(late_every=30)
+    made.velocities = velocities(*range(100)).velocities
+    lines = list(of_streams(made))
+    assert any(line.startswith("velocity: ") and line.endswith("jitter 0.0 ms.") for line in lines)
+    (shown,) = (line for line in lines if line.startswith("Order of the answers"))
+    assert "queries: bumper 0.5 ms, mileage 1.5 ms, ultrasonic 2.5 ms; 95.1% of 350" in shown
+    assert shown.endswith("cycles, late: bumper in 17.")
+    (shown,) = (line for line in of_streams(polled(trip_s=0.015)) if "Order" in line)
+    assert shown.endswith("not shown, without round trips of at most 10 ms.")
