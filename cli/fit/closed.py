@@ -23,10 +23,10 @@ from cli.fit.estimate import LEAST, ONE_SIDED
 from cli.fit.streams import Streams, between
 from common.freshness import NS_PER_S
 from common.motion import Twist
+from common.pose import Pose
 from services.odom.config import Odom
 from services.odom.core.estimator import Estimator
 from services.odom.core.noise import HOLD_S
-from services.odom.core.pose import Pose
 from t2.messages import Message, Mileage, Odometry, Velocity
 
 DEGREES = 3  # of freedom: x, y, heading

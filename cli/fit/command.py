@@ -141,7 +141,7 @@ def closed_drives(files: Sequence[Path], robot: str, settings: Everything) -> li
     """Return the drives of recordings that ended where they began; raise ``T2Error``."""
     drives = []
     for file in files:
-        _, (streams, *others), remarks = read([file], robot)
+        _, (streams, *others), remarks, _ = read([file], robot)
         if others or remarks:
             problem = remarks[0] if remarks else "the robot's computer restarted"
             raise T2Error(f"--closed {file}: {problem}")

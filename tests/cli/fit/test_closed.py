@@ -16,8 +16,8 @@ from cli.fit.closed import (
 )
 from cli.fit.streams import Streams
 from common.freshness import NS_PER_S
+from common.pose import Pose
 from services.odom.config import Odom
-from services.odom.core.pose import Pose
 from tests.cli.fit.closed_fixture import TRUE, closed_streams
 
 TINY = Odom(distance_noise=1e-6, turn_noise=1e-6, drift_noise=1e-6)
