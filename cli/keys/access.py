@@ -56,7 +56,7 @@ DRIVER_SERVICES = (*LAPTOP_SERVICES, "teleop")
 
 COMMANDS: Mapping[str, Sequence[keys.Topic[Any]]] = {  # besides the emergency stop
     "driver": (keys.DRIVE, keys.LIMIT),
-    "device": (keys.LIMIT,),
+    "device": (keys.LIMIT, keys.FIX),
 }
 PROGRAMS_CALLS = (keys.SET_LED, keys.SET_POSE)  # without an operator's source
 ROS_TWISTS = ("TwistStamped", "Twist")
@@ -121,7 +121,7 @@ def rights(member: Profile, router: RouterSettings) -> Rights:
 
 
 def laptop(member: Profile) -> Rights:
-    """Return the rights to see everything; a driver drives, a device limits, all but a viewer stop.
+    """Return the rights to see everything; drivers drive, devices limit and locate, they all stop.
 
     Drivers and devices do so for their robots, as their sources. Only an operator also resets. Each
     publishes on keys of its own.
@@ -161,7 +161,7 @@ def site() -> Rights:
         "recall": RECALLED,
         "ask": (*QUERYABLE, *(call.on(ANY) for call in keys.CALLS)),
         "write": (
-            *(topic.on(ANY, source=ANY) for topic in (keys.DRIVE, keys.LIMIT)),
+            *(topic.on(ANY, source=ANY) for topic in (keys.DRIVE, keys.LIMIT, keys.FIX)),
             keys.estop_key(ANY),
             *(keys.EVENTS.on(ANY, service=name) for name in DRIVER_SERVICES),
             *app_keys(ANY, ANY),

@@ -51,9 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     issue.add_argument(
         "--source", action="append", default=[], metavar="NAME",
-        help="for a driver or device: allow only this source, as in safety.sources or "
-        f"safety.limits; may be repeated; by default {', '.join(OPERATORS_SOURCES)} for a driver, "
-        "which may also reset; NAME for a device",
+        help="for a driver or device: allow only this source, as in safety.sources, "
+        "safety.limits or localization.sources; may be repeated; by default "
+        f"{', '.join(OPERATORS_SOURCES)} for a driver, which may also reset; NAME for a device",
     )  # fmt: skip
     for verb in (issue, renew):
         _add_signing(verb)

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -21,10 +22,12 @@ from mcp import Client, StdioServerParameters
 from nbclient import NotebookClient
 
 import t2
+from cli.settings import Everything
 from examples import limit_speed, nearest_obstacle, wall_follower
 from sim.requests import Bumper, Sonar
 from t2.messages import Ultrasonic
 from tests.sdk.library_robot import blocked, ready
+from verification.harness.bus import set_options
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import PATIENCE_S, wait_until
 
@@ -36,9 +39,18 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "sdk")}
 SETS = ("safety.sources.agent={priority=1, lease=0.3, operator=false}",)
 
 
+def beside(config: Everything) -> dict[str, list[str]]:
+    """Return the command of a localization that tags may place."""
+    router = f"bus.connect=['{config.bus.endpoints[0]}']"
+    sets = set_options(router, "localization.sources.tags={places=true}")
+    return {"localization": [sys.executable, "-m", "services.localization", *sets]}
+
+
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
-    with running_stack(tmp_path_factory.mktemp("examples"), "office", sets=SETS) as it:
+    with running_stack(
+        tmp_path_factory.mktemp("examples"), "office", sets=SETS, beside=beside
+    ) as it:
         yield it
 
 
@@ -125,6 +137,28 @@ def test_the_agent_drives_and_stops_and_never_resets(robot: t2.Robot, stack: Run
     asyncio.run(asyncio.wait_for(session(), 100.0))
     stack.control.do(Sonar(name="rear"))
     wait_until(lambda: robot.safety.latest().latched == ("estop",), "the latch")
+
+
+def test_the_localizer_places_the_vehicle_by_tags(robot: t2.Robot) -> None:
+    words = [sys.executable, "examples/localizer.py", robot.endpoint]
+    tag = {"tag": "7", "x": 2.0, "y": 1.0, "heading": math.pi / 2, "age": 0.1}
+    unknown = {"tag": "9", "x": 2.0, "y": 1.0, "heading": 0.0, "age": 0.1}
+    with subprocess.Popen(
+        words, cwd=ROOT, env=ENVIRONMENT, stdin=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None
+        pose = robot.localization.latest(PATIENCE_S)
+        for step in range(400):
+            detected = unknown if step % 5 == 0 else tag
+            print(json.dumps(detected), file=process.stdin, flush=True)
+            pose = robot.localization.latest()
+            if pose.state == "placed":
+                break
+            time.sleep(0.1)
+        process.stdin.close()
+        assert process.wait(PATIENCE_S) == 0
+    # The tag at (4, 1) faces west; it is 2 m ahead and 1 m to the left of a vehicle facing north.
+    assert (pose.x, pose.y, pose.heading) == pytest.approx((5.0, -1.0, math.pi / 2), abs=0.05)
 
 
 def test_the_web_hook_gets_each_latch_once(robot: t2.Robot, stack: RunningStack) -> None:

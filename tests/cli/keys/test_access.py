@@ -66,7 +66,10 @@ def test_a_driver_is_limited_to_its_sources(sources: tuple[str, ...], resets: bo
 def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> None:
     given = ROLES["device lidar of 001"]
     assert may(given, "write", LIMIT.on(MINE, source="lidar"))
+    assert may(given, "write", keys.FIX.on(MINE, source="lidar"))
     for key in (
+        keys.FIX.on(MINE, source="amcl"),
+        keys.FIX.on(OTHER, source="lidar"),
         *(LIMIT.on(MINE, source=source) for source in ("person", "*")),
         LIMIT.on(OTHER, source="lidar"),
         DRIVE.on(MINE, source="lidar"),
