@@ -93,6 +93,14 @@ class Sample(Struct, frozen=True):
     pose: Pose
     covariance: Covariance
     received_ns: int
+    step: tuple[float, float] = (0.0, 0.0)  # m and rad until the next message
+
+    def halfway(self) -> "Sample":
+        """Return where the vehicle was in the middle until the next message."""
+        distance, turn = self.step
+        pose = self.pose.moved(distance / 2, turn / 2)
+        covariance = self.covariance.carried(pose.x - self.pose.x, pose.y - self.pose.y)
+        return Sample(self.seq, pose, covariance, self.received_ns, self.step)
 
 
 class Transform(Struct, frozen=True):

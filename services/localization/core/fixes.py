@@ -109,14 +109,19 @@ class SourceState:
         )
 
 
-def measured_of(fix: Fix, settings: FixSource) -> Measured:
-    """Return what a fix measures; its standard deviations are at least those of the settings."""
+def measured_of(fix: Fix, sample: Sample, settings: FixSource) -> Measured:
+    """Return what a fix measures that names a sample.
+
+    Its standard deviations are at least those of the settings. It was measured at any time until
+    the next sample: the vehicle may have moved.
+    """
     given = Covariance.of(fix.covariance)
+    moved, turned = (each**2 / 12 for each in sample.step)  # variances of an interval
     covariance = replace(
         given,
-        xx=max(given.xx, settings.sigma**2),
-        yy=max(given.yy, settings.sigma**2),
-        hh=max(given.hh, settings.heading_sigma**2),
+        xx=max(given.xx, settings.sigma**2) + moved,
+        yy=max(given.yy, settings.sigma**2) + moved,
+        hh=max(given.hh, settings.heading_sigma**2) + turned,
     )
     values = POSITION if fix.heading is None else POSE
     return Measured(Pose(fix.x, fix.y, fix.heading or 0.0), covariance, values)

@@ -31,11 +31,13 @@ from services.localization.config import Localization
 from services.localization.core.estimate import GATE, POSE, Located, Sample, Transform
 from services.localization.core.fixes import AGREEING, SourceState, TakenFix, measured_of
 from t2 import messages as m
+from t2.keys import ODOMETRY
 from t2.messages import Phrase
 from t2.words import render
 
 KEPT_NS = 2 * NS_PER_S  # of samples and used fixes
 USED = 64  # fixes at most that are used again after a late one
+PERIOD_S = 1 / ODOMETRY.rate_hz
 GAP_S = 0.5  # of odometry, during which its pose may be set without a new placement
 SILENT_NS = NS_PER_S // 2  # odometry: the vehicle cannot be placed
 
@@ -72,7 +74,8 @@ class Localizer:
         """Process a pose of odometry; an older one than the last is ignored."""
         before, covariance = self._odometry, Covariance.of(odometry.pose_covariance)
         pose = Pose(odometry.x, odometry.y, odometry.heading)
-        sample = Sample(odometry.seq, pose, covariance, now_ns)
+        step = odometry.linear * PERIOD_S, odometry.angular * PERIOD_S
+        sample = Sample(odometry.seq, pose, covariance, now_ns, step)
         if before is not None and before.boot == odometry.boot:
             if odometry.seq <= before.seq:
                 return
@@ -151,7 +154,7 @@ class Localizer:
         sample = self._sample_of(fix)
         if sample is None:
             return Phrase("fix.unknown_odometry")
-        taken = TakenFix(sample, measured_of(fix, source.settings))
+        taken = TakenFix(sample.halfway(), measured_of(fix, sample, source.settings))
         if reason := source.fault(taken):
             return reason
         if not self._used:
@@ -159,7 +162,7 @@ class Localizer:
         earlier = [each for each in self._used if each.seq <= sample.seq]
         if not earlier:
             return Phrase("fix.late")
-        distance = earlier[-1].transform.at(sample).distance(taken.measured)
+        distance = earlier[-1].transform.at(taken.sample).distance(taken.measured)
         if distance > GATE[taken.measured.values]:
             if source.agrees(taken):
                 self._contradicts = self._contradicts or name

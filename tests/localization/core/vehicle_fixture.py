@@ -32,7 +32,7 @@ class Drive:
         self.random = random.Random(seed)
         self.true = start
         self.seq, self.now_ns, self.boot = 0, 0, BOOT
-        self.epoch = 0
+        self.half = (0.0, 0.0)
         self.noise = Odom()
         self.localizer = Localizer(
             Localization(sources={name: FixSource(**of) for name, of in sources.items()})
@@ -59,6 +59,7 @@ class Drive:
         self.now_ns += STEP_NS
         self.seq += 1
         distance, turn = linear * STEP_S, angular * STEP_S
+        self.half = distance / 2, turn / 2
         of = self.noise
         away = self.random.gauss(0.0, of.distance_noise * math.sqrt(abs(distance)))
         variance = of.turn_noise**2 * abs(turn) + of.drift_noise**2 * abs(distance)
@@ -86,12 +87,12 @@ class Drive:
         return self.pose()
 
     def measured(self, *, turned: bool = True, sigma: float = SIGMA, **about: Any) -> Fix:
-        """Return a fix of the true pose at the newest odometry."""
-        noise = self.random.gauss
+        """Return a fix of the true pose, measured halfway to the next odometry."""
+        noise, true = self.random.gauss, self.true.moved(*self.half)
         fields: dict[str, Any] = {
-            "x": self.true.x + noise(0.0, sigma),
-            "y": self.true.y + noise(0.0, sigma),
-            "heading": self.true.heading + noise(0.0, SIGMA) if turned else None,
+            "x": true.x + noise(0.0, sigma),
+            "y": true.y + noise(0.0, sigma),
+            "heading": true.heading + noise(0.0, SIGMA) if turned else None,
             "covariance": diagonal(sigma, SIGMA),
             "odom_boot": self.boot,
             "odom_seq": self.seq,

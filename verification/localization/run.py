@@ -1,0 +1,183 @@
+"""One vehicle with one source of fixes, in simulated time, and what its pose is worth."""
+
+import math
+import random
+from collections import deque
+from typing import Any
+
+from msgspec import Struct
+from msgspec.structs import replace
+
+from services.localization.config import FixSource, Localization, LocalizationConfig
+from services.localization.localization import LocalizationService
+from t2 import keys
+from t2 import messages as m
+from verification.search.bus import MS, ROBOT
+from verification.search.draw import TURN_BRAKING, draw
+from verification.search.judge import normalised
+from verification.search.stack import PLANE, Stack
+
+STEP_NS = 10 * MS
+READY_MS, TICK_MS = 2000, 100
+DRIVE_S = 120.0
+PLACED_SIGMA, OUTLIER_M = 0.05, 5.0
+SOURCE = "tags"
+
+
+class FixModel(Struct, frozen=True, kw_only=True):
+    """How a simulated source measures the truth."""
+
+    period: int  # ticks between two fixes
+    sigma: float  # m
+    heading_sigma: float | None  # rad; None: it measures no heading
+    delay: int  # ticks
+    outliers: float  # share
+    gap: float  # share of the time without fixes
+
+
+class Result(Struct, frozen=True, kw_only=True):
+    """What the pose of one vehicle was worth, once a second."""
+
+    seed: int
+    source: FixModel
+    nees: tuple[float, ...]  # squared errors in standard deviations
+    error: float  # m, at worst while it was placed
+    sigma: float  # m, at worst while it was placed
+    placed: float  # share of the time
+    used: int
+    refused: int
+
+
+def source_of(chance: random.Random) -> FixModel:
+    """Draw a source: tags, UWB, GNSS, or a lidar."""
+    return FixModel(
+        period=chance.choice((1, 2, 5, 10, 30)),
+        sigma=chance.choice((0.02, 0.05, 0.1, 0.3)),
+        heading_sigma=chance.choice((0.02, 0.05, None)),
+        delay=chance.choice((0, 1, 3, 10)),
+        outliers=chance.choice((0.0, 0.05, 0.2)),
+        gap=chance.choice((0.0, 0.3)),
+    )
+
+
+class Run:
+    """A vehicle without faults that drives at random in a plane."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = random.Random(seed)
+        self._source = source_of(self._random)
+        drawn = draw(seed)
+        turning = float(drawn.get(TURN_BRAKING, 1.0))
+        self._stack = Stack(drawn.model(), PLANE, seed=seed, step_ns=STEP_NS, turn_braking=turning)
+        self._seed = seed
+        self._pose: m.MapPose | None = None
+        self._truth = self._stack.vehicle.simulation.pose  # when it was published
+        self._odometry: m.Odometry | None = None
+        self._waiting: deque[tuple[int, m.Fix]] = deque()
+        process: Any = self._stack.process("localization")
+        self._process = process
+        process.config = LocalizationConfig(
+            localization=Localization(sources={SOURCE: FixSource(sigma=0.01, heading_sigma=0.01)})
+        )
+        with self._stack.time():
+            LocalizationService(process)
+        self._stack.processes["localization"] = process
+        self._stack.hand.subscribe(keys.MAP_POSE, self._on_pose)
+        self._stack.hand.subscribe(keys.ODOMETRY, self._on_odometry)
+
+    def _on_pose(self, arrival: Any) -> None:
+        self._pose, self._truth = arrival.message, self._stack.vehicle.simulation.pose
+
+    def _on_odometry(self, arrival: Any) -> None:
+        self._odometry = arrival.message
+
+    def go(self) -> Result:
+        """Place the vehicle, drive, and compare once a second."""
+        self._stack.sources["teleop"].message = m.Drive(linear=0.0, angular=0.0, echo=0)
+        self._stack.run(READY_MS)
+        self._place()
+        nees, error, sigma, placed, ticks = [], 0.0, 0.0, 0, round(DRIVE_S * 1000 / TICK_MS)
+        for tick in range(ticks):
+            if tick % 20 == 0:
+                self._request()
+            self._measure(tick)
+            self._stack.run(TICK_MS)
+            if tick % 10 == 9 and (found := self._compare()):
+                nees.append(found[0])
+                if found[1]:
+                    placed += 1
+                    error, sigma = max(error, found[2]), max(sigma, found[3])
+        assert self._pose is not None
+        (state,) = self._pose.sources
+        return Result(
+            seed=self._seed, source=self._source, nees=tuple(nees), error=error, sigma=sigma,
+            placed=placed / (ticks // 10), used=state.used, refused=state.refused,
+        )  # fmt: skip
+
+    def _place(self) -> None:
+        """Place the vehicle as a person does: a little beside the truth."""
+        truth, noise = self._stack.vehicle.simulation.pose, self._random.gauss
+        assert self._stack.seen is not None
+        request = m.PlaceRequest(
+            x=truth.x + noise(0.0, PLACED_SIGMA),
+            y=truth.y + noise(0.0, PLACED_SIGMA),
+            heading=math.remainder(truth.heading + noise(0.0, PLACED_SIGMA), math.tau),
+            sigma=PLACED_SIGMA,
+            heading_sigma=PLACED_SIGMA,
+            echo=self._stack.seen.heartbeat,
+        )
+        with self._stack.time():
+            caller = self._process.call(keys.PLACE, request)
+        self._stack.run(TICK_MS)
+        assert caller.done, caller.text
+
+    def _request(self) -> None:
+        """Request another velocity."""
+        chance = self._random
+        turns = chance.random() < 0.3  # on the spot
+        linear = 0.0 if turns else chance.choice((0.0, 0.2, 0.5, 0.8, -0.3))
+        angular = chance.uniform(-0.6, 0.6)
+        self._stack.sources["teleop"].message = m.Drive(linear=linear, angular=angular, echo=0)
+
+    def _measure(self, tick: int) -> None:
+        """Measure the truth at the newest odometry, and deliver what is due."""
+        of = self._source
+        in_gap = (tick // 100) % 3 == 0 and of.gap > 0  # 10 s of 30 s
+        if tick % of.period == 0 and not in_gap and self._odometry is not None:
+            self._waiting.append((tick + of.delay, self._fix()))
+        while self._waiting and self._waiting[0][0] <= tick:
+            fix = replace(self._waiting.popleft()[1], boot=1, seq=tick)
+            self._stack.hand.post(keys.FIX.on(ROBOT, source=SOURCE), fix)
+
+    def _fix(self) -> m.Fix:
+        of, noise, truth = self._source, self._random.gauss, self._stack.vehicle.simulation.pose
+        assert self._odometry is not None
+        away = OUTLIER_M if self._random.random() < of.outliers else 0.0
+        turned = of.heading_sigma
+        return m.Fix(
+            x=truth.x + noise(0.0, of.sigma) + noise(0.0, away),
+            y=truth.y + noise(0.0, of.sigma) + noise(0.0, away),
+            heading=None if turned is None else truth.heading + noise(0.0, turned),
+            covariance=(of.sigma**2, 0, 0, 0, of.sigma**2, 0, 0, 0, (turned or 1.0) ** 2),
+            odom_boot=self._odometry.boot,
+            odom_seq=self._odometry.seq,
+        )
+
+    def _compare(self) -> tuple[float, bool, float, float] | None:
+        """Return NEES, whether the pose is placed, its error and its standard deviation."""
+        pose, truth = self._pose, self._truth
+        if pose is None or pose.pose_covariance is None:
+            return None
+        assert pose.x is not None
+        assert pose.y is not None
+        assert pose.heading is not None
+        turned = math.remainder(pose.heading - truth.heading, math.tau)
+        error = (pose.x - truth.x, pose.y - truth.y, turned)
+        nees = normalised(error, pose.pose_covariance)
+        sigma = math.sqrt(max(pose.pose_covariance[0], pose.pose_covariance[4]))
+        return nees, pose.state == "placed", math.hypot(*error[:2]), sigma
+
+
+def measure(seed: int) -> Result:
+    """Run one vehicle."""
+    return Run(seed).go()
