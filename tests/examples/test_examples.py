@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
+from itertools import repeat
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -139,26 +140,42 @@ def test_the_agent_drives_and_stops_and_never_resets(robot: t2.Robot, stack: Run
     wait_until(lambda: robot.safety.latest().latched == ("estop",), "the latch")
 
 
-def test_the_localizer_places_the_vehicle_by_tags(robot: t2.Robot) -> None:
-    words = [sys.executable, "examples/localizer.py", robot.endpoint]
-    tag = {"tag": "7", "x": 2.0, "y": 1.0, "heading": math.pi / 2, "age": 0.1}
-    unknown = {"tag": "9", "x": 2.0, "y": 1.0, "heading": 0.0, "age": 0.1}
+Pose = tuple[float, float, float]
+
+
+def locates(robot: t2.Robot, program: str, lines: Iterator[str], pose: Pose) -> bool:
+    """Return whether a localizer moves a vehicle that is placed beside this pose to it."""
+    robot.localization.latest(PATIENCE_S)
+    x, y, heading = pose
+    robot.place(x + 0.3, y - 0.3, heading, sigma=0.5)
+    words = [sys.executable, program, robot.endpoint]
     with subprocess.Popen(
         words, cwd=ROOT, env=ENVIRONMENT, stdin=subprocess.PIPE, text=True
     ) as process:
         assert process.stdin is not None
-        pose = robot.localization.latest(PATIENCE_S)
-        for step in range(400):
-            detected = unknown if step % 5 == 0 else tag
-            print(json.dumps(detected), file=process.stdin, flush=True)
-            pose = robot.localization.latest()
-            if pose.state == "placed":
-                break
+        for line in lines:
+            print(line, file=process.stdin, flush=True)
             time.sleep(0.1)
+            now = robot.localization.latest()
+            if (now.x, now.y, now.heading) == pytest.approx(pose, abs=0.06):
+                break
         process.stdin.close()
         assert process.wait(PATIENCE_S) == 0
+    now = robot.localization.latest()
+    return (now.x, now.y, now.heading) == pytest.approx(pose, abs=0.06)
+
+
+def test_plain_fixes_are_used(robot: t2.Robot) -> None:
+    lines = repeat("1.1 2.1 0.55", 300)
+    assert locates(robot, "examples/plain/fix.py", lines, (1.1, 2.1, 0.55))
+
+
+def test_the_localizer_locates_the_vehicle_by_tags(robot: t2.Robot) -> None:
+    tag = {"tag": "7", "x": 2.0, "y": 1.0, "heading": math.pi / 2, "age": 0.1}
+    unknown = {"tag": "9", "x": 2.0, "y": 1.0, "heading": 0.0, "age": 0.1}
+    lines = (json.dumps(unknown if step % 5 == 0 else tag) for step in range(300))
     # The tag at (4, 1) faces west; it is 2 m ahead and 1 m to the left of a vehicle facing north.
-    assert (pose.x, pose.y, pose.heading) == pytest.approx((5.0, -1.0, math.pi / 2), abs=0.05)
+    assert locates(robot, "examples/localizer.py", lines, (5.0, -1.0, math.pi / 2))
 
 
 def test_the_web_hook_gets_each_latch_once(robot: t2.Robot, stack: RunningStack) -> None:

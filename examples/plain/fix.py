@@ -1,0 +1,29 @@
+"""Send a fix of the position for each line "x y heading" of standard input, as the source "tags".
+
+In metres and radians in the map; the line is printed when the position is measured.
+"""
+
+import sys
+
+import msgpack
+from robot_bus import ROOT, Newest, open_session
+
+SIGMA = 0.05  # m and rad, standard deviation
+
+with open_session() as session:
+    odometry = Newest(session, "tel/odom/odometry")
+    newest = None
+    for line in sys.stdin:
+        newest = odometry.take() or newest
+        if newest is None:
+            continue  # no odometry yet
+        x, y, heading = map(float, line.split())
+        fix = {
+            "x": x,
+            "y": y,
+            "heading": heading,  # None if it is not measured
+            "covariance": [SIGMA**2, 0, 0, 0, SIGMA**2, 0, 0, 0, SIGMA**2],  # x, y, heading
+            "odom_boot": newest["boot"],
+            "odom_seq": newest["seq"],
+        }
+        session.put(f"{ROOT}/@cmd/fix/tags", msgpack.packb(fix))
