@@ -310,9 +310,10 @@ class Robot:
     ) -> None:
         """Say where the standing vehicle is in ``map``: m, m, rad, and standard deviations.
 
-        Raises ``Refused``.
+        Returns once the pose in the map shows it. Raises ``Refused``, and ``NoData`` without
+        localization.
         """
-        echo = self.safety.latest().heartbeat
+        before, echo = self.localization.latest(), self.safety.latest().heartbeat
         request = m.PlaceRequest(
             x=finite(x),
             y=finite(y),
@@ -322,6 +323,8 @@ class Robot:
             echo=echo,
         )
         self._call(keys.PLACE, request)
+        while self.localization.latest().placement == before.placement:
+            time.sleep(PERIOD_S)
 
     def fix(
         self,
