@@ -1,7 +1,9 @@
 """Steps of the checkout on the bus, in their order, with the instructions to the operator."""
 
+import shutil
 import sys
 import termios
+import textwrap
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
@@ -44,8 +46,16 @@ GROUND_PHRASE = "on the ground, free space"  # of the guided drive
 
 
 def show(text: str) -> None:
-    """Print lines without buffering."""
-    print(printable(text, "\n"), flush=True)
+    """Print lines without buffering, wrapped between words on a terminal."""
+    print(wrapped(printable(text, "\n")), flush=True)
+
+
+def wrapped(text: str) -> str:
+    """Return lines that fit on the terminal; unchanged for a file or a pipe."""
+    if not sys.stdout.isatty():
+        return text
+    width = shutil.get_terminal_size().columns
+    return "\n".join(textwrap.fill(line, width) for line in text.split("\n"))
 
 
 def prompt(question: str) -> str:
