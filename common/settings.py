@@ -71,7 +71,9 @@ class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             if safe := extra_of(kind).get("safe"):
                 found[name] = safe
             for row, section in value.items() if isinstance(value, dict) else ():
-                found |= {f"{name}.{row}.{at}": it for at, it in section.protections().items()}
+                if isinstance(section, Section):
+                    of_row = section.protections()
+                    found |= {f"{name}.{row}.{at}": it for at, it in of_row.items()}
         return found
 
 

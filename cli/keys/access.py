@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 from cli.keys.members import OPERATORS_SOURCES, Member, Profile
 from services.ros2 import names, parameters
 from services.ros2.config import Ros2
+from services.ros2.fixes import POSE
 from t2 import keys
 
 Verb = Literal["read", "know", "recall", "keep", "write", "ask", "serve", "live"]
@@ -186,7 +187,7 @@ def robot(name: str) -> Rights:
 def ros(settings: Ros2) -> Rights:
     """Return the rights of a computer with ROS 2: read topics, command velocity, stop and reset.
 
-    It has no rights on the keys of T2.
+    It writes the poses that ``fixes`` names, too. It has no rights on the keys of T2.
     """
     domain = settings.domain
     topics, kept = f"{domain}/**", f"{domain}/**/@adv/**"  # ``**`` does not match @adv
@@ -203,7 +204,10 @@ def ros(settings: Ros2) -> Rights:
         "know": everything,
         "recall": (topics, kept),
         "ask": (kept, *(key(name, interface) for name, interface in calls.items())),
-        "write": tuple(key("cmd_vel", f"geometry_msgs/msg/{kind}") for kind in ROS_TWISTS),
+        "write": (
+            *(key("cmd_vel", f"geometry_msgs/msg/{kind}") for kind in ROS_TWISTS),
+            *(key(topic, POSE) for topic in settings.fixes.values()),
+        ),
         "live": tuple(f"{names.LIVELINESS}/{domain}{'/*' * chunks}" for chunks in ROS_TOKENS),
     }
 

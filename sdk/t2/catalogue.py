@@ -576,6 +576,29 @@ PHRASES: dict[str, Words] = {
         "sideways through this interface.",
         "指令要求 linear.x 和 angular.z 之外的运动：此接口不支持横向行驶。",
     ),
+    # poses that ROS nodes measure
+    "ros_fix.taken": ("Passed on to localization.", "已转交定位服务。"),
+    "ros_fix.unreadable": ("A pose cannot be read: {reason}.", "无法读取位姿：{reason}。"),
+    "ros_fix.clock": (
+        "The gateway published no odometry in the 0.1 s before its stamp, which is {seconds:.2f} s "
+        "older than the newest one. Synchronize the clocks of both computers (chrony or NTP), and "
+        "turn use_sim_time off.",
+        "其时间戳之前 0.1 s 内网关未发布里程计；该时间戳比最新里程计早 {seconds:.2f} s。请同步两台计算机的时钟"
+        "（chrony 或 NTP），并关闭 use_sim_time。",
+    ),
+    "ros_fix.no_odometry": (
+        "Odometry is silent, so a pose cannot be related to it.", "收不到里程计：无法使用位姿。",
+    ),
+    "ros_fix.frame": (
+        "Its frame is '{frame}', allowed is '{map}'.", "其坐标系为“{frame}”，应为“{map}”。",
+    ),
+    "ros_fix.orientation": (
+        "Its quaternion is not of length 1, or it tilts the vehicle by over 0.3 rad.",
+        "其四元数长度不为 1，或使车辆倾斜超过 0.3 rad。",
+    ),
+    "ros_fix.not_finite": (
+        "A pose has a number that is not finite, or over 1e9.", "位姿中有非有限的数值，或超过 1e9。",
+    ),
     # the terminal of ``t2 drive``
     "terminal.unknown": ("Terminal delay unknown: no answer yet.", "终端延迟未知：尚无应答。"),
     "terminal.slow": (
@@ -987,6 +1010,14 @@ EVENTS: tuple[EventRow, ...] = (
             "ROS 节点的速度指令被拒绝，并给出原因。",
         ),
         ("as in the text ([ros2.md](ros2.md))", "按文中所述处理（ros2.md）"),
+    ),
+    EventRow(
+        "ros2", "ros_fix_refused", "warning",
+        (
+            "A pose that a ROS node has measured is refused, with the reason.",
+            "ROS 节点测得的位姿被拒绝，并给出原因。",
+        ),
+        ("as in the text ([ros2.md](ros2.md#poses-in-the-map))", "按文中所述处理（ros2.md）"),
     ),
 )  # fmt: skip
 

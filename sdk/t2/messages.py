@@ -60,9 +60,9 @@ if TYPE_CHECKING:
         "placed", "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
         "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
         "release_refused", "reset", "reset_refused", "reset_request", "reset_unconfirmed",
-        "runaway", "second_authority", "silent", "slip", "slip_over", "source", "stop",
-        "switches_unverified", "take_over", "terminal_slow", "uncommanded_motion", "unheard",
-        "unplaced", "velocity_back",
+        "ros_fix_refused", "runaway", "second_authority", "silent", "slip", "slip_over", "source",
+        "stop", "switches_unverified", "take_over", "terminal_slow", "uncommanded_motion",
+        "unheard", "unplaced", "velocity_back",
     ]  # fmt: skip
 else:
     EventName = Name

@@ -26,6 +26,9 @@ FIELDS: dict[str, Fields] = {
     "geometry_msgs/msg/PoseWithCovariance": (
         ("pose", "geometry_msgs/msg/Pose"), ("covariance", "float64[36]"),
     ),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": (
+        ("header", "std_msgs/msg/Header"), ("pose", "geometry_msgs/msg/PoseWithCovariance"),
+    ),
     "geometry_msgs/msg/Twist": (
         ("linear", "geometry_msgs/msg/Vector3"), ("angular", "geometry_msgs/msg/Vector3"),
     ),
@@ -145,6 +148,7 @@ FIELDS: dict[str, Fields] = {
 
 DIGESTS = """
 5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e diagnostic_msgs/msg/DiagnosticArray
+26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e geometry_msgs/msg/PoseWithCovarianceStamped
 9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a geometry_msgs/msg/Twist
 5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64 geometry_msgs/msg/TwistStamped
 3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0 nav_msgs/msg/Odometry

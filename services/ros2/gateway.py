@@ -4,17 +4,19 @@ import time
 from functools import partial
 
 from common import clock
+from common.bus import publisher as bus
 from common.freshness import NS_PER_S
 from common.service import Node
 from common.source import DriveSource
-from services.ros2 import names, translate
+from services.ros2 import fixes, names, translate
 from services.ros2.calls import FRESH_NS, Calls
 from services.ros2.cdr import Attachment, Value
 from services.ros2.command import MAX_PUBLISHERS, SOURCE, Commands, Refusal, Twist
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
-from t2.messages import Field, Phrase
+from t2 import keys
+from t2.messages import Field, Fix, Phrase
 from t2.words import render
 
 REPORT_NS = NS_PER_S
@@ -23,7 +25,7 @@ OTHER_TYPE = Refusal("other_type")
 
 
 class Gateway:
-    """Streams to topics, services to calls, and ``cmd_vel`` to drive requests."""
+    """Streams to topics, services to calls, ``cmd_vel`` to drive requests, poses to fixes."""
 
     def __init__(self, node: Node[Ros2Config]) -> None:
         settings = node.config.ros2
@@ -31,7 +33,8 @@ class Gateway:
         self._commands = Commands(by_zero=settings.neutral == "zero")
         self._diagnostics = translate.Diagnostics()
         self._publishers: dict[bytes, str] = {}  # nodes that publish commands, by GID
-        self._reported: dict[bytes, dict[str, int]] = {}  # when which decision, the last one last
+        # by publisher or source of fixes: when which decision, the last one last
+        self._reported: dict[bytes | str, dict[str, int]] = {}
         ros = names.Node(settings.domain, "", settings.namespace, names.NODE)
         self._ros = Endpoints(node.config.bus, ros, node.loop.post, node.counters)
         self._drive = DriveSource(node.bus, SOURCE)
@@ -44,6 +47,10 @@ class Gateway:
                 self._types.append(names.wire_type(interface))
                 take = partial(self._take, name == "stamped")
                 self._ros.subscribe(self._absolute("cmd_vel"), interface, take, self._unreadable)
+        for source, topic in settings.fixes.items():
+            take_fix = partial(self._take_fix, source, node.bus.publisher(keys.FIX, source=source))
+            unreadable = partial(self._unreadable_fix, source)
+            self._ros.subscribe(self._absolute(topic), fixes.POSE, take_fix, unreadable)
         self._ros.watch(self._on_token)
         node.on_exit = self._ros.close
         self._ros.open(lambda: self._commands.listen(clock.now_ns()))
@@ -70,10 +77,9 @@ class Gateway:
         self._node.counters[f"cmd_vel_{refusal.name}"] += 1
         self._note(translate.WARN, Phrase(f"cmd_vel.{refusal.name}", fields), publisher)
 
-    def _is_new(self, publisher: bytes, decision: str) -> bool:
+    def _is_new(self, about: bytes | str, decision: str) -> bool:
         """Return whether it is not the last one; each of a publisher counts once a second."""
-        known = publisher if publisher in self._publishers else b""  # anybody can invent a GID
-        reported, now_ns = self._reported.setdefault(known, {}), clock.now_ns()
+        reported, now_ns = self._reported.setdefault(about, {}), clock.now_ns()
         is_repeated = now_ns - reported.get(decision, -REPORT_NS) < REPORT_NS
         if is_repeated or decision == next(reversed(reported), None):
             return False
@@ -87,12 +93,41 @@ class Gateway:
         decision, text = phrase.name.partition(".")[2], render((phrase,))
         values = {"reason": decision, "publisher": sender}
         self._diagnostics.note(translate.status(level, "cmd_vel", text, values), clock.now_ns())
-        if not self._is_new(publisher, decision):
+        known = publisher if publisher in self._publishers else b""  # anybody can invent a GID
+        if not self._is_new(known, decision):
             return
         logged = f"cmd_vel of {sender} ({decision}): {text}"
         self._log.put(translate.log(time.time_ns(), level, logged))
         if level == translate.WARN:
             self._node.event("cmd_vel_refused", "warning", phrase, **values)
+
+    def _take_fix(
+        self, source: str, to: bus.Publisher[Fix], _: Attachment, message: Value, received_ns: int
+    ) -> None:
+        """Pass on a pose that a ROS node has measured, or refuse it."""
+        decided = fixes.fix(message, self._streams.odometry, received_ns)
+        if isinstance(decided, Phrase):
+            self._refuse_fix(source, decided)
+            return
+        to.put(decided)
+        self._note_fix(translate.OK, source, Phrase("ros_fix.taken"))
+
+    def _unreadable_fix(self, source: str, reason: str) -> None:
+        self._refuse_fix(source, Phrase("ros_fix.unreadable", {"reason": reason}))
+
+    def _refuse_fix(self, source: str, phrase: Phrase) -> None:
+        self._node.counters[phrase.name.replace(".", "_")] += 1
+        self._note_fix(translate.WARN, source, phrase)
+
+    def _note_fix(self, level: int, source: str, phrase: Phrase) -> None:
+        """Log a new decision about a source's poses, and report a new refusal."""
+        decision = phrase.name.partition(".")[2]
+        if not self._is_new(source, decision):
+            return
+        logged = f"pose of {source} ({decision}): {render((phrase,))}"
+        self._log.put(translate.log(time.time_ns(), level, logged))
+        if level == translate.WARN:
+            self._node.event("ros_fix_refused", "warning", phrase, reason=decision, source=source)
 
     def _on_token(self, token: str, appeared: bool) -> None:
         """Keep the nodes that publish commands."""

@@ -5,14 +5,16 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from common import clock
 from common.bus.bus import Arrival
 from common.freshness import NS_PER_S, Latest
 from common.service import Node
 from common.settings import sonar_mounts
 from services.ros2 import translate
 from services.ros2.cdr import Value
-from services.ros2.config import Ros2Config
+from services.ros2.config import MAP_POSE, Ros2Config
 from services.ros2.endpoints import Publisher
+from services.ros2.fixes import POSE, PublishedOdometry
 from t2 import keys
 from t2 import messages as m
 
@@ -33,8 +35,11 @@ class Streams:
     ) -> None:
         self._state: Latest[m.SafetyState] | None = None
         self._node, self._publisher, self._diagnostics = node, publisher, diagnostics
-        self._settings = node.config.ros2
-        self._motion()
+        self._settings = settings = node.config.ros2
+        self.odometry = PublishedOdometry()
+        tf = self._publisher("/tf", TRANSFORMS) if settings.publish_tf else None
+        self._motion(tf)
+        self._map(tf if settings.publish_map_tf else None)
         self._sonars()
         self._stops()
         self._statuses()
@@ -45,17 +50,41 @@ class Streams:
         newest = self._state
         return newest.value if newest and newest.received_ns >= since_ns else None
 
-    def _motion(self) -> None:
-        settings, prefix = self._settings, self._settings.frame_prefix
+    def _motion(self, tf: Publisher | None) -> None:
+        prefix = self._settings.frame_prefix
         odometry = self._publisher("odom", "nav_msgs/msg/Odometry")
-        tf = self._publisher("/tf", TRANSFORMS) if settings.publish_tf else None
 
         def publish(message: m.Odometry) -> None:
             odometry.put(translate.odometry(message, prefix))
             if tf:
                 tf.put(translate.transform(message, prefix))
+            self.odometry.note(message, clock.now_ns())
 
         self._pass_on(keys.ODOMETRY, ODOM_HZ, publish)
+
+    def _map(self, tf: Publisher | None) -> None:
+        """Publish the pose in the map with the stamp of the odometry that it follows from.
+
+        So tf2 finds ``map`` to ``odom`` and ``odom`` to ``base_link`` at the same times. A pose of
+        odometry that was not published has no stamp, and is skipped.
+        """
+        poses, prefix = self._publisher(MAP_POSE, POSE), self._settings.frame_prefix
+        last: m.Odometry | None = None
+
+        def publish(arrival: Arrival[m.MapPose]) -> None:
+            nonlocal last
+            message = arrival.message
+            odometry = self.odometry.find(message.odom_boot, message.odom_seq)
+            if odometry is None or odometry is last:  # tf2 refuses a stamp that comes twice
+                return
+            last = odometry
+            if pose := translate.map_pose(message, odometry.t_ns):
+                poses.put(pose)
+            transform = translate.map_transform(message, odometry.t_ns, prefix)
+            if tf and transform:
+                tf.put(transform)
+
+        self._node.bus.subscribe(keys.MAP_POSE, publish)
 
     def _sonars(self) -> None:
         config = self._node.config

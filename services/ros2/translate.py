@@ -57,6 +57,26 @@ def spread(covariance: tuple[float, ...], axes: tuple[int, ...]) -> tuple[float,
     return tuple(full)
 
 
+def map_pose(message: m.MapPose, t_ns: int) -> Value | None:
+    """Return a geometry_msgs/PoseWithCovarianceStamped in ``map``; None without a pose."""
+    x, y, heading, covariance = message.x, message.y, message.heading, message.pose_covariance
+    if x is None or y is None or heading is None or covariance is None:
+        return None
+    pose = (x, y, 0.0), turned(heading)
+    return header(t_ns, message.frame_id), (pose, spread(covariance, (0, 1, 5)))
+
+
+def map_transform(message: m.MapPose, t_ns: int, prefix: str) -> Value | None:
+    """Return a tf2_msgs/TFMessage from ``map`` to ``odom``; None without a pose.
+
+    ``map`` has no prefix: robots share it.
+    """
+    if (origin := message.odom) is None:
+        return None
+    where = (origin.x, origin.y, 0.0), turned(origin.heading)
+    return (((header(t_ns, message.frame_id), f"{prefix}odom", where),),)
+
+
 def transform(message: m.Odometry, prefix: str) -> Value:
     """Return a tf2_msgs/TFMessage from ``odom`` to ``base_link``."""
     where = (message.x, message.y, 0.0), turned(message.heading)

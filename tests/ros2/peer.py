@@ -11,6 +11,7 @@ from zenoh_ros2_sdk.session import ZenohSession
 from tests.ros2 import oracle
 
 LATCHED = ":1:,1:,:,:,,"
+POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 TRIGGER = "bool success\nstring message"
 PERIOD_S = 0.05
 PAUSE_S, DRIVE_S = 0.7, 1.2
@@ -44,6 +45,15 @@ class RosPeer:
         )  # fmt: skip
         self._open.append(made)
         return CommandPublisher(made, interface)
+
+    def poses(self, topic: str) -> Any:
+        """Return a publisher of poses, as a localizer's."""
+        made = ROS2Publisher(
+            topic=topic, msg_type=POSE, msg_definition=definition(POSE),
+            type_hash=oracle.STORE.hash_rihs01(POSE), router_port=self._port,
+        )  # fmt: skip
+        self._open.append(made)
+        return made
 
     def trigger(self, service: str, type_hash: str) -> Any:
         """Call a Trigger service; return the response."""

@@ -4,10 +4,12 @@ import math
 import subprocess
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy
 import pytest
 import zenoh
 
@@ -17,7 +19,8 @@ from services.ros2.definitions import HASHES
 from sim.requests import Bumper, Sonar
 from t2 import codec, keys
 from tests import factories
-from tests.ros2.peer import LATCHED, RosPeer, peer
+from tests.ros2 import oracle
+from tests.ros2.peer import LATCHED, POSE, RosPeer, peer
 from verification.harness.bus import at, set_options
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
@@ -27,6 +30,11 @@ pytestmark = pytest.mark.timed
 
 STAMPED, PLAIN = "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Twist"
 BOOL, TRANSFORMS = "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage"
+MAP = (
+    "localization.sources.amcl={sigma = 0.05, heading_sigma = 0.05, places = true}",
+    "ros2.fixes.amcl=/amcl_pose",
+    "ros2.publish_map_tf=true",
+)
 STOP, RESET = "/hardware/e_stop_trigger", "/hardware/e_stop_reset"
 
 
@@ -34,11 +42,14 @@ STOP, RESET = "/hardware/e_stop_trigger", "/hardware/e_stop_reset"
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
     folder: Path = tmp_path_factory.mktemp("ros2")
 
-    def gateway(config: Any) -> dict[str, list[str]]:
-        options = set_options(f"bus.connect={config.bus.endpoints[0]}")
-        return {"ros2": list(child_process.command("services.ros2", *options))}
+    def beside(config: Any) -> dict[str, list[str]]:
+        sets = f"bus.connect={config.bus.endpoints[0]}", *MAP
+        return {
+            name: list(child_process.command(f"services.{name}", *set_options(*sets)))
+            for name in ("ros2", "localization")
+        }
 
-    with running_stack(folder, beside=gateway) as it:
+    with running_stack(folder, beside=beside) as it:
         yield it
 
 
@@ -97,6 +108,71 @@ def test_latched_topics_reach_who_comes_later(node: RosPeer) -> None:
     assert link.get("name") == "base_link"
     frames = {transform.child_frame_id for transform in static[-1].transforms}
     assert len([frame for frame in frames if frame.startswith("sonar_")]) == 8
+
+
+def measured(stamp: Any, **at: float) -> dict[str, Any]:
+    """Return header and pose of a localizer: the heading is north."""
+    types = oracle.STORE.types
+    half = math.sqrt(0.5)
+    pose = types["geometry_msgs/msg/Pose"](
+        position=types["geometry_msgs/msg/Point"](**{"x": 0.0, "y": 0.0, "z": 0.0} | at),
+        orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=half, w=half),
+    )
+    covariance = [0.0] * 36
+    covariance[0] = covariance[7] = covariance[35] = 1e-4
+    with_covariance = types["geometry_msgs/msg/PoseWithCovariance"]
+    return {
+        "header": types["std_msgs/msg/Header"](stamp=stamp, frame_id="map"),
+        "pose": with_covariance(pose=pose, covariance=numpy.array(covariance)),
+    }
+
+
+def test_a_localizer_of_ros_places_the_vehicle_in_the_map(node: RosPeer) -> None:
+    odom = node.subscribe("/odom", "nav_msgs/msg/Odometry")
+    tf, poses = node.subscribe("/tf", TRANSFORMS), node.subscribe("/map_pose", POSE)
+    log = node.subscribe("/rosout", "rcl_interfaces/msg/Log")
+    amcl = node.poses("/amcl_pose")
+    wait_until(lambda: odom and tf, "odometry")
+    assert {each.transforms[0].header.frame_id for each in tf} == {"odom"}
+
+    def refused() -> bool:
+        stamp = odom[-1].header.stamp
+        amcl.publish(**measured(replace(stamp, sec=stamp.sec + 5), x=70.0))
+        return any("pose of amcl (clock): " in each.msg for each in log)
+
+    wait_until(refused, "the refusal of a clock that is ahead")
+
+    def placed() -> bool:
+        amcl.publish(**measured(odom[-1].header.stamp, x=7.0, y=-3.0))
+        return bool(poses)
+
+    wait_until(placed, "the pose in the map")
+    wait_until(lambda: len(poses) > 5, "more of them")
+    last = poses[-3]  # its transforms have arrived
+    assert (last.header.frame_id, last.pose.covariance[0] > 0) == ("map", True)
+    assert (last.pose.pose.position.x, last.pose.pose.position.y) == pytest.approx((7, -3), abs=0.2)
+    of_map: dict[Any, Any] = {}
+    of_odom: dict[Any, Any] = {}
+    by_frames = {("map", "odom"): of_map, ("odom", "base_link"): of_odom}
+    for each in tf:
+        (transform,) = each.transforms
+        ends = transform.header.frame_id, transform.child_frame_id
+        stamp = transform.header.stamp.sec, transform.header.stamp.nanosec
+        by_frames[ends][stamp] = transform.transform
+    assert len(of_map) > 3
+    assert of_map.keys() <= of_odom.keys()  # tf2 finds both at one time
+    stamp = last.header.stamp.sec, last.header.stamp.nanosec
+    assert chained(of_map[stamp], of_odom[stamp]) == pytest.approx((7, -3), abs=0.2)
+
+
+def chained(parent: Any, child: Any) -> tuple[float, float]:
+    """Return x and y of a frame through the one in between."""
+    yaw = 2 * math.atan2(parent.rotation.z, parent.rotation.w)
+    x, y = child.translation.x, child.translation.y
+    return (
+        parent.translation.x + x * math.cos(yaw) - y * math.sin(yaw),
+        parent.translation.y + x * math.sin(yaw) + y * math.cos(yaw),
+    )
 
 
 def test_parameters_can_be_listed(stack: RunningStack) -> None:

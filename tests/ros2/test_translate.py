@@ -189,3 +189,37 @@ def test_the_newest_status_of_each_name_and_a_silent_part_is_stale() -> None:
     assert diagnostics.statuses(late_ns) == (command, link, safety)
     stale = (translate.STALE, "t2: link", "Silent. Last: Up.", "t2", (("a", "1"),))
     assert diagnostics.statuses(late_ns + 1) == (command, stale, safety)
+
+
+def map_pose(**fields: Any) -> m.MapPose:
+    usual: dict[str, Any] = {
+        "state": "lost", "x": 3.0, "y": 4.0, "heading": math.pi / 2, "text": "Lost.",
+        "pose_covariance": tuple(float(n) for n in range(1, 10)),
+        "odom": m.PlaneFrame(x=1.0, y=-2.0, heading=-math.pi / 2),
+        "odom_boot": 9, "odom_seq": 7, "placement": 1, "t_ns": T_NS + 5_000_000,
+    }  # fmt: skip
+    return m.MapPose(**usual | fields)
+
+
+def test_the_pose_in_the_map_has_the_stamp_of_its_odometry() -> None:
+    made: Any = translate.map_pose(map_pose(), T_NS)
+    header, (pose, spread) = made
+    assert header == (STAMP, "map")
+    assert pose == ((3.0, 4.0, 0.0), pytest.approx((0.0, 0.0, HALF, HALF)))
+    assert (spread[0], spread[5], spread[35], spread[14]) == (1.0, 3.0, 9.0, 1e-6)
+
+
+def test_the_transform_of_the_map_ends_at_the_prefixed_odom() -> None:
+    made: Any = translate.map_transform(map_pose(), T_NS, "r1/")
+    (((header, child, (where, turned)),),) = made
+    assert (header, child) == ((STAMP, "map"), "r1/odom")
+    assert where == (1.0, -2.0, 0.0)
+    assert turned == pytest.approx((0.0, 0.0, -HALF, HALF))
+
+
+def test_a_vehicle_that_is_not_placed_has_neither() -> None:
+    nowhere = map_pose(
+        state="unplaced", x=None, y=None, heading=None, pose_covariance=None, odom=None
+    )
+    assert translate.map_pose(nowhere, T_NS) is None
+    assert translate.map_transform(nowhere, T_NS, "") is None

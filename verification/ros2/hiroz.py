@@ -25,6 +25,7 @@ STILL_MPS = 0.001
 TOPICS = {
     "/odom": "nav_msgs::msg::dds_::Odometry_",
     "/tf": "tf2_msgs::msg::dds_::TFMessage_",
+    "/map_pose": "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_",
     "/tf_static": "tf2_msgs::msg::dds_::TFMessage_",
     "/robot_description": "std_msgs::msg::dds_::String_",
     "/sonar_front/range": "sensor_msgs::msg::dds_::Range_",

@@ -169,6 +169,17 @@ def test_the_rights_of_a_ros_computer_follow_domain_and_namespace() -> None:
         assert not may(given, "write", f"{key}/{names.wire_type(twist)}/{HASHES[twist]}")
 
 
+def test_a_ros_computer_writes_the_poses_that_the_settings_name() -> None:
+    """A topic of the namespace and an absolute one; no fix under the bus's own key."""
+    kind = "geometry_msgs/msg/PoseWithCovarianceStamped"
+    given = ros(Ros2(namespace="/t2_001", fixes={"amcl": "/amcl_pose", "tags": "tags/pose"}))
+    for topic in ("/amcl_pose", "/t2_001/tags/pose"):
+        assert may(given, "write", names.data_key(0, topic, kind))
+        assert not may(ros(Ros2()), "write", names.data_key(0, topic, kind))
+    for key in (names.data_key(0, "/map_pose", kind), keys.FIX.on(MINE, source="amcl")):
+        assert not may(given, "write", key)
+
+
 def test_zenohs_configuration_has_no_empty_part() -> None:
     """Zenoh refuses the whole of it for one: of a trusted protocol, or of a member's rights."""
     members = [member("ros", "lab", (OTHER,)), member("viewer")]
