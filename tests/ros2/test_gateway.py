@@ -127,7 +127,9 @@ def measured(stamp: Any, **at: float) -> dict[str, Any]:
     }
 
 
-def test_a_localizer_of_ros_places_the_vehicle_in_the_map(node: RosPeer) -> None:
+def test_a_localizer_of_ros_places_the_vehicle_in_the_map(
+    node: RosPeer, stack: RunningStack
+) -> None:
     odom = node.subscribe("/odom", "nav_msgs/msg/Odometry")
     tf, poses = node.subscribe("/tf", TRANSFORMS), node.subscribe("/map_pose", POSE)
     log = node.subscribe("/rosout", "rcl_interfaces/msg/Log")
@@ -141,6 +143,7 @@ def test_a_localizer_of_ros_places_the_vehicle_in_the_map(node: RosPeer) -> None
         return any("pose of amcl (clock): " in each.msg for each in log)
 
     wait_until(refused, "the refusal of a clock that is ahead")
+    wait_until(lambda: "ros_fix_refused" in stack.log.read_text(), "the event")
 
     def placed() -> bool:
         amcl.publish(**measured(odom[-1].header.stamp, x=7.0, y=-3.0))
