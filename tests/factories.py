@@ -2,7 +2,21 @@
 
 from typing import Any
 
-from t2.messages import Cause, Health, Limits, LimitState, Link, Odometry, Release, SafetyState
+from t2.messages import (
+    Cause,
+    FixState,
+    Health,
+    Limits,
+    LimitState,
+    Link,
+    MapPose,
+    Odometry,
+    Phrase,
+    PlaneFrame,
+    Release,
+    SafetyState,
+)
+from t2.words import render
 
 
 def safety_state(**fields: Any) -> SafetyState:
@@ -90,6 +104,26 @@ def odometry(**fields: Any) -> Odometry:
         "slip": False,
     }
     return Odometry(**usual | fields)
+
+
+def map_pose(state: Any = "placed", **fields: Any) -> MapPose:
+    """Return a pose in the map; one that is not placed has none."""
+    phrase = Phrase("map.unplaced")
+    usual: dict[str, Any] = {"state": state, "odom_boot": 1, "odom_seq": 1, "placement": 0}
+    if state != "unplaced":
+        name = "map.placed" if state == "placed" else "map.uncertain"
+        phrase = Phrase(name, {"sigma": 0.2, "degrees": 3.0})
+        usual |= {
+            "x": 4.0, "y": 2.0, "heading": 0.5, "odom": PlaneFrame(x=3.0, y=1.0, heading=0.0),
+            "pose_covariance": (0.04, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0025), "placement": 1,
+        }  # fmt: skip
+    return MapPose(**usual | {"text": render([phrase]), "phrases": (phrase,)} | fields)
+
+
+def fix_state(source: str = "tags", **fields: Any) -> FixState:
+    """Return the state of a source whose fixes are used."""
+    usual: dict[str, Any] = {"age": 0.1, "used": 5, "refused": 1, "in_a_row": 0}
+    return FixState(source=source, **usual | fields)
 
 
 def health(service: str = "bridge", **fields: Any) -> Health:

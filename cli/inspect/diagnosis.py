@@ -11,9 +11,10 @@ from typing import Any
 
 from cli.inspect.findings import PREFIX, REMEDIES, REMEDY, Finding, Level, found, said
 from common.root_cause import FROM_LINK
+from services.localization.core.fixes import AGREEING
 from t2 import keys
 from t2.catalogue import CAUSES, NOTHING
-from t2.messages import Cause, Field, Health, Link, Phrase, Relay, SafetyState
+from t2.messages import Cause, Field, FixState, Health, Link, MapPose, Phrase, Relay, SafetyState
 
 STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOMETRY)
 # Safety's causes that follow from a stream that is not sent.
@@ -25,6 +26,7 @@ FROM_STREAM = {
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
+FIX_S = 10.0  # age of the newest fix that is reported
 SPREAD_S = 0.2  # delay variation; half of safety's limit for the delay of a request
 
 # Causes of normal operation, with or without a driver.
@@ -49,6 +51,7 @@ class Observation:
     undecodable: dict[str, str] = field(default_factory=dict)  # reason by path
     healths: dict[str, Health] = field(default_factory=dict)  # the newest by service
     links: list[Link] = field(default_factory=list)
+    pose: MapPose | None = None  # the newest
     state: SafetyState | None = None  # the newest
 
     def is_absent(self, service: str) -> bool:
@@ -79,6 +82,7 @@ def diagnose(seen: Observation, robot: str) -> Iterator[Finding]:
     for check in (services, versions, rights, clock):
         yield from check(seen)
     yield from board(seen)
+    yield from localization(seen)
     if seen.is_absent("bridge") or any(link.state != "up" for link in seen.links[-1:]):
         yield from safety(seen, FROM_LINK)
     else:
@@ -249,6 +253,44 @@ def streams(seen: Observation) -> Iterator[Finding]:
         elif not rate:
             about = {"path": topic.path, "hz": sent_hz}
             yield found("network", "wrong", "network.dropped", "dropped", **about)
+
+
+# --- the pose in the map, and safety ----------------------------------------------------------
+
+
+def localization(seen: Observation) -> Iterator[Finding]:
+    """Report the pose in the map; a robot that does not drive in the map needs none."""
+    pose = seen.pose
+    if pose is None:
+        if seen.is_unsent(keys.ODOMETRY):
+            return  # the pose follows from odometry
+        if "localization" in seen.instances:
+            yield found("map", "unknown", "map.no_pose")
+        elif seen.listed:
+            yield found("map", "note", "map.absent", "localization")
+        return
+    levels: dict[str, Level] = {"placed": "ok", "unplaced": "note", "lost": "wrong"}
+    todo = () if pose.state == "placed" else (Phrase(f"{REMEDY}place"),)
+    text = said(pose.phrases, pose.text)
+    yield Finding("map", levels[pose.state], f"map.{pose.state}", text, todo)
+    for source in pose.sources:
+        yield _fixes(source, pose)
+
+
+def _fixes(of: FixState, pose: MapPose) -> Finding:
+    """Return the state of a source of fixes."""
+    name: dict[str, Field] = {"source": of.source}
+    if of.age is None:
+        return found("map", "note", "map.never", "fixes", **name)
+    if of.age > FIX_S:
+        return found("map", "note", "map.silent", "fixes", age=of.age, **name)
+    if not of.in_a_row:
+        return found("map", "ok", "map.fixes", used=of.used, refused=of.refused, **name)
+    # Refusals of a vehicle that is not placed, or lost by them, follow from that.
+    is_faulty = pose.state == "placed" and of.in_a_row >= AGREEING
+    refused = Phrase(f"{PREFIX}map.refused", {"count": of.in_a_row, **name})
+    phrases = refused, *said(of.phrases, of.text)
+    return Finding("map", "wrong" if is_faulty else "note", "map.refused", phrases)
 
 
 def safety(seen: Observation, following: Container[str] = ()) -> Iterator[Finding]:

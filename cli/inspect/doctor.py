@@ -1,8 +1,8 @@
 """``t2 doctor``: diagnosis of the path from this laptop to the wheels, with remedies.
 
 It checks in the order of a request's path: network, router, services, versions, rights, clock,
-relay, link, streams, and the causes that safety reports. It only listens and queries; it changes
-nothing.
+relay, link, streams, the pose in the map, and the causes that safety reports. It only listens and
+queries; it changes nothing.
 """
 
 import argparse
@@ -35,7 +35,7 @@ from t2 import keys
 from t2.codec import Sample
 from t2.errors import LinkError, MessageError
 from t2.keys import Topic
-from t2.messages import Field, Health, Link, Phrase, SafetyState
+from t2.messages import Field, Health, Link, MapPose, Phrase, SafetyState
 from t2.text_file import pem_problem
 from t2.words import Language, in_language
 
@@ -237,6 +237,8 @@ def add_sample(sample: Sample, seen: Observation) -> None:
             seen.healths[message.service] = message
         case Link():
             seen.links.append(message)
+        case MapPose():
+            seen.pose = message
         case SafetyState():
             seen.state = message
 

@@ -132,6 +132,20 @@ FINDINGS: dict[str, Words] = {
     "link.not_armed": ("the bridge accepts no motion now:", "桥接服务当前不接受运动指令："),
     "streams.no_board": ("no data without the board", "没有主控板，收不到数据"),
     "streams.slow": ("{path} has {rate:.0f} of {expected:g} Hz", "{path} 为 {rate:.0f} Hz，应为 {expected:g} Hz"),
+    # localization
+    "map.absent": (
+        "localization is not running: only driving in the map needs it",
+        "定位服务未运行：仅在地图中行驶时需要",
+    ),
+    "map.no_pose": ("localization publishes no pose", "定位服务不发布位姿"),
+    "map.fixes": (
+        "{source}: {used} fixes used, {refused} refused", "{source}：已采用 {used} 次定位修正，拒绝 {refused} 次",
+    ),
+    "map.never": ("{source}: no fix was received", "{source}：从未收到定位修正"),
+    "map.silent": ("{source}: no fix for {age:.0f} s", "{source}：已 {age:.0f} s 未收到定位修正"),
+    "map.refused": (
+        "{source}: {count} fixes in a row refused:", "{source}：连续 {count} 次定位修正被拒绝：",
+    ),
     # safety
     "safety.no_state": ("safety publishes no state", "安全服务不发布状态"),
     "safety.follows": ("follows from the above:", "由上述原因引起："),
@@ -256,6 +270,19 @@ REMEDIES: dict[str, Words] = {
         "the network or the router drops it: move closer to the access point",
         "网络或路由器丢弃了该数据：请靠近接入点",
     ),
+    "localization": (
+        "`t2 up --only localization`; with systemd `systemctl start t2-localization`",
+        "`t2 up --only localization`；systemd 用 `systemctl start t2-localization`",
+    ),
+    "place": (
+        "let the vehicle stand; `t2 call localization/place x=0.0 y=0.0 heading=0.0` with its position "
+        "in m and its heading in rad",
+        "让车辆停稳；`t2 call localization/place x=0.0 y=0.0 heading=0.0`，填入位置（m）和航向（rad）",
+    ),
+    "fixes": (
+        "is its program running, and `t2 hz @cmd/fix/{source}` above 0? A source may be out of sight",
+        "请确认其程序在运行，且 `t2 hz @cmd/fix/{source}` 大于 0；定位来源也可能不在视野内",
+    ),
     "by_hand": ("push the vehicle off by hand; then reset", "请用手推开车辆，然后复位"),
 }  # fmt: skip
 
@@ -277,6 +304,7 @@ PLACES: dict[str, Words] = {
     "relay": ("relay", "中继器"),
     "link": ("link", "主控板"),
     "streams": ("streams", "数据流"),
+    "map": ("map", "地图"),
     "safety": ("safety", "安全"),
 }
 MARKS: dict[Level, Words] = {

@@ -52,6 +52,7 @@ def seen(**given: Any) -> Observation:
         "sources": ["teleop", "web"], "calls": ["safety/reset"],
         "healths": {name: health(name) for name in keys.ON_BOARD}, "links": [link()],
         "state": state("no_request"), "delays_s": [0.01, 0.02], "rates": RATES,
+        "pose": factories.map_pose(),
     }  # fmt: skip
     return Observation(**(healthy | given))
 
@@ -156,6 +157,56 @@ REJECTED = [
 )  # fmt: skip
 def test_problems(given: dict[str, Any], expected: list[tuple[str, str, str]]) -> None:
     assert problems(seen(**given)) == expected
+
+
+FAR = {"text": "", "phrases": (m.Phrase("fix.far", {"sigmas": 9.0}),), "used": 0, "refused": 5}
+REFUSED = "tags: 5 fixes in a row refused: It is 9.0 standard deviations from the pose."
+
+
+def fixes(state: Any = "placed", **given: Any) -> m.MapPose:
+    """Return a pose in the map with one source of fixes."""
+    return factories.map_pose(state, sources=(factories.fix_state(**given),))
+
+
+@pytest.mark.parametrize(
+    ("pose", "expected"),
+    [
+        (None, [("note", "localization is not running: only driving in the map needs it",
+                 remedy("localization"))]),
+        (factories.map_pose("unplaced"),
+         [("note", "The position is not known: place the vehicle (`t2 call localization/place`).",
+           remedy("place"))]),
+        (factories.map_pose("lost"),
+         [("wrong", "The position is lost: it is known only to 0.20 m and 3 degrees. Place the "
+           "vehicle (`t2 call localization/place`), or wait for a fix.", remedy("place"))]),
+        (fixes(age=None), [("note", "tags: no fix was received",
+                            remedy("fixes").format(source="tags"))]),
+        (fixes(age=11.0), [("note", "tags: no fix for 11 s",
+                            remedy("fixes").format(source="tags"))]),
+        (fixes(in_a_row=4, **FAR), [("note", REFUSED.replace("5", "4"), "")]),
+        (fixes(in_a_row=5, **FAR), [("wrong", REFUSED, "")]),
+        (fixes("unplaced", in_a_row=5, **FAR), [  # which follows from the vehicle's own state
+            ("note", "The position is not known: place the vehicle (`t2 call localization/place`).",
+             remedy("place")), ("note", REFUSED, "")]),
+    ],
+)  # fmt: skip
+def test_the_pose_in_the_map(pose: Any, expected: list[tuple[str, str, str]]) -> None:
+    assert problems(seen(pose=pose)) == expected
+
+
+def test_a_placed_vehicle_and_its_fixes_in_both_languages() -> None:
+    position, source = d.localization(seen(pose=fixes()))
+    assert (position.level, source.level) == ("ok", "ok")
+    assert "known to 0.20 m and 3 degrees" in position.text()
+    assert source.text() == "tags: 5 fixes used, 1 refused"
+    assert source.text("zh") == "tags：已采用 5 次定位修正，拒绝 1 次"
+
+
+def test_a_localization_without_a_pose_is_no_second_problem() -> None:
+    running = dict.fromkeys((*keys.ON_BOARD, "localization"), 1)
+    (one,) = d.localization(seen(pose=None, instances=running))
+    assert (one.level, one.text()) == ("unknown", "localization publishes no pose")
+    assert not [*d.localization(seen(pose=None, rates=RATES | {keys.ODOMETRY.path: 0.0}))]
 
 
 def without(*services: str) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from t2 import keys
 from t2.messages import Bumper
 from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture
-from tests.factories import health, safety_state
+from tests.factories import health, map_pose, safety_state
 from verification.harness.bus import at, router_process
 from verification.harness.certificates import Site, connecting
 from verification.harness.ports import free_port
@@ -37,6 +37,7 @@ def test_what_it_observes(buses: BusFixture, tool: Tool) -> None:
     streams = {keys.BUMPER: lambda: Bumper(pressed=True)}
     pretend(buses, "bridge", {**streams, keys.HEALTH: partial(health, "bridge")}, service="bridge")
     pretend(buses, "safety", {keys.SAFETY: partial(safety_state, heartbeat=1)}, safety)
+    pretend(buses, "localization", {keys.MAP_POSE: map_pose}, service="localization")
     session, key = buses.session(), keys.LINK.on(buses.robot)
     buses.loop.post(lambda: buses.loop.every(0.1, lambda _: session.put(key, b"\xc1")))
     result = tool("doctor", "--duration", "1")
@@ -47,6 +48,7 @@ def test_what_it_observes(buses: BusFixture, tool: Tool) -> None:
     assert not any(level == "wrong" and "odom/odometry" in text for _, level, text in found)
     assert any(text.startswith("safety is running and publishes no") for *_, text in found)
     assert any(text.startswith("tel/bridge/link: ") for *_, text in found)
+    assert ("map", "ok", map_pose().text) in found
     assert any(where == "clock" and level == "ok" for where, level, _ in found)
 
 
