@@ -127,6 +127,13 @@ class Covariance(Struct, frozen=True):
         return math.sqrt(max(0.0, mean + math.hypot(difference, self.xy)))
 
     @property
+    def ellipse(self) -> tuple[float, float, float]:
+        """Half axes of the ellipse of one standard deviation, m; direction of the longer, rad."""
+        shorter = (self.xx + self.yy) / 2 - math.hypot((self.xx - self.yy) / 2, self.xy)
+        direction = math.atan2(2 * self.xy, self.xx - self.yy) / 2
+        return self.sigma, math.sqrt(max(0.0, shorter)), direction
+
+    @property
     def heading_sigma(self) -> float:
         """The standard deviation of the heading, rad."""
         return math.sqrt(max(0.0, self.hh))

@@ -36,7 +36,7 @@ Notify = Callable[[m.Level, Texts], None]
 
 FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.VELOCITY, keys.ULTRASONIC, keys.BUMPER, keys.LINK, keys.SWITCHES,
-    keys.ODOMETRY, keys.SAFETY, keys.MOTION,
+    keys.ODOMETRY, keys.MAP_POSE, keys.SAFETY, keys.MOTION,
 )  # fmt: skip
 WILDCARD_DEPTH = 16  # of a key with many publishers
 # How long an emergency stop is repeated without a confirmation, as on the page: the link to the

@@ -10,6 +10,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from common.pose import Covariance
 from common.root_cause import RootCause, root_cause
 from common.text import line
 from services.dashboard.driver_lock import HoldState
@@ -24,6 +25,8 @@ from t2.messages import (
     Driver,
     Health,
     Limits,
+    MapPose,
+    MapState,
     Phrase,
     Phrases,
     RangeStatus,
@@ -38,6 +41,7 @@ Tone = Literal["dark", "clear", "slow", "stop", "fault"]  # of a sonar sector
 WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")
 OF_STATUS: dict[RangeStatus, Tone] = {"no_echo": "clear", "too_near": "stop", "fault": "fault"}
 OF_CAUSE: dict[CauseName, Tone] = {"obstacle": "slow", "blocked": "stop"}
+SIGMAS = 2.0  # of the drawn ellipse
 YOU = Phrase("control.you")
 
 
@@ -78,6 +82,15 @@ class SafetyView(Struct, frozen=True):
     release_refusal: Texts | None
 
 
+class MapView(Struct, frozen=True):
+    """The pose in the map, with its text; the page draws in ``odom``."""
+
+    state: MapState
+    text: Texts
+    pose: tuple[float, ...] | None  # x, y and heading in the map
+    ellipse: tuple[float, ...] | None  # half axes of two standard deviations; direction in ``odom``
+
+
 class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
     """The values that change with the motion."""
 
@@ -107,6 +120,7 @@ class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
     left: Driver | None
     right: Driver | None
     switches: Switches | None
+    map: MapView | None
 
 
 def fast_snapshot(
@@ -152,7 +166,7 @@ def slow_snapshot(
     telemetry: TelemetryCache, robots: Mapping[str, bool], viewers: int, now_ns: int
 ) -> SlowSnapshot:
     """Return the slow snapshot at this time."""
-    services = telemetry.services()
+    services, pose = telemetry.services(), telemetry.newest(keys.MAP_POSE, now_ns)
     health = {name: telemetry.newest(keys.HEALTH, now_ns, service=name) for name in services}
     return SlowSnapshot(
         robots=dict(robots),
@@ -162,7 +176,20 @@ def slow_snapshot(
         left=telemetry.newest(keys.DRIVER, now_ns, side="left"),
         right=telemetry.newest(keys.DRIVER, now_ns, side="right"),
         switches=telemetry.newest(keys.SWITCHES, now_ns),
+        map=map_view(pose) if pose else None,
     )
+
+
+def map_view(pose: MapPose) -> MapView:
+    """Return the part of a pose in the map that the page shows."""
+    text = rendered(pose.phrases, pose.text)
+    if pose.x is None or pose.y is None or pose.heading is None:
+        return MapView(pose.state, text, None, None)
+    ellipse = None
+    if pose.pose_covariance and pose.odom:
+        axis, other, direction = Covariance.of(pose.pose_covariance).ellipse
+        ellipse = SIGMAS * axis, SIGMAS * other, direction - pose.odom.heading
+    return MapView(pose.state, text, (pose.x, pose.y, pose.heading), ellipse)
 
 
 def safety_view(state: SafetyState) -> SafetyView:

@@ -69,6 +69,14 @@ def test_a_covariance_turns_with_its_axes(values: list[float], angle: float) -> 
     assert turned.heading_sigma == pytest.approx(math.sqrt(full[2, 2]))
 
 
+@given(st.floats(0.1, 2.0), st.floats(0.01, 0.09), st.floats(-math.pi / 2, math.pi / 2))
+def test_the_ellipse_of_a_covariance(longer: float, shorter: float, direction: float) -> None:
+    upright = Covariance(longer**2, 0.0, shorter**2, 0.0, 0.0, 0.0)
+    half_axes = upright.rotated(direction).ellipse
+    assert half_axes[:2] == pytest.approx((longer, shorter), abs=1e-6)
+    assert math.sin(half_axes[2] - direction) == pytest.approx(0.0, abs=1e-6)
+
+
 def test_covariances_add_and_subtract() -> None:
     one = Covariance(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     assert one.combined(one) == Covariance(2.0, 4.0, 6.0, 8.0, 10.0, 12.0)

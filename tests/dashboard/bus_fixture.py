@@ -8,7 +8,8 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from t2 import keys
-from t2.messages import Cause, Drive, Limit, LimitState, Release
+from t2.messages import Cause, Drive, Limit, LimitState, MapPose, Release
+from tests import factories
 from tests.dashboard.viewer import Client
 from tests.factories import safety_state
 from verification.harness.waiting import PATIENCE_S, wait_until
@@ -27,6 +28,7 @@ class Peer:
         self.causes: tuple[Cause, ...] = ()
         self.release: Release | None = None
         self.release_refusal = ""
+        self.map_pose: MapPose | None = None
         self.keepalives: tuple[LimitState, ...] = ()
         self.kept_alive: list[Limit] = []
         self.boot = 0  # of safety
@@ -34,7 +36,8 @@ class Peer:
 
     def declare(self, bus: Bus) -> None:
         self.boot = bus.boot
-        state = bus.publisher(keys.SAFETY)
+        state, map_pose = bus.publisher(keys.SAFETY), bus.publisher(keys.MAP_POSE)
+        odometry = bus.publisher(keys.ODOMETRY)
         bus.subscribe(
             keys.DRIVE, lambda it: self.requests.append(it.message), source="web", depth=64
         )
@@ -44,6 +47,9 @@ class Peer:
         bus.live(keys.live_key("002", "bridge", "x"))
 
         def publish(now_ns: int) -> None:
+            if self.map_pose:
+                map_pose.put(self.map_pose)
+                odometry.put(factories.odometry())
             if self.safe:
                 state.put(
                     safety_state(

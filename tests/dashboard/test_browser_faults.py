@@ -8,10 +8,11 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from common.loop import Loop
+from t2.messages import PlaneFrame
 from tests.dashboard.bus_fixture import Peer
 from tests.dashboard.page import BROWSER_MARKS, center_of, take_control, text, wait_for_text
 from tests.dashboard.servers import FREE, NEWER, CallServers
-from tests.factories import limit_source
+from tests.factories import limit_source, map_pose
 from verification.harness.bus import at, joined, running
 from verification.harness.certificates import Site
 from verification.harness.dashboard import Server, dashboard
@@ -28,6 +29,31 @@ def page(browser: Browser) -> Iterator[Page]:
     yield page
     page.close()
     assert problems == []
+
+
+def test_the_pose_in_the_map(page: Page, server: Server, peer: Peer) -> None:
+    page.add_init_script("""
+        const draw = CanvasRenderingContext2D.prototype.ellipse;
+        window.ellipses = [];
+        CanvasRenderingContext2D.prototype.ellipse = function (...it) {
+            window.ellipses.push(it);
+            return draw.apply(this, it);
+        };
+    """)
+    page.goto(server.url)
+    peer.map_pose = map_pose("unplaced")
+    wait_for_text(page, "#map", "The position is not known: place the vehicle")
+    assert page.evaluate("window.ellipses.length") == 0
+    peer.map_pose = map_pose(odom=PlaneFrame(x=0.0, y=0.0, heading=0.5))
+    wait_for_text(page, "#map", "In the map: x 4.00 m, y 2.00 m, 29°. The position is known to")
+    page.wait_for_function("() => window.ellipses.length > 0")
+    axis, other, rotation = page.evaluate("window.ellipses.at(-1).slice(2, 5)")
+    assert (axis / other, rotation) == pytest.approx((2.0, 0.5))
+    page.click("#language")
+    wait_for_text(page, "#map", "地图位姿：x 4.00 m")
+    peer.map_pose = None  # localization has ended
+    page.wait_for_function("() => document.querySelector('#map').textContent === ''")
+    page.click("#language")
 
 
 def at_a_contact(page: Page, server: Server) -> None:

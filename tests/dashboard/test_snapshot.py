@@ -19,6 +19,7 @@ from t2.messages import (
     Driver,
     Motion,
     Phrase,
+    PlaneFrame,
     RangeStatus,
     Switches,
     Ultrasonic,
@@ -41,6 +42,7 @@ def full() -> TelemetryCache:
         "tel/bridge/driver/left": Driver(faults=("encoder",), bits=4),
         "tel/bridge/switches": Switches(ultrasonic_brake=True, bumper_brake=False),
         "tel/odom/odometry": factories.odometry(x=1.0, y=2.0, heading=0.3, epoch=3),
+        "tel/localization/pose": factories.map_pose(),
         "tel/safety/state": factories.contact_state(source="nav"),
         "@cmd/drive/nav": Drive(linear=0.7, angular=0.2, echo=1),
         "@cmd/drive/web": Drive(linear=0.1, angular=0.0, echo=1),
@@ -96,6 +98,21 @@ def test_the_slow_snapshot() -> None:
     assert seen.left is not None
     assert (seen.left.bits, seen.right) == (4, None)
     assert seen.switches == Switches(ultrasonic_brake=True, bumper_brake=False)
+
+
+def test_the_pose_in_the_map_has_its_ellipse_in_odom() -> None:
+    view = snapshot.slow_snapshot(full(), {}, 1, AT).map
+    assert view is not None
+    assert (view.state, view.pose) == ("placed", (4.0, 2.0, 0.5))
+    assert view.text.zh == "位置已知，标准差为 0.20 m 和 3 度。"
+    assert view.ellipse == pytest.approx((0.4, 0.2, 0.0))
+    turned = factories.map_pose("lost", odom=PlaneFrame(x=0.0, y=0.0, heading=0.5))
+    ellipse = snapshot.map_view(turned).ellipse
+    assert ellipse == pytest.approx((0.4, 0.2, -0.5))
+    unplaced = snapshot.map_view(factories.map_pose("unplaced"))
+    assert (unplaced.pose, unplaced.ellipse) == (None, None)
+    assert "t2 call localization/place" in unplaced.text.en
+    assert snapshot.slow_snapshot(full(), {}, 1, AT + NS_PER_S).map is None
 
 
 @pytest.mark.parametrize(

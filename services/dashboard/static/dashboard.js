@@ -105,6 +105,7 @@ const HANDLERS = {
   slow(message) {
     slow = message;
     panels.showSlow(message);
+    trail.locate(message.map);
     showRobots();
   },
   events(message) {

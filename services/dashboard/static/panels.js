@@ -62,6 +62,7 @@ export function showCauses(fast) {
 
 export function showSlow(slow) {
   showDrivers(slow);
+  showMap(slow.map);
   for (const name of ["ultrasonic_brake", "bumper_brake"]) {
     const on = slow.switches?.[name];
     $(name).textContent = t(name, on === true ? t("on") : on === false ? t("off") : t("unknown"));
@@ -91,6 +92,15 @@ function service(name, instances, health) {
   const counters = Object.entries(health?.counters ?? {}).filter(([, count]) => count).map((it) => it.join(" "));
   if (counters.length) line.firstChild.append(create("small", counters.join(", ")));
   return line;
+}
+
+/** Show the pose in the map under the trajectory, with the ellipse of its uncertainty. */
+function showMap(map) {
+  const degrees = (angle) => Math.round(angle * 180 / Math.PI);
+  const at = map?.pose && t("map_at", map.pose[0].toFixed(2), map.pose[1].toFixed(2), degrees(map.pose[2]));
+  const text = joined([at, t(map?.text), map?.ellipse && t("map_ellipse")]);
+  if ($("map").textContent !== text) $("map").textContent = text;
+  $("map").dataset.state = map?.state ?? "";
 }
 
 function showDrivers(slow) {

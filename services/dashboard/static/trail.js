@@ -10,8 +10,11 @@ let scale = 40;
 let center = [0, 0];
 let epoch = null;
 let pose = null;
+let uncertainty = null; // of the pose in the map: half axes, m, and the direction of the first, rad
 
 export const size = (given) => { vehicle = given; };
+
+export const locate = (map) => { uncertainty = map?.ellipse; };
 
 export function add(snapshot) {
   if (!snapshot.pose) return;
@@ -40,6 +43,16 @@ export function draw(given) {
   if (pose && points.length) pen.lineTo(...screen(pose));
   pen.stroke();
   if (pose) body(pen, screen(pose), pose[2], color);
+  if (pose && uncertainty) ellipse(pen, screen(pose), color);
+}
+
+function ellipse(pen, [x, y], color) {
+  const [axis, other, direction] = uncertainty;
+  pen.strokeStyle = color("allowed");
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.ellipse(x, y, axis * scale, other * scale, -direction, 0, 2 * Math.PI);
+  pen.stroke();
 }
 
 function step() {
