@@ -3,12 +3,15 @@
 import math
 import re
 from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from itertools import groupby
+from typing import TypeVar
 
 import ziaplot as zp
 from ziaplot.canvas import Borders, Canvas, ViewBox
 from ziaplot.style import DashTypes, MarkerTypes
 
+from cli.recordings.path import PathSegment
 from cli.recordings.timeline import Series, Timeline, VelocitySeries, downsampled
 
 WIDTH = 1100  # pixels
@@ -18,9 +21,15 @@ VERDICTS = {
     "run": "#1a7f37", "slow": "#f0b429", "stop": "#8a939c", "brake": "#cf1f26",
     "inhibited": "#7a3fd0",
 }  # fmt: skip
+MAP_STATES = {"placed": "#1a7f37", "unplaced": "#8a939c", "lost": "#cf1f26"}
+ELLIPSE, USED, REFUSED = "#b35900", "#1a7f37", "#7a3fd0"
+SIGMAS = 2.0  # of an ellipse
 DASHES: tuple[DashTypes, ...] = ("-", "--", ":", "-.")
+PLAN = 560  # pixels, height of a figure of a path
 PATH_ASPECT = 2.0  # width by height
 BEYOND = 1000.0  # outside each axis; figures are clipped
+
+T = TypeVar("T")
 
 zp.config.text = "text"  # searchable, and a `$` in a name is not a formula
 zp.config.precision = 1  # of a pixel
@@ -66,35 +75,78 @@ class BrokenLine(zp.PolyLine):
 
 def path(timeline: Timeline) -> str:
     """Draw the path by odometry, with the numbered stops."""
+    graph = _plan("odom", timeline.path, "odometry restart")
+    _stops(graph, timeline, timeline.path)
+    return svg(graph, PLAN, "path")
+
+
+def map_path(timeline: Timeline) -> str:
+    """Draw the path in the map, with stops, ellipses and fixes."""
+    track = timeline.map
+    graph = _plan("map", track.path, "placed")
+    for each in _thinned(track.ellipses):
+        axis, other, direction = each.axes
+        ellipse = zp.Ellipse(
+            (each.x, each.y), SIGMAS * axis, SIGMAS * other, math.degrees(direction)
+        )
+        graph.add(ellipse.color(ELLIPSE).strokewidth(1))
+    _scatter(graph, [(it.x, it.y) for it in track.fixes if it.used], "round", USED)
+    _scatter(graph, [(it.x, it.y) for it in track.fixes if not it.used], "x", REFUSED)
+    _stops(graph, timeline, track.path)
+    return svg(graph, PLAN, "map")
+
+
+def _plan(frame: str, path: Sequence[PathSegment], begins: str) -> zp.Graph:
     graph = zp.Graph()
-    graph.axesnames("x in odom, m", "y in odom, m")
-    for number, segment in enumerate(timeline.path):
+    graph.axesnames(f"x in {frame}, m", f"y in {frame}, m")
+    for number, segment in enumerate(path):
         xs, ys = downsampled(segment.xs, segment.ys)
         graph.add(zp.PolyLine(xs, ys).color(MEASURED).strokewidth(1.6))
-        _mark(graph, (xs[0], ys[0]), "round", "start" if number == 0 else "odometry restart")
-        if number == len(timeline.path) - 1:
+        _mark(graph, (xs[0], ys[0]), "round", "start" if number == 0 else begins)
+        if number == len(path) - 1:
             _mark(graph, (xs[-1], ys[-1]), "square", "end")
+    _fit(graph, path)
+    return graph
+
+
+def _stops(graph: zp.Graph, timeline: Timeline, path: Sequence[PathSegment]) -> None:
     for number, stop in enumerate(timeline.stops, 1):
-        place = place_at(timeline, stop.begins_s)
+        place = place_at(path, stop.begins_s)
         if place:
             graph.add(zp.Point(place).marker("x", 5).label(str(number), "SE").color(STOPPED))
-    _fit(graph, timeline)
-    return svg(graph, 560, "path")
+
+
+def _scatter(
+    graph: zp.Graph, places: Sequence[tuple[float, float]], marker: MarkerTypes, color: str
+) -> None:
+    if places:
+        xs, ys = zip(*_thinned(places), strict=True)
+        graph.add(zp.Scatter(xs, ys).marker(marker, 3).color(color))
+
+
+def _thinned(places: Sequence[T], limit: int = 1000) -> Sequence[T]:
+    return places[:: math.ceil(len(places) / limit) or 1]
 
 
 def speeds(timeline: Timeline) -> str:
     """Draw linear and angular velocity over time, with the verdicts."""
-    rows = (
+    rows = [
         _velocity(timeline, timeline.linear, "linear, m/s"),
         _velocity(timeline, timeline.angular, "angular, rad/s"),
-        _verdicts(timeline),
-    )
-    return svg(zp.LayoutV(*rows, row_gap=4, row_heights="4fr 4fr 1fr"), 620, "speeds")
+    ]
+    heights, states = "4fr 4fr 1fr", timeline.map.states
+    if states:
+        heights += " 1fr"
+        bands = [(each.begins_s, each.ends_s, each.state) for each in states]
+        rows.append(_band(timeline, "map", bands, MAP_STATES))
+    verdicts = [(each.begins_s, each.ends_s, each.state.verdict) for each in timeline.verdicts]
+    rows.append(_band(timeline, "verdict", verdicts, VERDICTS, "time, s"))
+    return svg(zp.LayoutV(*rows, row_gap=4, row_heights=heights), 700 if states else 620, "speeds")
 
 
-def place_at(timeline: Timeline, at_s: float) -> tuple[float, float] | None:
-    """Return the last odometry position at that time; None before the first."""
-    for segment in reversed(timeline.path):
+def place_at(path: Sequence[PathSegment], at_s: float) -> tuple[float, float] | None:
+    """Return the last position of a path at that time; None before the first."""
+    for segment in reversed(path):
         index = bisect_right(segment.times, at_s) - 1
         if index >= 0:
             return segment.xs[index], segment.ys[index]
@@ -133,15 +185,21 @@ def _velocity(timeline: Timeline, series: VelocitySeries, label: str) -> zp.Grap
     return graph
 
 
-def _verdicts(timeline: Timeline) -> zp.Graph:
-    graph = _over_time(timeline, None, "time, s")
+def _band(
+    timeline: Timeline,
+    name: str,
+    bands: Sequence[tuple[float, float, str]],
+    colors: Mapping[str, str],
+    x_name: str | None = None,
+) -> zp.Graph:
+    graph = _over_time(timeline, None, x_name)
     graph.css("Graph.GridY { color: none; }")
     graph.yrange(-0.5, 0.5)
-    graph.yticks([0], ["verdict"])
-    for phase in timeline.verdicts:
-        _span(graph, phase.begins_s, phase.ends_s, VERDICTS[phase.state.verdict])
-    for verdict in dict.fromkeys(phase.state.verdict for phase in timeline.verdicts):
-        _line(graph, Series(), VERDICTS[verdict], verdict, width=6)
+    graph.yticks([0], [name])
+    for begins_s, ends_s, state in bands:
+        _span(graph, begins_s, ends_s, colors[state])
+    for state in dict.fromkeys(state for *_, state in bands):
+        _line(graph, Series(), colors[state], state, width=6)
     return graph
 
 
@@ -168,13 +226,13 @@ def _mark(graph: zp.Graph, place: tuple[float, float], shape: MarkerTypes, label
     graph.add(zp.Point(place).marker(shape, 4).label(label).color(TEXT))
 
 
-def _fit(graph: zp.Graph, timeline: Timeline) -> None:
+def _fit(graph: zp.Graph, path: Sequence[PathSegment]) -> None:
     """Show the whole path in a frame of ``PATH_ASPECT``, with equal scales."""
     (left, right), (bottom, top) = (
         (min(values), max(values))
         for values in (
-            [x for segment in timeline.path for x in segment.xs],
-            [y for segment in timeline.path for y in segment.ys],
+            [x for segment in path for x in segment.xs],
+            [y for segment in path for y in segment.ys],
         )
     )
     height = 1.1 * max((right - left) / PATH_ASPECT, top - bottom, 0.1)

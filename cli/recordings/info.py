@@ -4,7 +4,7 @@ import argparse
 import shlex
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from cli.inspect import output
 from cli.inspect.addressing import chunks
@@ -13,7 +13,7 @@ from common.cli_args import file_path, needs_extra, reader_language
 from common.freshness import NS_PER_S
 from common.text import printable
 from t2.keys import ROOT
-from t2.messages import Cause, Event
+from t2.messages import Cause, Event, MapState
 from t2.words import Language, render
 
 if TYPE_CHECKING:
@@ -106,10 +106,21 @@ def summary(timeline: Timeline, reader: "Reader") -> dict[str, str]:
         "start": f"{began:%Y-%m-%d %H:%M:%S} UTC" if timeline.streams else "",
         "duration": clock(timeline.lasted_s),
         "distance": f"{timeline.distance:.1f} m",
+        "in the map": in_map(timeline),
         "stops": f"{len(timeline.stops)}, {while_driving} while driving",
         "services": versions or "no health messages",
         "messages": f"{timeline.messages} on {len(timeline.streams)} keys",
     }
+
+
+def in_map(timeline: Timeline) -> str:
+    """Return the times of each state of localization, and the number of fixes; empty without."""
+    track, states = timeline.map, get_args(MapState)
+    parts = [f"{state} {clock(track.lasted_s(state))}" for state in states if track.lasted_s(state)]
+    used = sum(each.used for each in track.fixes)
+    if track.fixes:
+        parts.append(f"fixes: {used} used, {len(track.fixes) - used} refused")
+    return ", ".join(parts)
 
 
 def warnings(timeline: Timeline, reader: "Reader") -> list[str]:

@@ -1,7 +1,8 @@
 """``t2 report FILE...``: an HTML report of each recording, in one self-contained file.
 
-It shows the stops with their reasons, the velocities (requested, allowed, measured), the path, and
-rates and gaps of each stream. All content from the bus is escaped. It needs the extra ``report``.
+It shows the stops with their reasons, the velocities (requested, allowed, measured), the path, also
+in the map, and rates and gaps of each stream. All content from the bus is escaped. It needs the
+extra ``report``.
 """
 
 import argparse
@@ -83,5 +84,6 @@ def page(timeline: Timeline, reader: "Reader", language: Language = "en") -> str
         warnings=warnings(timeline, reader),
         streams=list(zip(names, streams, strict=True)),
         path=figures.path(timeline) if timeline.path else "",
+        map_path=figures.map_path(timeline) if timeline.map.path else "",
         speeds=figures.speeds(timeline),
     )

@@ -1,4 +1,4 @@
-"""Timeline of a recording, for ``t2 info`` and ``t2 report``: series, path, stops, events. Pure.
+"""Timeline of a recording, for ``t2 info`` and ``t2 report``: series, paths, stops, events. Pure.
 
 A stop begins with the first cause that stops the vehicle and ends when none is left. ``no_request``
 and ``neutral`` do not count: the vehicle stands because nothing requests motion, or because the
@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from itertools import pairwise
 
 from cli.inspect.addressing import chunks, topic_of
+from cli.recordings.path import MapTrack, PathSegment, segment_of
 from common.freshness import NS_PER_S
 from t2 import keys
 from t2.messages import (
@@ -135,22 +136,6 @@ class VelocitySeries:
 
 
 @dataclass(slots=True)
-class PathSegment:
-    """The path of one odometry epoch, in ``odom``; m."""
-
-    epoch: tuple[int, int]
-    times: list[float] = field(default_factory=list)
-    xs: list[float] = field(default_factory=list)
-    ys: list[float] = field(default_factory=list)
-
-    @property
-    def length(self) -> float:
-        """Return its length in metres."""
-        points = list(zip(self.xs, self.ys, strict=True))
-        return sum(math.dist(before, after) for before, after in pairwise(points))
-
-
-@dataclass(slots=True)
 class Stream:
     """The samples of a key, by arrival time in s."""
 
@@ -207,7 +192,8 @@ class Timeline:
     lasted_s: float = 0.0
     linear: VelocitySeries = field(default_factory=VelocitySeries)
     angular: VelocitySeries = field(default_factory=VelocitySeries)
-    path: list[PathSegment] = field(default_factory=list)
+    path: list[PathSegment] = field(default_factory=list)  # by odometry
+    map: MapTrack = field(default_factory=MapTrack)
     verdicts: list[Phase] = field(default_factory=list)
     events: list[TimedEvent] = field(default_factory=list)
     streams: dict[str, Stream] = field(default_factory=dict)  # by key
@@ -221,6 +207,7 @@ class Timeline:
         self.streams.setdefault(key, Stream(key, kind)).add(at_s, message)
         if message is not None:
             self._add(message, key, at_s)
+            self.map.add(message, key, at_s)
 
     def utc(self, at_s: float) -> str:
         """Return the time of day of a moment, by the recorder's clock."""
@@ -265,13 +252,8 @@ class Timeline:
                 self.versions[key.split("/")[-2]] = message.version
 
     def _add_pose(self, message: Odometry, at_s: float) -> None:
-        epoch = (message.boot, message.epoch)
-        if not self.path or self.path[-1].epoch != epoch:
-            self.path.append(PathSegment(epoch))
-        segment = self.path[-1]
-        segment.times.append(at_s)
-        segment.xs.append(message.x)
-        segment.ys.append(message.y)
+        segment = segment_of(self.path, (message.boot, message.epoch))
+        segment.add(at_s, message.x, message.y)
 
 
 def downsampled(

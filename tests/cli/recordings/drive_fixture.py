@@ -38,6 +38,19 @@ def drive() -> Iterator[Arrival]:
             yield at("tel/bridge/health", health, at_s)
 
 
+def in_the_map() -> Iterator[Arrival]:
+    """Yield a used and a refused fix in two seconds of a pose in the map, which is lost then."""
+    used, refused = 0, 0
+    for step in range(21):
+        if step in (5, 10):
+            fix = m.Fix(x=step / 10, y=0.1, covariance=(0.01,) * 9, odom_boot=1, odom_seq=step)
+            yield at("@cmd/fix/tags", fix, step / 10)
+            used, refused = used + (step == 5), refused + (step == 10)
+        sources = (factories.fix_state(used=used, refused=refused, in_a_row=refused),)
+        pose = factories.map_pose("lost" if step > 15 else "placed", x=step / 10, sources=sources)
+        yield at("tel/localization/pose", pose, step / 10 + 0.01)
+
+
 def at(path: str, message: m.Message, at_s: float) -> Arrival:
     """Return a message with its arrival time, in seconds since the start."""
     return f"{ROOT}/{path}", type(message).__name__, message, BEGIN_NS + round(at_s * NS_PER_S)

@@ -4,9 +4,11 @@ import math
 import re
 from xml.etree import ElementTree as ET
 
+import pytest
+
 from cli.recordings import figures
 from tests import factories
-from tests.cli.recordings.drive_fixture import at, drive, state, timeline_of
+from tests.cli.recordings.drive_fixture import at, drive, in_the_map, state, timeline_of
 
 
 def lines_of(svg: str, color: str) -> list[str]:
@@ -31,3 +33,23 @@ def test_a_single_point_makes_no_path() -> None:
     drawn = figures.path(timeline) + figures.speeds(timeline)
     assert re.findall(r' d="M[^"L]*"', drawn)
     assert re.findall(r' d="[^"]*L *"', drawn) == []
+
+
+def test_the_path_in_the_map_has_ellipses_fixes_and_states() -> None:
+    timeline = timeline_of(*drive(), *in_the_map())
+    drawn = figures.map_path(timeline)
+    (ellipse,) = re.findall(r"<ellipse [^>]*>", drawn)
+    assert float(attribute(ellipse, "rx")) == pytest.approx(
+        2 * float(attribute(ellipse, "ry")), rel=0.02
+    )
+    assert figures.USED in drawn
+    assert figures.REFUSED in drawn
+    speeds = figures.speeds(timeline)
+    assert all(f">{word}<" in speeds for word in ("map", "placed", "lost"))
+    assert ">map<" not in figures.speeds(timeline_of(*drive()))
+
+
+def attribute(element: str, name: str) -> str:
+    found = re.search(rf' {name}="([^"]*)"', element)
+    assert found, element
+    return found[1]

@@ -10,7 +10,7 @@ from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from services.recorder.mcap_codec import Encoder
 from services.recorder.writer import RecordingWriter
-from tests.cli.recordings.drive_fixture import drive
+from tests.cli.recordings.drive_fixture import drive, in_the_map
 from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 
 
@@ -18,7 +18,7 @@ from tests.recorder.samples import BEGIN_NS, ROOT, bare, sample
 def file(tmp_path: Path) -> Path:
     """A recording of the drive, and of an unknown key."""
     made = RecordingWriter(tmp_path / "lap.mcap", Encoder(Vehicle()))
-    for key, _, message, at_ns in drive():
+    for key, _, message, at_ns in (*drive(), *in_the_map()):
         at_s = (at_ns - BEGIN_NS) / NS_PER_S
         made.write(sample(key.removeprefix(f"{ROOT}/"), message, at_s))
     made.write(bare("tel/<i>\u202e", b"\xc1"))
@@ -34,12 +34,13 @@ def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for word in (
         "requested by teleop", "allowed by safety", "measured", "The bumper was hit.",
         "tel/bridge/velocity", "bridge 0.1.0", "4.0 m", "2023-11-14 22:13:20 UTC",
+        "Path in the map", "placed 1.6 s, lost 0.4 s, fixes: 1 used, 1 refused",
     ):  # fmt: skip
         assert word in text, word
     assert re.search(r'<td class="n">22:13:\d\d</td>', text)  # of a stop
     # It loads nothing, and content of the bus is escaped.
     assert not re.findall(r"<script|(?:src|href|action|data|poster)=[^#]{2}", text)
-    assert text.count("<svg") == 2
+    assert text.count("<svg") == 3
     assert "<i>" not in text
     assert "tel/&lt;i&gt;\\u202e" in text
     assert text.replace("\n", "").isprintable()
