@@ -17,7 +17,7 @@ import msgspec
 
 from common.freshness import NS_PER_S
 from common.settings import Vehicle, sonar_mounts
-from t2.messages import SONAR_NAMES, Event, Message, Odometry, Ultrasonic
+from t2.messages import SONAR_NAMES, Event, MapPose, Message, Odometry, PlaneFrame, Ultrasonic
 
 CONE = 0.5  # rad, for display only: the manual does not specify the sensors' opening angle
 POINTS = 5  # of the displayed arc
@@ -107,7 +107,10 @@ class FoxgloveViews:
         timestamp = {"sec": log_ns // NS_PER_S, "nsec": log_ns % NS_PER_S}
         match message:
             case Odometry():
-                views = iter([_transform(message)])
+                frames = message.frame_id, message.child_frame_id
+                views = iter([_transform(*frames, message)])
+            case MapPose(odom=PlaneFrame() as origin):
+                views = iter([_transform(message.frame_id, "odom", origin)])
             case Ultrasonic():
                 views = self._scans(message)
             case Event():
@@ -130,11 +133,11 @@ class FoxgloveViews:
             yield f"sonar/{name}", SCAN, fields
 
 
-def _transform(message: Odometry) -> View:
-    pose = _pose(message.x, message.y, message.heading)
+def _transform(parent: str, child: str, at: Odometry | PlaneFrame) -> View:
+    pose = _pose(at.x, at.y, at.heading)
     fields = {
-        "parent_frame_id": message.frame_id,
-        "child_frame_id": message.child_frame_id,
+        "parent_frame_id": parent,
+        "child_frame_id": child,
         "translation": pose["position"],
         "rotation": pose["orientation"],
     }

@@ -17,7 +17,8 @@ from services.recorder.foxglove_views import (
     schema_of,
 )
 from services.recorder.mcap_codec import MESSAGE_TYPES
-from t2.messages import SONAR_NAMES, Event, Message
+from t2.messages import SONAR_NAMES, Event, Message, PlaneFrame
+from tests import factories
 from tests.recorder import samples
 
 VEHICLE = Vehicle(length=1.0, width=0.6)
@@ -33,7 +34,12 @@ def views_of(message: Message, service: str = "") -> dict[str, tuple[Schema, dic
 
 @pytest.mark.parametrize(
     "message",
-    [samples.odometry(), samples.ultrasonic(), Event(name="stop", level="info", text="b")],
+    [
+        samples.odometry(),
+        samples.ultrasonic(),
+        factories.map_pose(),
+        Event(name="stop", level="info", text="b"),
+    ],
 )
 def test_views_match_their_schemas(message: Message) -> None:
     assert views_of(message)
@@ -48,6 +54,15 @@ def test_the_frame_of_the_vehicle_follows_its_pose() -> None:
     half = math.sqrt(0.5)
     assert transform["rotation"] == pytest.approx({"x": 0.0, "y": 0.0, "z": half, "w": half})
     assert (transform["parent_frame_id"], transform["child_frame_id"]) == ("odom", "base_link")
+
+
+def test_odom_follows_its_pose_in_the_map_once_it_is_known() -> None:
+    origin = PlaneFrame(x=3.0, y=1.0, heading=math.pi)
+    _, transform = views_of(factories.map_pose(odom=origin))["foxglove/tf"]
+    assert transform["translation"] == {"x": 3.0, "y": 1.0, "z": 0.0}
+    assert transform["rotation"] == pytest.approx({"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0})
+    assert (transform["parent_frame_id"], transform["child_frame_id"]) == ("map", "odom")
+    assert views_of(factories.map_pose("unplaced")) == {}
 
 
 def test_each_sonar_is_a_scan_at_its_mounting_position() -> None:
