@@ -12,14 +12,16 @@ from msgspec import Struct
 from msgspec.structs import replace
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
+from common.pose import Covariance
 from services.metrics.robot import RobotState
 from t2 import keys
-from t2.messages import Durations, LinkState, Message, Verdict
+from t2.messages import Durations, LinkState, MapPose, MapState, Message, Verdict
 
 STREAMS: dict[str, keys.Topic[Any]] = {
     "safety": keys.SAFETY,
     "link": keys.LINK,
     "odometry": keys.ODOMETRY,
+    "localization": keys.MAP_POSE,
 }
 UNITS = {
     "x": "_meters", "y": "_meters", "residual": "_meters", "heading": "_radians",
@@ -28,12 +30,18 @@ UNITS = {
     "round_trip": "_seconds", "uptime": "_seconds", "lateness": "_seconds", "age": "_seconds",
     "rss": "_bytes", "rates": "_hertz", "reactions": "_seconds",
 }  # fmt: skip
-WORDS = {"state": get_args(LinkState), "verdict": get_args(Verdict)}  # 0 or 1 for each of them
+# By metric, the words of a fixed set: 0 or 1 for each of them.
+WORDS = {
+    "t2_link_state": get_args(LinkState),
+    "t2_link_relay_state": get_args(LinkState),
+    "t2_localization_state": get_args(MapState),
+    "t2_safety_verdict": get_args(Verdict),
+}
 # Sentences, ids and times that say nothing as a number; matrices; labels.
 OMITTED = {
     *Message.__struct_fields__, "text", "waiting", "release_refusal", "heartbeat", "latched_by",
     "estop", "ports", "frame_id", "child_frame_id", "pose_covariance", "twist_covariance",
-    "service", "limit_sources",
+    "service", "limit_sources", "odom", "odom_boot", "odom_seq", "placement", "sources",
 }  # fmt: skip
 # Metrics that are no fields of messages.
 METRICS = {
@@ -41,6 +49,7 @@ METRICS = {
     "t2_robot_up": "Whether the robot is alive",
     "t2_service_up": "Whether the service is present and healthy",
     "t2_service_instances": "Processes of the service on the bus",
+    "t2_localization_sigma_meters": "Greatest standard deviation of the position in the map",
     "t2_events_total": "Events received, including replayed ones, by `event` and `level`",
 }
 
@@ -67,7 +76,7 @@ class Scrape:
                 self.add_fields(f"{prefix}_{field}", value, **labels)
                 continue
             name = f"{prefix}_{field}{UNITS.get(field, '')}"
-            for word, number in _numbers(value, WORDS.get(field)):
+            for word, number in _numbers(value, WORDS.get(name)):
                 self.add(name, number, about, **labels, **word)
 
 
@@ -104,6 +113,9 @@ def _robot(scrape: Scrape, name: str, robot: RobotState, now_ns: int) -> None:
         message = robot.fresh(topic.path, now_ns)
         if message is not None:
             scrape.add_fields(f"t2_{stream}", message, robot=name)
+        if isinstance(message, MapPose) and message.pose_covariance:
+            sigma = Covariance.of(message.pose_covariance).sigma
+            scrape.add("t2_localization_sigma_meters", sigma, robot=name)
     for (service, event, level), count in sorted(robot.events.items()):
         labels = {"robot": name, "service": service, "event": event, "level": level}
         scrape.add("t2_events_total", count, **labels)

@@ -13,6 +13,7 @@ from tests.factories import health, odometry
 NOW_NS = 1_000_000 * NS_PER_S  # any time but zero
 SAFETY, LINK, ODOMETRY = "tel/safety/state", "tel/bridge/link", "tel/odom/odometry"
 SERVICES = "bridge", "safety", "odom", "recorder"
+MAP_POSE = "tel/localization/pose"
 Values = dict[tuple[str, frozenset[tuple[str, str]]], float]
 
 

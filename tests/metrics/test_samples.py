@@ -6,9 +6,10 @@ from common.freshness import NS_PER_S
 from services.metrics.robot import FRESH_S, RobotState
 from services.metrics.samples import metric_families
 from t2.messages import Durations
-from tests.factories import health, odometry
+from tests.factories import fix_state, health, map_pose, odometry
 from tests.metrics.robots import (
     LINK,
+    MAP_POSE,
     NOW_NS,
     ODOMETRY,
     SAFETY,
@@ -61,6 +62,21 @@ def test_words_of_a_fixed_set_are_one_or_zero_and_others_are_one_while_they_hold
     assert of_name(found, "t2_safety_latched") == {"contact": 1, "estop": 1}
     robot.on_message(SAFETY, safety("limit", "limit"), NOW_NS)  # listed twice
     assert of_name(values(robot), "t2_safety_causes") == {"limit": 1}
+
+
+def test_the_pose_in_the_map_and_its_uncertainty() -> None:
+    robot = whole()
+    robot.on_message(MAP_POSE, map_pose("lost", sources=(fix_state(),)), NOW_NS)
+    found = values(robot)
+    states = {"unplaced": 0, "placed": 0, "lost": 1}
+    assert of_name(found, "t2_localization_state") == states
+    assert value(found, "t2_localization_sigma_meters") == 0.2
+    assert value(found, "t2_localization_x_meters") == 4.0
+    robot.on_message(MAP_POSE, map_pose("unplaced"), NOW_NS)
+    absent = {"t2_localization_sigma_meters", "t2_localization_x_meters"}
+    assert not absent & names(values(robot))
+    links = {"up": 1, "lost": 0, "never": 0}
+    assert of_name(found, "t2_link_state") == links
 
 
 def test_stale_values_are_not_exported() -> None:
