@@ -17,6 +17,7 @@ from t2.messages import (
     Cause,
     Direction,
     Driver,
+    Odometry,
     Phrase,
     Release,
     SafetyState,
@@ -327,10 +328,22 @@ def _pose(view: View, say: Labels) -> list[tuple[str, Text]]:
     if at.residual is not None:
         residual = say("odom.residual", residual=at.residual)
     slip = (say("odom.slip"), WARN) if at.slip else (say("odom.no_slip"), GOOD)
-    return [
-        ("pose", Text(f"x {at.x:+.2f}  y {at.y:+.2f} m  {math.degrees(at.heading):+.0f}°")),
-        ("odom", Text.assemble(residual, slip)),
-    ]
+    return [_position(view, at, say), ("odom", Text.assemble(residual, slip))]
+
+
+def _position(view: View, at: Odometry, say: Labels) -> tuple[str, Text]:
+    """Return the pose in the map once the vehicle is placed; before that, by odometry."""
+    known = view.map_pose
+    if known is None or known.x is None or known.y is None or known.heading is None:
+        return "pose", Text(_pose_text(at.x, at.y, at.heading))
+    text = _pose_text(known.x, known.y, known.heading)
+    if known.state == "lost":
+        return "map", Text(fitted(f"{say('lost')} {text}", VALUE), BAD)
+    return "map", Text(text, GOOD)
+
+
+def _pose_text(x: float, y: float, heading: float) -> str:
+    return f"x {x:+.2f}  y {y:+.2f} m  {math.degrees(heading):+.0f}°"
 
 
 def _link(view: View, say: Labels) -> Text:

@@ -13,6 +13,7 @@ TOPICS: dict[str, tuple[Any, float, str]] = {
     "safety": (keys.SAFETY, 0.5, ""),
     "velocity": (keys.VELOCITY, 0.5, ""),
     "odometry": (keys.ODOMETRY, 0.5, ""),
+    "map_pose": (keys.MAP_POSE, 0.5, ""),
     "ultrasonic": (keys.ULTRASONIC, 0.5, ""),
     "bumper": (keys.BUMPER, 0.5, ""),
     "link": (keys.LINK, 1.0, ""),

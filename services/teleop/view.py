@@ -10,6 +10,7 @@ from t2.messages import (
     Drive,
     Driver,
     Link,
+    MapPose,
     Odometry,
     Phrase,
     Phrases,
@@ -45,6 +46,7 @@ class View:
     safety: SafetyState | None = None
     velocity: Velocity | None = None
     odometry: Odometry | None = None
+    map_pose: MapPose | None = None
     ultrasonic: Ultrasonic | None = None
     bumper: Bumper | None = None
     link: Link | None = None

@@ -20,7 +20,7 @@ from t2.messages import (
     Velocity,
 )
 from t2.words import PLACEHOLDER
-from tests.factories import contact_state, link, odometry, release, safety_state
+from tests.factories import contact_state, link, map_pose, odometry, release, safety_state
 from tests.teleop.support import view
 
 SAY = Labels()
@@ -173,6 +173,15 @@ def test_the_footer_has_the_keys_that_have_an_effect(
     [
         ({}, {"pose": "no data", "odom": "no data", "board": "no data"}),
         ({"odometry": odometry(residual=None, slip=True)}, {"odom": "residual -  SLIP"}),
+        (
+            {"odometry": odometry(), "map_pose": map_pose("unplaced")},
+            {"pose": "x +1.23  y -0.40 m  +90°"},
+        ),
+        ({"odometry": odometry(), "map_pose": map_pose()}, {"map": "x +4.00  y +2.00 m  +29°"}),
+        (
+            {"odometry": odometry(), "map_pose": map_pose("lost")},
+            {"map": "LOST x +4.00  y +2.00 m  +29°"},
+        ),
         ({"link": link(armed=False, waiting="a neutral motion")}, {"board": "a neutral motion"}),
         (
             {
