@@ -275,9 +275,10 @@ REMEDIES: dict[str, Words] = {
         "`t2 up --only localization`；systemd 用 `systemctl start t2-localization`",
     ),
     "place": (
-        "let the vehicle stand; `t2 call localization/place x=0.0 y=0.0 heading=0.0` with its position "
-        "in m and its heading in rad",
-        "让车辆停稳；`t2 call localization/place x=0.0 y=0.0 heading=0.0`，填入位置（m）和航向（rad）",
+        """let the vehicle stand; then `t2 call localization/place '{"x": 0.0, "y": 0.0, "heading": """
+        """0.0}'`, with its position in m and its heading in rad""",
+        """让车辆停稳；然后运行 `t2 call localization/place '{"x": 0.0, "y": 0.0, "heading": 0.0}'`，"""
+        """填入位置（m）和航向（rad）""",
     ),
     "fixes": (
         "is its program running, and `t2 hz @cmd/fix/{source}` above 0? A source may be out of sight",
