@@ -44,6 +44,7 @@ zp.css("""
     Graph.Legend { stroke: none; edge_color: none; edge_width: 12; font_size: 12; radius: 24; }
     Graph.LegendText { font_size: 12; }
     Point { edge_width: 0; }
+    Scatter { edge_width: 0; }
     Point.Text { font_size: 12; margin: 8; }
     Text { font_size: 12; }
 """)
@@ -134,14 +135,14 @@ def speeds(timeline: Timeline) -> str:
         _velocity(timeline, timeline.linear, "linear, m/s"),
         _velocity(timeline, timeline.angular, "angular, rad/s"),
     ]
-    heights, states = "4fr 4fr 1fr", timeline.map.states
+    heights, states = "8fr 8fr 2fr", timeline.map.states
     if states:
-        heights += " 1fr"
+        heights = "8fr 8fr 1.6fr 2fr"
         bands = [(each.begins_s, each.ends_s, each.state) for each in states]
         rows.append(_band(timeline, "map", bands, MAP_STATES))
     verdicts = [(each.begins_s, each.ends_s, each.state.verdict) for each in timeline.verdicts]
     rows.append(_band(timeline, "verdict", verdicts, VERDICTS, "time, s"))
-    return svg(zp.LayoutV(*rows, row_gap=4, row_heights=heights), 700 if states else 620, "speeds")
+    return svg(zp.LayoutV(*rows, row_gap=4, row_heights=heights), 690 if states else 620, "speeds")
 
 
 def place_at(path: Sequence[PathSegment], at_s: float) -> tuple[float, float] | None:

@@ -160,7 +160,7 @@ class Stream:
     def expected_hz(self) -> float:
         """Return the nominal rate; 0 for an event-driven key, also of a source that may pause."""
         topic = topic_of(self.key)
-        return topic.rate_hz if topic and topic is not keys.DRIVE else 0.0
+        return topic.rate_hz if topic and topic not in (keys.DRIVE, keys.FIX) else 0.0
 
     @property
     def hz(self) -> float | None:

@@ -45,7 +45,7 @@ def test_the_pose_in_the_map(page: Page, server: Server, peer: Peer) -> None:
     wait_for_text(page, "#map", "The position is not known: place the vehicle")
     assert page.evaluate("window.ellipses.length") == 0
     peer.map_pose = map_pose(odom=PlaneFrame(x=0.0, y=0.0, heading=0.5))
-    wait_for_text(page, "#map", "In the map: x 4.00 m, y 2.00 m, 29°. The position is known to")
+    wait_for_text(page, "#map", "(standard deviations). In the map: x 4.00 m, y 2.00 m, 29°.")
     page.wait_for_function("() => window.ellipses.length > 0")
     axis, other, rotation = page.evaluate("window.ellipses.at(-1).slice(2, 5)")
     assert (axis / other, rotation) == pytest.approx((2.0, 0.5))

@@ -98,7 +98,7 @@ function service(name, instances, health) {
 function showMap(map) {
   const degrees = (angle) => Math.round(angle * 180 / Math.PI);
   const at = map?.pose && t("map_at", map.pose[0].toFixed(2), map.pose[1].toFixed(2), degrees(map.pose[2]));
-  const text = joined([at, t(map?.text), map?.ellipse && t("map_ellipse")]);
+  const text = joined([t(map?.text), at, map?.ellipse && t("map_ellipse")]);
   if ($("map").textContent !== text) $("map").textContent = text;
   $("map").dataset.state = map?.state ?? "";
 }

@@ -73,6 +73,7 @@ def test_events_and_sources_have_no_gaps_and_an_emergency_stop_no_message_to_dec
     for at_s in (0.0, 9.0):
         stream.add(at_s, Drive(seq=int(at_s) + 1, boot=9, linear=0.0, angular=0.0, echo=1))
     assert (stream.gaps, stream.expected_hz) == ([], 0.0)
+    assert Stream("t2/v1/001/@cmd/fix/tags").expected_hz == 0.0  # not always in sight
     stop = Stream("t2/v1/001/estop")
     stop.add(0.0, None)
     assert (stop.undecoded, stop.hz) == (0, None)
