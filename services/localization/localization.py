@@ -15,7 +15,7 @@ from t2 import keys
 from t2 import messages as m
 from t2.words import done
 
-FIXES = 16  # queued until the loop wakes up
+QUEUED = 16  # messages of a key, until the loop wakes up: a fix may name each odometry
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 
 
@@ -29,9 +29,9 @@ class LocalizationService:
         self._published: m.MapPose | None = None
         bus = node.bus
         self._to_pose = bus.publisher(keys.MAP_POSE)
-        bus.subscribe(keys.ODOMETRY, self._on_odometry)
+        bus.subscribe(keys.ODOMETRY, self._on_odometry, depth=QUEUED)
         for source in node.config.localization.sources:
-            bus.subscribe(keys.FIX, self._on_fix, depth=FIXES, source=source)
+            bus.subscribe(keys.FIX, self._on_fix, depth=QUEUED, source=source)
         bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES, post=node.loop.defer)
         bus.serve(keys.PLACE, self._on_place)
 
