@@ -1,18 +1,23 @@
-"""One vehicle: the guided drive, the fit, and what it missed."""
+"""One vehicle: the guided drive, the fit, what it missed, and runs with what it proposes."""
+
+from collections.abc import Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
 
+from cli.fit.fit import REACT, Fit, Value, refusal
 from cli.settings import Everything
 from sim.config import known_profiles, load_model
 from sim.model import Model
 from verification.fit.drive import GuidedDrive
+from verification.fit.trial import Runs, Trial
 from verification.fit.truth import truths, unsafe
 from verification.search.bus import MS
 from verification.search.draw import TURN_BRAKING, draw
-from verification.search.stack import PLANE, Stack
+from verification.search.stack import PLANE, Stack, replaced
 
 STEP_NS = 10 * MS
+NEAR = 0.1  # m to a wall: half of ``safety.margin`` is used up
 
 
 class Result(Struct, frozen=True, kw_only=True):
@@ -24,15 +29,30 @@ class Result(Struct, frozen=True, kw_only=True):
     unsafe: tuple[str, ...]  # stops that need more than is reckoned with by the proposal
     inside: int  # truths within their intervals
     outside: tuple[str, ...]
+    refused: str  # by safety, which would not start with the proposal
+    today: Runs | None  # with today's settings; None without a proposal that safety accepts
+    proposed: Runs | None  # with the proposed ones
+
+    @property
+    def wrong(self) -> list[str]:
+        """What failed in the runs with the proposed settings."""
+        if self.today is None or self.proposed is None:
+            return [self.refused] if self.refused else []
+        old, new = self.today, self.proposed
+        lap = f"lap: {new.failed} (today: {old.failed or 'completed'})"
+        contact = f"contact: {', '.join(new.contacts)} (today: {', '.join(old.contacts) or 'none'})"
+        near = f"{new.nearest:.2f} m to a wall (today: {old.nearest:.2f} m)"
+        found = (lap, new.failed), (contact, new.contacts), (near, new.nearest < NEAR)
+        return [text for text, is_so in found if is_so]
 
 
-def vehicles(runs: int) -> list[tuple[str, Model, float]]:
-    """Return the profiles' vehicles and random ones without faults, by name.
+Vehicle = tuple[str, Model, float]  # name, and the angular deceleration of its settings, rad/s^2
 
-    With each comes the angular deceleration of its settings, rad/s^2.
-    """
+
+def vehicles(runs: int) -> list[Vehicle]:
+    """Return the profiles' vehicles and random ones without faults."""
     named = [(name, load_model([name]), 1.0) for name in known_profiles()]
-    drawn: list[tuple[str, Model, float]] = []
+    drawn: list[Vehicle] = []
     seed = 0
     while len(drawn) < runs:
         seed += 1
@@ -42,12 +62,13 @@ def vehicles(runs: int) -> list[tuple[str, Model, float]]:
     return named + drawn
 
 
-def measure(vehicle: tuple[str, Model, float]) -> Result:
-    """Drive a vehicle, and compare its fit with the truth."""
+def measure(vehicle: Vehicle) -> Result:
+    """Drive a vehicle, compare its fit with the truth, and drive it with the proposal."""
     name, model, turn_braking = vehicle
-    body = replace(model.vehicle, angular_deceleration=turn_braking)
-    stack = Stack(model, PLANE, seed=len(name), step_ns=STEP_NS, turn_braking=turn_braking)
-    found = GuidedDrive(stack).run(replace(Everything(), vehicle=body))
+    found, units = fitted(vehicle, {}), {}
+    if REACT not in found.proposals:  # a wrong unit comes first, then the vehicle is driven again
+        units = {path: it for path, it in found.proposals.items() if path.startswith("wire.")}
+        found = fitted(vehicle, units) if units else found
     inside, outside = 0, []
     by_name = {each.name: each for each in found.estimates}
     for truth, value in truths(model):
@@ -57,11 +78,31 @@ def measure(vehicle: tuple[str, Model, float]) -> Result:
                 inside += 1
             else:
                 outside.append(f"{truth} {value:.4f}, not in {low:.4f} to {high:.4f}")
+    proposes, refused = REACT in found.proposals, refusal(found)
+    runs = [
+        Trial(model, turn_braking, settings).run()
+        for settings in (units, {**units, **found.proposals})
+        if proposes and not refused
+    ]
+    today, proposed = runs or (None, None)
     return Result(
         name=name,
-        proposes="safety.react" in found.proposals,
+        proposes=proposes,
         missing=tuple(found.missing),
         unsafe=tuple(unsafe(found, model)),
         inside=inside,
         outside=tuple(outside),
+        refused=refused,
+        today=today,
+        proposed=proposed,
     )
+
+
+def fitted(vehicle: Vehicle, units: Mapping[str, Value]) -> Fit:
+    """Return the fit of a guided drive with these units."""
+    name, model, turn_braking = vehicle
+    body = replace(model.vehicle, angular_deceleration=turn_braking)
+    stack = Stack(
+        model, PLANE, seed=len(name), step_ns=STEP_NS, turn_braking=turn_braking, settings=units
+    )
+    return GuidedDrive(stack).run(replaced(replace(Everything(), vehicle=body), units))

@@ -1,7 +1,7 @@
 """The real shells of bridge, safety and odometry, a vehicle and sources, in simulated time."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 from unittest.mock import patch
@@ -138,8 +138,12 @@ class Stack:
         seed: int = 1,
         step_ns: int = STEP_NS,
         turn_braking: float = BRAKING_RADPS2,
+        settings: Mapping[str, Any] | None = None,
     ) -> None:
-        """Set up; ``turn_braking`` is the angular deceleration of the settings (rad/s^2)."""
+        """Set up; ``turn_braking`` is the angular deceleration of the settings (rad/s^2).
+
+        ``settings`` are further ones, by their paths. The oracle does not know them.
+        """
         self.net = Net(START_NS)
         self.oracle = Oracle(START_NS, turn_braking=turn_braking)
         if front := model.vehicle.sonars.get("front"):
@@ -153,6 +157,7 @@ class Stack:
         self.vehicle = Vehicle(self.net, model, plan, seed)
         self._step_ns = step_ns
         self._body = model.vehicle
+        self._settings = settings or {}
         self._boots = 1000
         self._brake_ns = 0  # when the guard brakes next
         self._free_ns: int | None = None  # when a tap of the bumper ends
@@ -219,11 +224,8 @@ class Stack:
         self._boots += 1
         config = CONFIGS.get(name)
         body = replace(self._body, angular_deceleration=self.oracle.turn_braking)
-        if isinstance(config, SafetyConfig):
-            config = replace(config, vehicle=body)
-        elif isinstance(config, BridgeConfig):
-            slowing = replace(config.vehicle, angular_deceleration=body.angular_deceleration)
-            config = replace(config, vehicle=slowing)
+        if isinstance(config, SafetyConfig | BridgeConfig):
+            config = replaced(replace(config, vehicle=body), self._settings)
         return Process(name, self.net, config, self._boots, self.oracle)
 
     def _start(self, name: str) -> Process:
@@ -298,3 +300,13 @@ class Stack:
         self.oracle.on_answer(safety, request, bool(caller.done))
         self.run(5)
         return caller
+
+
+def replaced(config: Any, settings: Mapping[str, Any]) -> Any:
+    """Return a configuration with these settings, by path, of the sections that it has."""
+    sections: dict[str, Any] = {}
+    for path, value in settings.items():
+        section, _, name = path.partition(".")
+        if (before := sections.get(section, getattr(config, section, None))) is not None:
+            sections[section] = replace(before, **{name: value})
+    return replace(config, **sections)

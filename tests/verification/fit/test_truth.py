@@ -20,14 +20,18 @@ def fitted(**changes: float) -> Fit:
     return found
 
 
-def test_a_vehicle_is_measured() -> None:
+def test_a_vehicle_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """A random one, with dead time and noise."""
+    monkeypatch.setattr("verification.fit.trial.SHARES", (1.0,))
     result = measure(vehicles(5)[-1])
     assert result.missing == ()
     assert result.proposes
     assert result.unsafe == ()
     assert len(result.outside) <= 1
     assert result.inside >= 1
+    assert result.today is not None
+    assert result.proposed is not None
+    assert result.wrong == []
 
 
 @pytest.mark.parametrize(
