@@ -30,7 +30,10 @@ class GuidedDrive:
             stack.hand.subscribe(topic, self._record, depth=64)
 
     def run(self, settings: Everything) -> Fit:
-        """Drive all manoeuvres, and those that were disturbed again, twice; return the fit."""
+        """Drive all manoeuvres, and those that were disturbed again, twice; return the fit.
+
+        A proposal beside missing manoeuvres, as of a unit, must be set first.
+        """
         self._hold(STILL, READY_MS)
         body = settings.vehicle
         for _ in range(ROUNDS):
@@ -40,7 +43,7 @@ class GuidedDrive:
                     self._stop(Drive(linear=0.0, angular=sign * share * body.max_angular, echo=0))
             self.streams.sort()
             found = fit([self.streams], settings)
-            if not found.missing:
+            if found.proposals or not found.missing:
                 break
         return found
 

@@ -65,10 +65,11 @@ def vehicles(runs: int) -> list[Vehicle]:
 def measure(vehicle: Vehicle) -> Result:
     """Drive a vehicle, compare its fit with the truth, and drive it with the proposal."""
     name, model, turn_braking = vehicle
-    found, units = fitted(vehicle, {}), {}
-    if REACT not in found.proposals:  # a wrong unit comes first, then the vehicle is driven again
-        units = {path: it for path, it in found.proposals.items() if path.startswith("wire.")}
-        found = fitted(vehicle, units) if units else found
+    found, first = fitted(vehicle, {}), {}
+    if REACT not in found.proposals and found.proposals:  # of a unit, or where the sonars end
+        first = found.proposals
+        found = fitted(vehicle, first)
+        found.proposals = {**first, **found.proposals}
     inside, outside = 0, []
     by_name = {each.name: each for each in found.estimates}
     for truth, value in truths(model):
@@ -81,7 +82,7 @@ def measure(vehicle: Vehicle) -> Result:
     proposes, refused = REACT in found.proposals, refusal(found)
     runs = [
         Trial(model, turn_braking, settings).run()
-        for settings in (units, {**units, **found.proposals})
+        for settings in ({}, found.proposals)
         if proposes and not refused
     ]
     today, proposed = runs or (None, None)
@@ -98,11 +99,11 @@ def measure(vehicle: Vehicle) -> Result:
     )
 
 
-def fitted(vehicle: Vehicle, units: Mapping[str, Value]) -> Fit:
-    """Return the fit of a guided drive with these units."""
+def fitted(vehicle: Vehicle, settings: Mapping[str, Value]) -> Fit:
+    """Return the fit of a guided drive with these settings."""
     name, model, turn_braking = vehicle
     body = replace(model.vehicle, angular_deceleration=turn_braking)
     stack = Stack(
-        model, PLANE, seed=len(name), step_ns=STEP_NS, turn_braking=turn_braking, settings=units
+        model, PLANE, seed=len(name), step_ns=STEP_NS, turn_braking=turn_braking, settings=settings
     )
-    return GuidedDrive(stack).run(replaced(replace(Everything(), vehicle=body), units))
+    return GuidedDrive(stack).run(replaced(replace(Everything(), vehicle=body), settings))

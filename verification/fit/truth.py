@@ -6,6 +6,8 @@ is a parameter of ``sim.model``; motors with lag have no deceleration, so they a
 """
 
 from collections.abc import Iterator
+from math import ceil
+from statistics import mean
 
 from cli.fit.fit import ANGULAR, DECELERATION, REACT, SENSING_S, Fit
 from common.motion import STANDING_MPS, STANDING_RADPS, Twist
@@ -16,6 +18,7 @@ from sim.vehicle import WHEELS, Motors
 
 SPEEDS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0)  # of the greatest allowed speed
 STEP_S, STEADY, LONGEST = 0.01, 100, 3000  # of the simulated motors; steps
+SHARES = 100  # of the jitter
 LITTLE = 0.002  # m or rad: steps of the counters
 SPAN = {"forward": 1, "backward": -1, "left": 1, "right": -1}
 
@@ -25,10 +28,7 @@ def unsafe(found: Fit, model: Model) -> list[str]:
     if REACT not in found.proposals:
         return []
     wait_s = float(found.proposals[REACT]) + DECISION_PERIOD_S
-    line = model.cable.to_board
-    delay_s = (
-        line.delay + line.jitter if line.port == "both" else 0.0
-    )  # commands take the other one
+    delay_s = max(late_s(model))
     body, short = found.settings.vehicle, []
     for share in SPEEDS:
         for direction, sign in SPAN.items():
@@ -63,9 +63,7 @@ def truths(model: Model) -> Iterator[tuple[str, float]]:
     """Yield the names of estimates with their true values."""
     drive = model.drive
     force = 1 - drive.weak_wheel / WHEELS
-    # From the command to its effect in a velocity: dead time, both ways, and a step of the motors.
-    lines = [line for line in (model.cable.to_board, model.cable.to_pc) if line.port == "both"]
-    seen_s = drive.dead_time + sum(line.delay + line.jitter / 2 for line in lines) + STEP_S / 2
+    seen_s = round(drive.dead_time / STEP_S) * STEP_S + mean(late_s(model))
     if not drive.lag:
         for direction in SPAN:
             turns = direction in ("left", "right")
@@ -75,3 +73,15 @@ def truths(model: Model) -> Iterator[tuple[str, float]]:
     yield "speed at standstill, bias", model.velocity.bias
     if model.sonar.saturation < model.vehicle.sonar_max:
         yield "sonars, greatest reading", model.sonar.saturation
+
+
+def late_s(model: Model) -> list[float]:
+    """Return how late a velocity may show a command, by the cable both ways, in equal shares.
+
+    The simulator delivers a datagram at the end of a step. A line with one bad port does not count:
+    the other one takes over.
+    """
+    lines = [line for line in (model.cable.to_board, model.cable.to_pc) if line.port == "both"]
+    shares = [(n + 1) / SHARES for n in range(SHARES)]
+    late = [[ceil((line.delay + n * line.jitter) / STEP_S) for n in shares] for line in lines]
+    return [sum(each) * STEP_S for each in zip(*late, strict=True)] or [0.0]

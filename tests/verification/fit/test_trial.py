@@ -69,7 +69,7 @@ def test_a_wrong_unit_is_set_before_the_vehicle_is_measured(
     monkeypatch.setattr(run, "fitted", fitted)
     monkeypatch.setattr(run, "Trial", FakeTrial)
     assert run.measure(("7", Model(), 1.0)).proposed == GOOD
-    assert driven == [unit, {**unit, **stopping, **TOO_BOLD}]
+    assert driven == [{}, {**unit, **stopping, **TOO_BOLD}]
 
 
 def test_a_proposal_that_safety_refuses_is_not_driven(monkeypatch: pytest.MonkeyPatch) -> None:

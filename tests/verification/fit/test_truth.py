@@ -7,9 +7,9 @@ from cli.fit.fit import DECELERATION, REACT, Fit
 from cli.settings import Everything
 from common.motion import Twist
 from sim.config import load_model
-from sim.model import Model
+from sim.model import Cable, Line, Model
 from verification.fit.run import measure, vehicles
-from verification.fit.truth import stopped_within, truths, unsafe
+from verification.fit.truth import late_s, stopped_within, truths, unsafe
 
 PROPOSED = {REACT: 0.11, DECELERATION: 0.79, "vehicle.angular_deceleration": 1.9}
 
@@ -64,3 +64,11 @@ def test_the_distance_of_a_stop_by_the_motors() -> None:
 def test_motors_with_lag_have_no_true_deceleration() -> None:
     assert "STOP left: deceleration" in dict(truths(Model()))
     assert "STOP left: deceleration" not in dict(truths(load_model(["slow-motors"])))
+
+
+def test_a_late_datagram_arrives_at_the_end_of_a_step() -> None:
+    assert max(late_s(Model())) == 0
+    late = replace(Model(), cable=Cable(to_pc=Line(jitter=0.008), to_board=Line(delay=0.012)))
+    assert late_s(late) == pytest.approx([0.03] * 100)
+    assert dict(truths(late))["STOP left: reaction"] == pytest.approx(0.03)
+    assert max(late_s(load_model(["late-port"]))) == 0  # of one port
