@@ -65,12 +65,7 @@ def vehicles(runs: int) -> list[Vehicle]:
 def measure(vehicle: Vehicle) -> Result:
     """Drive a vehicle, compare its fit with the truth, and drive it with the proposal."""
     name, model, turn_braking = vehicle
-    found, first = fitted(vehicle, {}), {}
-    if REACT not in found.proposals and found.proposals:  # of a unit, or where the sonars end
-        first = found.proposals
-        found = fitted(vehicle, first)
-        found.proposals = {**first, **found.proposals}
-    inside, outside = 0, []
+    found, inside, outside = measured(vehicle), 0, []
     by_name = {each.name: each for each in found.estimates}
     for truth, value in truths(model):
         if truth in by_name and len(by_name[truth].values) > 1:
@@ -97,6 +92,20 @@ def measure(vehicle: Vehicle) -> Result:
         today=today,
         proposed=proposed,
     )
+
+
+def measured(vehicle: Vehicle) -> Fit:
+    """Return the fit, after a second drive if a unit or the sonars' range must be set first."""
+    first = fitted(vehicle, {})
+    if REACT in first.proposals or not first.proposals:
+        return first
+    found = fitted(vehicle, first.proposals)
+    found.proposals = {**first.proposals, **found.proposals}
+    # Where the sonars end is no reading any more, once it is set.
+    shown = {each.name: each for each in first.estimates if each.setting in first.proposals}
+    rest = [each for each in found.estimates if each.name not in shown]
+    found.estimates = [*shown.values(), *rest]
+    return found
 
 
 def fitted(vehicle: Vehicle, settings: Mapping[str, Value]) -> Fit:

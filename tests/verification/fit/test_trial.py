@@ -3,11 +3,13 @@
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
-from cli.fit.fit import REACT, Fit
+from cli.fit.estimate import Estimate
+from cli.fit.fit import Fit
 from cli.settings import Everything
 from sim.config import load_model
-from sim.model import Model
+from sim.model import Model, Sonar
 from verification.fit import run
 from verification.fit.__main__ import print_totals
 from verification.fit.run import Result
@@ -20,6 +22,7 @@ TOO_BOLD = {
     "vehicle.deceleration": 1.0,
     "vehicle.angular_deceleration": 3.0,
 }
+END = "sonars, greatest reading"
 GOOD = Runs(failed="", contacts=(), nearest=0.19)
 HIT = Runs(failed="", contacts=("forward at 1 m/s",), nearest=0.0)
 
@@ -47,16 +50,19 @@ def test_a_vehicle_that_may_not_drive_does_not(monkeypatch: pytest.MonkeyPatch) 
     assert failed == "goal 1 not reached, 2.00 m are left: switches, unarmed"
 
 
-def test_a_wrong_unit_is_set_before_the_vehicle_is_measured(
+def test_what_must_be_set_first_is_set_before_the_vehicle_is_measured(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    unit, stopping = {"wire.command_angular_unit": "milliradian"}, {REACT: 0.2}
+    end: dict[str, Any] = {"vehicle.sonar_max": 3.0}
     driven: list[dict[str, Any]] = []
 
-    def fitted(_: Any, units: dict[str, Any]) -> Fit:
-        found = Fit([], Everything())
-        found.missing = [] if units else ["a vehicle that obeys"]
-        found.proposals = {**stopping, **TOO_BOLD} if units else dict(unit)
+    def fitted(_: Any, settings: dict[str, Any]) -> Fit:
+        found, reading = Fit([], Everything()), 2.99 if settings else 3.0
+        found.estimates = [
+            Estimate(name=END, unit="m", values=(reading, reading), setting="vehicle.sonar_max")
+        ]
+        found.missing = [] if settings else ["5 more of STOP forward from 0.40 m/s or more"]
+        found.proposals = dict(TOO_BOLD) if settings else dict(end)
         return found
 
     class FakeTrial(Trial):
@@ -68,8 +74,10 @@ def test_a_wrong_unit_is_set_before_the_vehicle_is_measured(
 
     monkeypatch.setattr(run, "fitted", fitted)
     monkeypatch.setattr(run, "Trial", FakeTrial)
-    assert run.measure(("7", Model(), 1.0)).proposed == GOOD
-    assert driven == [{}, {**unit, **stopping, **TOO_BOLD}]
+    ends = replace(Model(), sonar=Sonar(saturation=3.0))
+    result = run.measure(("7", ends, 1.0))
+    assert (result.proposed, result.inside) == (GOOD, 1)
+    assert driven == [{}, {**end, **TOO_BOLD}]
 
 
 def test_a_proposal_that_safety_refuses_is_not_driven(monkeypatch: pytest.MonkeyPatch) -> None:
