@@ -331,6 +331,7 @@ def lines(found: Fit) -> Iterator[str]:
         )
     if found.left_out:
         yield f"Stops left out: {counted(found.left_out)}."
+    yield from (f"{hint}." for hint in found.hints)
     for manoeuvre in found.missing:
         yield f"NOT MEASURED: {manoeuvre}."
     if problem := refusal(found):

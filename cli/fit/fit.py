@@ -37,6 +37,7 @@ FAST, FASTEST = 0.4, 0.7  # of the greatest allowed speed: of many stops, and of
 
 # Allowed deviations from 1: of velocities from counters and from commands, and of counters from the
 # ground.
+FOLLOWED = 0.9  # share of the commanded slow-down: a vehicle that follows RUN
 UNLIKE, UNTRUE, TINY = 0.08, 0.02, 1e-9
 
 Value = float | str
@@ -53,6 +54,7 @@ class Fit:
     estimates: list[Estimate] = field(default_factory=list)
     ranges: list[sonars.Ranges] = field(default_factory=list)  # of each of the streams
     missing: list[str] = field(default_factory=list)  # manoeuvres without which nothing is proposed
+    hints: list[str] = field(default_factory=list)
     proposals: dict[str, Value] = field(default_factory=dict)  # by the setting's path
 
     @property
@@ -252,7 +254,7 @@ def _of_stopping(found: Fit) -> Iterator[tuple[str, Value]]:
     """Yield reaction and decelerations of all stops; nothing while their bounds are not safe."""
     safe = safe_values(found.settings)
     decelerations = {
-        path: min(down(least_deceleration(found, axis)), safe[path].high)
+        path: min(down(least_deceleration(found, axis)), safe[path].high, of_run(found, axis))
         for path, axis in ((DECELERATION, DRIVING), (ANGULAR, TURNING))
     }
     if any(value < safe[path].low for path, value in decelerations.items()):
@@ -264,6 +266,12 @@ def _of_stopping(found: Fit) -> Iterator[tuple[str, Value]]:
         return
     yield REACT, react
     yield from decelerations.items()
+    for path, axis in ((DECELERATION, DRIVING), (ANGULAR, TURNING)):
+        if (shown := down(least_deceleration(found, axis))) > decelerations[path]:
+            found.hints.append(
+                f"A STOP slows down by {shown:g} {axis.unit}/s2. Near an obstacle RUN has to, too: "
+                f"to use more than {decelerations[path]:g}, set {path}, and repeat the slow-downs"
+            )
 
 
 def least_deceleration(found: Fit, axis: Axis) -> float:
@@ -276,6 +284,24 @@ def least_deceleration(found: Fit, axis: Axis) -> float:
         for direction in axis.directions.values()
         if (fast := fast_stops(found.stops, direction, found.settings))
     )
+
+
+def of_run(found: Fit, axis: Axis) -> float:
+    """Return the deceleration that RUN has shown, at most today's.
+
+    Near an obstacle safety slows down by RUN, at today's deceleration: a stronger one has not been
+    commanded, so nothing is known of it. Without a slow-down today's stays.
+    """
+    body = found.settings.vehicle
+    is_driving = axis is DRIVING
+    today = body.deceleration if is_driving else body.angular_deceleration
+    name = steady.SLOWING.format(axis="driving" if is_driving else "turning")
+    shares = next((each for each in found.estimates if each.name == name), None)
+    if shares is None:
+        return today
+    is_bound = len(shares.values) >= LEAST
+    share = shares.lower_bound if is_bound else min(shares.values)
+    return today if share >= FOLLOWED else down(today * share)
 
 
 def longest_wait(found: Fit, decelerations: Mapping[str, float]) -> float:

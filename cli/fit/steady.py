@@ -26,6 +26,8 @@ SPAN = Twist(0.15, 0.3)  # commanded change of speed that shows a delay, m/s and
 DELAY_STEP_S, DELAYS = 0.01, 41  # 0 to 0.4 s
 LEAST = 8  # velocities of a window
 GROUND = ("distance, counted / driven", "turn, counted / turned")
+SLOWING = "RUN {axis}: slowing down, measured / commanded"
+FALLEN = 0.8  # share of the speed from which a slow-down is measured
 RISE = 10  # velocities, 0.2 s, over which an acceleration is measured
 SAME, SAME_TWIST = 0.02, Twist(0.01, 0.02)  # deviation of a steady speed: relative, or absolute
 
@@ -132,8 +134,10 @@ def of_ramps(streams: Streams) -> list[Estimate]:
                 )
             )  # fmt: skip
         if rises:
-            name = f"RUN {name}: acceleration"
-            found.append(Estimate(name=name, unit=unit, values=tuple(rises)))
+            values = tuple(rises)
+            found.append(Estimate(name=f"RUN {name}: acceleration", unit=unit, values=values))
+        if falls := [f for one in changing if (f := _fall(streams, one, of)) is not None]:
+            found.append(Estimate(name=SLOWING.format(axis=name), unit="", values=tuple(falls)))
     return found
 
 
@@ -266,6 +270,26 @@ def _rise(streams: Streams, drive: Sequence[Motion], of: Component) -> float | N
         for a, b in zip(velocities, velocities[RISE:], strict=False)
     ]
     return max(rises, default=None)
+
+
+def _fall(streams: Streams, drive: Sequence[Motion], of: Component) -> float | None:
+    """Return the ratio of the measured slow-down at the end of a drive to the commanded one."""
+    commands = [(one.mono_ns, abs(of(one))) for one in drive]
+    top = max(speed for _, speed in commands)
+    begin = max(at for at, (_, speed) in enumerate(commands) if speed == top)
+    velocities = between(streams.velocities, commands[begin][0], commands[-1][0])
+    measured = [(one.mono_ns, abs(of(one))) for one in velocities]
+    if commands[-1][1] > top / 2 or len(measured) < LEAST:
+        return None
+    commanded = _slope(commands[begin:], FALLEN * top)
+    return _slope(measured, FALLEN * top) / commanded if commanded > 0 else None
+
+
+def _slope(speeds: Sequence[tuple[int, float]], below: float) -> float:
+    """Return the fall of a speed per second, from where it is below a value to the end."""
+    slow = [each for each in speeds if each[1] <= below]
+    (begin_ns, high), (end_ns, low) = (slow if len(slow) >= LEAST else speeds)[0], speeds[-1]
+    return (high - low) / (end_ns - begin_ns) * NS_PER_S if end_ns > begin_ns else 0.0
 
 
 def _delay_s(streams: Streams, drive: Sequence[Motion], of: Component) -> float | None:

@@ -13,6 +13,7 @@ RECORDED = (
     keys.VELOCITY, keys.MILEAGE, keys.ULTRASONIC, keys.BUMPER, keys.LINK, keys.MOTION
 )  # fmt: skip
 SPEEDS = (0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)  # of the greatest allowed speed
+SLOW = 0.7  # likewise, of slow-downs
 READY_MS, REST_MS, FULL_MS = 2000, 1500, 1000
 SLOWEST = 0.5  # acceleration and deceleration, m/s^2 and rad/s^2
 ROUNDS = 3
@@ -41,11 +42,21 @@ class GuidedDrive:
                 for sign in (1, -1):
                     self._stop(Drive(linear=sign * share * body.max_linear, angular=0.0, echo=0))
                     self._stop(Drive(linear=0.0, angular=sign * share * body.max_angular, echo=0))
+            for sign in (1, -1):
+                self._slow(Drive(linear=sign * SLOW * body.max_linear, angular=0.0, echo=0))
+                self._slow(Drive(linear=0.0, angular=sign * SLOW * body.max_angular, echo=0))
             self.streams.sort()
             found = fit([self.streams], settings)
             if found.proposals or not found.missing:
                 break
         return found
+
+    def _slow(self, request: Drive) -> None:
+        """Reach a speed, and let RUN slow the vehicle down, three times."""
+        ramp_ms = 1000 * max(abs(request.linear), abs(request.angular)) / SLOWEST
+        for _ in range(3):
+            self._hold(request, round(ramp_ms) + FULL_MS)
+            self._hold(STILL, REST_MS + round(ramp_ms))
 
     def _stop(self, request: Drive) -> None:
         """Reach a speed, and fall silent until the vehicle rests."""

@@ -79,9 +79,11 @@ def test_what_is_missing(speeds: tuple[float, ...], missing: str) -> None:
 
 def test_no_proposal_takes_a_protection_away() -> None:
     """The vehicle brakes better than the settings may say, or worse than they can."""
-    strong = measured(forward=1.9, backward=1.9, left=5.0, right=5.0).proposals
-    assert strong["vehicle.deceleration"] == 1.0
-    assert strong["vehicle.angular_deceleration"] == 3.0
+    strong = measured(forward=1.9, backward=1.9, left=5.0, right=5.0)
+    body = TODAY.vehicle
+    assert strong.proposals["vehicle.deceleration"] == body.deceleration
+    assert strong.proposals["vehicle.angular_deceleration"] == body.angular_deceleration
+    assert "set vehicle.deceleration, and repeat the slow-downs" in strong.hints[0]
     weak = measured(left=0.09)
     assert "vehicle.angular_deceleration" not in weak.proposals
     assert any("the bound of a deceleration is too low" in each for each in weak.missing)
