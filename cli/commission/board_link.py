@@ -118,15 +118,19 @@ def check_alone(config: Everything) -> None:
 
 @contextmanager
 def board_link(config: Everything) -> Iterator["BoardLink"]:
-    """Open the link for the context. On each way out BRAKE is sent, which no signal interrupts."""
+    """Open the link for the context; BRAKE is sent on each way out.
+
+    A signal raises nothing where it arrives, because that may be on the way out: it ends the link
+    within a tick.
+    """
     with closing(BoardLink(config)) as link:
-        ends = dict.fromkeys(ENDING, signal.default_int_handler)
+        ends = dict.fromkeys(ENDING, lambda *_: link.end())
         with _handling({**ends, signal.SIGTSTP: signal.SIG_IGN}):  # Ctrl-Z: the wheels would turn
             try:
                 yield link
             finally:
-                with _handling(dict.fromkeys(ENDING, signal.SIG_IGN)):
-                    link.brake()
+                link.brake()
+    link.check()  # a signal during BRAKE
 
 
 @contextmanager
@@ -154,6 +158,16 @@ class BoardLink:
         self._counted_ns = 0
         self._commanded_ns = 0
         self._ticks = self._tick_ns = 0
+        self._has_ended = False
+
+    def end(self) -> None:
+        """End the link at the next tick; a signal handler may call this."""
+        self._has_ended = True
+
+    def check(self) -> None:
+        """Raise ``KeyboardInterrupt`` after ``end``."""
+        if self._has_ended:
+            raise KeyboardInterrupt
 
     def close(self) -> None:
         """Close the sockets."""
@@ -218,6 +232,7 @@ class BoardLink:
         """Speak to the board for a time, or until something is true; return whether it is."""
         end_ns = clock.now_ns() + round(seconds * NS_PER_S)
         while not (is_so := until()) and (now_ns := clock.now_ns()) < end_ns:
+            self.check()
             if now_ns >= self._tick_ns:
                 self._tick_ns = max(self._tick_ns + TICK_NS, now_ns + TICK_NS // 2)
                 self._tick(now_ns, command, queries=queries)

@@ -159,9 +159,17 @@ def test_nothing_moves_without_the_phrase(measure: Measure) -> None:
     assert measure.board.commands() == []
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        [signal.SIGINT],
+        [signal.SIGQUIT],
+        [signal.SIGTERM, signal.SIGHUP, signal.SIGINT],
+        [signal.SIGHUP, signal.SIGTERM, signal.SIGTERM, signal.SIGQUIT],
+    ],
+)
 def test_each_signal_brakes_while_the_board_holds_run(
-    board: Board, tmp_path: Path, number: signal.Signals
+    board: Board, tmp_path: Path, numbers: Sequence[signal.Signals]
 ) -> None:
     report = tmp_path / "report.md"
     words = t2("checkout", "watchdog", "--report", str(report), *sets(*board.sets))
@@ -172,7 +180,8 @@ def test_each_signal_brakes_while_the_board_holds_run(
         wait_until(lambda: ("run", 0.1) in board.commands(), "a RUN", 60.0)
         process.send_signal(signal.SIGTSTP)  # Ctrl-Z does not suspend it
         wait_until(lambda: board.control.truth().linear > 0.09, "the speed", 60.0)
-        process.send_signal(number)
+        for number in numbers:
+            process.send_signal(number)
         process.communicate(timeout=60.0)
     assert process.returncode == 1
     assert board.ends_braked()
@@ -187,7 +196,7 @@ def test_no_signal_interrupts_the_brake(monkeypatch: pytest.MonkeyPatch) -> None
         settings = BoardSettings(port=peer.getsockname()[1], listen_ports=tuple(udp_ports(2)))
         sleep = SimpleNamespace(sleep=lambda _: signal.raise_signal(signal.SIGINT))
         monkeypatch.setattr("cli.commission.board_link.time", sleep)
-        with board_link(Everything(board=settings)):
+        with pytest.raises(KeyboardInterrupt), board_link(Everything(board=settings)):
             pass
         assert [peer.recv(100) for _ in range(2 * BRAKES)] == [BRAKE] * 2 * BRAKES
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
