@@ -11,6 +11,7 @@ import math
 import sys
 import time
 from collections import deque
+from contextlib import suppress
 
 import t2
 from t2.messages import Odometry
@@ -36,14 +37,17 @@ def main(endpoint: str) -> None:
         robot.odometry.on(lambda pose: received.append((time.monotonic(), pose)))
         for line in sys.stdin:
             seen = json.loads(line)
-            taken_s = time.monotonic() - seen.pop("age")
-            poses = [pose for at_s, pose in received if at_s <= taken_s]
+            taken_s = time.monotonic() - seen["age"]
+            poses = [pose for at_s, pose in list(received) if at_s <= taken_s]
             if seen["tag"] not in TAGS or not poses:
                 continue
-            place = SIGMA + BY_DISTANCE * math.hypot(seen["x"], seen["y"])
-            place += TURN_SIGMA * math.hypot(seen["x"], seen["y"])  # its heading moves the vehicle
+            x, y = seen["x"], seen["y"]
+            # The error of the heading moves the vehicle, too.
+            place = SIGMA + (BY_DISTANCE + TURN_SIGMA) * math.hypot(x, y)
             covariance = (place**2, 0, 0, 0, place**2, 0, 0, 0, TURN_SIGMA**2)
-            robot.fix("tags", *locate(**seen), covariance, odometry=poses[-1])
+            pose = locate(seen["tag"], x, y, seen["heading"])
+            with suppress(t2.NoData):  # while localization restarts
+                robot.fix("tags", *pose, covariance, odometry=poses[-1])
 
 
 if __name__ == "__main__":

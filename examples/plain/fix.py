@@ -1,9 +1,11 @@
 """Send a fix of the position for each line "x y heading" of standard input, as the source "tags".
 
-In metres and radians in the map; the line is printed when the position is measured.
+In metres and radians in the map, without a heading if it is not measured. Each line is read when
+the position is measured.
 """
 
 import sys
+import time
 
 import msgpack
 from robot_bus import ROOT, Newest, open_session
@@ -12,16 +14,15 @@ SIGMA = 0.05  # m and rad, standard deviation
 
 with open_session() as session:
     odometry = Newest(session, "tel/odom/odometry")
-    newest = None
+    while (newest := odometry.take()) is None:
+        time.sleep(0.02)
     for line in sys.stdin:
         newest = odometry.take() or newest
-        if newest is None:
-            continue  # no odometry yet
-        x, y, heading = map(float, line.split())
+        x, y, *heading = map(float, line.split())
         fix = {
             "x": x,
             "y": y,
-            "heading": heading,  # None if it is not measured
+            "heading": heading[0] if heading else None,
             "covariance": [SIGMA**2, 0, 0, 0, SIGMA**2, 0, 0, 0, SIGMA**2],  # x, y, heading
             "odom_boot": newest["boot"],
             "odom_seq": newest["seq"],

@@ -58,6 +58,7 @@ BLOCKED_S = 1.0  # of the event loop that waits for a motion: ends it
 VALID_S, LONGEST_S = 0.5, 10.0  # a velocity of the program is valid, by default and at most
 WAIT_S = 60.0  # for the end of a stop; a vehicle that stood for longer must not surprise anybody
 SPEED, TURN_SPEED = 0.3, 0.5  # m/s, rad/s, of motions
+ATTEMPTS = 3  # to reach the end of a path in the map
 STANDING = 0.02  # m/s and rad/s
 CLOSED = "this drive is closed, or not entered yet: use `with robot.drive(...) as drive`"
 PASSING = {"no_request", "blocked"}  # stops that end without a neutral request
@@ -302,8 +303,16 @@ class Drive:
         check_word(frame, Frame)
         if heading is not None:
             finite(heading)  # before it drives
-        path = Path(place_of(self._stream(frame).latest()), points, speed, TURN_SPEED)
+        ends = [(finite(x), finite(y)) for x, y in points]
+        path = Path(place_of(self._stream(frame).latest()), ends, speed, TURN_SPEED)
         pose = self._go(path, patience, on_stop, frame)
+        attempts = 1
+        while ends and frame == "map" and self._is_off(ends[-1]):  # by a correction near the end
+            if attempts == ATTEMPTS:
+                raise Lost(f"the pose in the map changed at the end of {ATTEMPTS} attempts")
+            attempts += 1
+            path = Path(place_of(self._stream(frame).latest()), ends[-1:], speed, TURN_SPEED)
+            pose = self._go(path, patience, on_stop, frame)
         if heading is None:
             return pose
         now = place_of(self._stream(frame).latest())
@@ -323,6 +332,11 @@ class Drive:
     ) -> Odometry:
         """Drive to a place, m, straight there; then turn to a heading in rad. As ``follow``."""
         return self.follow([(x, y)], speed, patience, heading=heading, frame=frame, on_stop=on_stop)
+
+    def _is_off(self, end: tuple[float, float]) -> bool:
+        """Return whether the vehicle is not at a point of the map."""
+        now = place_of(self._robot.localization.latest())
+        return math.dist((now.x, now.y), end) > CORRECTION
 
     def _pose(self) -> Odometry:
         return self._robot.odometry.latest()
@@ -530,7 +544,8 @@ def is_corrected(before: Odometry | MapPose, now: Odometry | MapPose) -> bool:
         return False
     a, b = place_of(before), place_of(now)
     driven = FASTEST * (now.mono_ns - before.mono_ns) / 1e9
-    return math.dist((a.x, a.y), (b.x, b.y)) > CORRECTION + driven
+    turned = abs(math.remainder(b.heading - a.heading, math.tau))
+    return math.dist((a.x, a.y), (b.x, b.y)) > CORRECTION + driven or turned > CORRECTION + driven
 
 
 def is_stopped(state: SafetyState) -> bool:

@@ -76,6 +76,8 @@ Statuses = Annotated[tuple[RangeStatus, ...], Meta(min_length=8, max_length=8)]
 Covariance3 = Annotated[tuple[Number, ...], Meta(min_length=9, max_length=9)]
 Covariance2 = Annotated[tuple[Number, ...], Meta(min_length=4, max_length=4)]
 
+InMap = Annotated[float, Meta(ge=-1e6, le=1e6)]  # m: less than a number, so that poses are numbers
+
 Cap = Annotated[float, Meta(ge=0.0, le=MAX_NUMBER)]
 MAX_REASON = 80  # characters
 Reason = Annotated[str, Meta(max_length=MAX_REASON)]
@@ -352,8 +354,8 @@ class Fix(Message, frozen=True, kw_only=True):
     compared.
     """
 
-    x: Number  # m
-    y: Number  # m
+    x: InMap  # m
+    y: InMap  # m
     heading: Number | None = None  # rad; None if it is not measured
     covariance: Covariance3  # 3x3 row by row over x, y, heading; of the heading if it is measured
     odom_boot: int  # ``Odometry.boot``
@@ -471,8 +473,8 @@ class PoseRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
 class PlaceRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Say where the standing vehicle is in ``map``, and how well it is known."""
 
-    x: Number  # m
-    y: Number  # m
+    x: InMap  # m
+    y: InMap  # m
     heading: Number  # rad
     sigma: Annotated[float, Meta(ge=0.001, le=100.0)] = 0.1  # m, standard deviation of x and y
     heading_sigma: Annotated[float, Meta(ge=0.001, le=4.0)] = 0.1  # rad

@@ -17,7 +17,7 @@ KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
 AHEAD = 0.3  # m along a path, of the point that is aimed at
 FACING, TURNED = 0.8, 0.1  # rad: off the aim, a path is left for a turn on the spot, until turned
 
-CORRECTION, FASTEST = 0.1, 1.5  # m, m/s: a pose that moves by more was corrected by localization
+CORRECTION, FASTEST = 0.1, 2.0  # m or rad, and that per s: what moves more was corrected
 
 OnStop = Literal["raise", "wait"]
 Frame = Literal["odom", "map"]

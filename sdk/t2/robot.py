@@ -323,7 +323,9 @@ class Robot:
             echo=echo,
         )
         self._call(keys.PLACE, request)
-        while self.localization.latest().placement == before.placement:
+        while (now := self.localization.latest()).placement == before.placement:
+            if now.boot != before.boot:
+                raise NoData("localization restarted: the placement may be lost")
             time.sleep(PERIOD_S)
 
     def fix(

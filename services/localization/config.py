@@ -12,10 +12,10 @@ Sources = Annotated[dict[SourceName, "FixSource"], Meta(max_length=8)]
 
 
 class FixSource(settings.Section, frozen=True, kw_only=True):
-    """A source of fixes; a fix counts at most as much as these standard deviations allow."""
+    """A source of fixes; these standard deviations are added to those of its fixes."""
 
-    sigma: Annotated[float, allowed("m", gt=0.0, le=10.0)] = 0.02  # of x and y, at least
-    heading_sigma: Annotated[float, allowed("rad", gt=0.0, le=3.0)] = 0.02  # at least
+    sigma: Annotated[float, allowed("m", gt=0.0, le=10.0)] = 0.02  # of x and y
+    heading_sigma: Annotated[float, allowed("rad", gt=0.0, le=3.0)] = 0.02
     # whether it may place a vehicle that is not placed, without an operator
     places: bool = False
 

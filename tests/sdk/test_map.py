@@ -101,6 +101,49 @@ def test_a_large_correction_is_no_lack_of_progress(robot: t2.Robot, stack: Simul
     assert off(stack, x + 3.0, y) < 0.2
 
 
+@pytest.mark.parametrize(("ahead", "aside"), [(-2.0, 0.0), (0.0, 1.5), (-1.0, 1.0)])
+@pytest.mark.parametrize("left", [0.6, 1.0])
+def test_a_correction_near_the_end_is_driven_back(
+    robot: t2.Robot, stack: SimulatedStack, ahead: float, aside: float, left: float
+) -> None:
+    """The correction is beside the line, or past its end."""
+    x, y, heading = true(stack)
+    robot.place(x + ahead, y + aside, heading, sigma=0.8)
+    goal = x + 2.0 + ahead, y + aside
+
+    def correct() -> None:
+        def is_near() -> bool:
+            pose = robot.localization.latest()
+            return math.dist((pose.x or 0.0, pose.y or 0.0), goal) < left
+
+        wait_until(is_near, "the end")
+        fix(robot, stack, robot.odometry.latest())
+
+    correcting = stack.start(correct)
+    with robot.drive("nav") as drive:
+        drive.goto(*goal, frame="map")
+    correcting.join()
+    assert off(stack, *goal) < 0.2
+
+
+def test_a_correction_of_the_heading_is_no_lack_of_progress(
+    robot: t2.Robot, stack: SimulatedStack
+) -> None:
+    x, y, heading = true(stack)
+    robot.place(x, y, heading + 1.9, sigma=0.1, heading_sigma=0.49)
+    goal = x + 2 * math.cos(heading + 3.9), y + 2 * math.sin(heading + 3.9)
+
+    def correct() -> None:
+        wait_until(lambda: robot.odometry.latest().heading > heading + 1.7, "the end of the turn")
+        fix(robot, stack, robot.odometry.latest())
+
+    correcting = stack.start(correct)
+    with robot.drive("nav") as drive:
+        drive.goto(*goal, frame="map")
+    correcting.join()
+    assert off(stack, *goal) < 0.2
+
+
 def test_without_a_placement_no_motion_in_the_map_begins(robot: t2.Robot) -> None:
     with (
         robot.drive("nav") as drive,

@@ -5,11 +5,13 @@ import random
 from collections import deque
 from typing import Any
 
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
 from services.localization.config import FixSource, Localization, LocalizationConfig
 from services.localization.localization import LocalizationService
+from sim import requests as q
 from t2 import keys
 from t2 import messages as m
 from verification.search.bus import MS, ROBOT
@@ -22,6 +24,7 @@ READY_MS, TICK_MS = 2000, 100
 DRIVE_S = 120.0
 PLACED_SIGMA, OUTLIER_M = 0.05, 5.0
 SOURCE = "tags"
+MUTE = 0.25  # share of the vehicles
 
 
 class FixModel(Struct, frozen=True, kw_only=True):
@@ -33,6 +36,7 @@ class FixModel(Struct, frozen=True, kw_only=True):
     delay: int  # ticks
     outliers: float  # share
     gap: float  # share of the time without fixes
+    mute: bool  # whether the board loses its counters for some seconds, again and again
 
 
 class Result(Struct, frozen=True, kw_only=True):
@@ -57,6 +61,7 @@ def source_of(chance: random.Random) -> FixModel:
         delay=chance.choice((0, 1, 3, 10)),
         outliers=chance.choice((0.0, 0.05, 0.2)),
         gap=chance.choice((0.0, 0.3)),
+        mute=chance.random() < MUTE,
     )
 
 
@@ -100,6 +105,9 @@ class Run:
         for tick in range(ticks):
             if tick % 20 == 0:
                 self._request()
+            if self._source.mute and tick % 100 in (0, 30):  # for 3 s of 10
+                reports: tuple[q.ReportName, ...] = ("mileage",) if tick % 100 == 0 else ()
+                self._stack.vehicle.inject(q.Mute(reports=reports))
             self._measure(tick)
             self._stack.run(TICK_MS)
             if tick % 10 == 9 and (found := self._compare()):
@@ -173,6 +181,7 @@ class Run:
         assert pose.heading is not None
         turned = math.remainder(pose.heading - truth.heading, math.tau)
         error = (pose.x - truth.x, pose.y - truth.y, turned)
+        assert np.linalg.eigvalsh(np.reshape(pose.pose_covariance, (3, 3)))[0] > 0, self._seed
         nees = normalised(error, pose.pose_covariance)
         sigma = math.sqrt(max(pose.pose_covariance[0], pose.pose_covariance[4]))
         return nees, pose.state == "placed", math.hypot(*error[:2]), sigma

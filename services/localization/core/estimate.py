@@ -16,13 +16,16 @@ taken to o, as odometry does. A fix corrects pose and covariance at its own samp
 import math
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from common.pose import Covariance, Pose
 
 POSITION, POSE = 2, 3  # values of a fix: x and y, or x, y and heading
 
-# 99.9 % of the squared distances of a true fix, by its number of values: chi-square.
+# Chi-square quantiles of 99.9 %, by the number of values.
 GATE = {POSITION: 13.816, POSE: 16.266}
+
+ROUNDING = 1e-12  # m^2, rad^2
 
 Matrix = list[list[float]]
 
@@ -95,12 +98,25 @@ class Sample(Struct, frozen=True):
     received_ns: int
     step: tuple[float, float] = (0.0, 0.0)  # m and rad until the next message
 
+    def after(self, before: "Sample", covariance: Covariance) -> "Sample":
+        """Return this sample with the covariance of all steps, from the one before on.
+
+        ``covariance`` is what odometry said of that one. Odometry becomes more certain when
+        counters replace a path that only velocities had shown. The step from one path to the other
+        is as uncertain as the first was: certainty about the past does not grow by it.
+        """
+        dx, dy = self.pose.x - before.pose.x, self.pose.y - before.pose.y
+        step = self.covariance.combined(covariance.carried(dx, dy), -1.0)
+        if min(step.xx, step.yy, step.hh) < -ROUNDING:
+            step = Covariance(abs(step.xx), 0.0, abs(step.yy), 0.0, 0.0, abs(step.hh))
+        return replace(self, covariance=before.covariance.carried(dx, dy).combined(step))
+
     def halfway(self) -> "Sample":
         """Return where the vehicle was in the middle until the next message."""
         distance, turn = self.step
         pose = self.pose.moved(distance / 2, turn / 2)
         covariance = self.covariance.carried(pose.x - self.pose.x, pose.y - self.pose.y)
-        return Sample(self.seq, pose, covariance, self.received_ns, self.step)
+        return replace(self, pose=pose, covariance=covariance)
 
 
 class Transform(Struct, frozen=True):

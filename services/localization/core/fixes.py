@@ -63,8 +63,6 @@ class SourceState:
 
     def fault(self, fix: TakenFix) -> Phrase | None:
         """Return what is wrong with a fix, whatever the pose is."""
-        if not fix.measured.is_possible:
-            return Phrase("fix.covariance")
         if self.newest is not None and fix.sample.seq <= self.newest.sample.seq:
             return Phrase("fix.repeated")
         self.newest = fix
@@ -109,19 +107,19 @@ class SourceState:
         )
 
 
-def measured_of(fix: Fix, sample: Sample, settings: FixSource) -> Measured:
-    """Return what a fix measures that names a sample.
+def measured_of(fix: Fix, sample: Sample, settings: FixSource) -> Measured | None:
+    """Return what a fix measures that names a sample; None if its covariance is none.
 
-    Its standard deviations are at least those of the settings. It was measured at any time until
-    the next sample: the vehicle may have moved.
+    The variances of the settings are added. It was measured at any time until the next sample: the
+    vehicle may have moved.
     """
-    given = Covariance.of(fix.covariance)
+    given, values = Covariance.of(fix.covariance), POSITION if fix.heading is None else POSE
+    measured = Measured(Pose(fix.x, fix.y, fix.heading or 0.0), given, values)
+    pairs = zip(given.rows(), fix.covariance, strict=True)
+    is_symmetric = all(math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-12) for a, b in pairs)
+    if not (is_symmetric and measured.is_possible):
+        return None
     moved, turned = (each**2 / 12 for each in sample.step)  # variances of an interval
-    covariance = replace(
-        given,
-        xx=max(given.xx, settings.sigma**2) + moved,
-        yy=max(given.yy, settings.sigma**2) + moved,
-        hh=max(given.hh, settings.heading_sigma**2) + turned,
-    )
-    values = POSITION if fix.heading is None else POSE
-    return Measured(Pose(fix.x, fix.y, fix.heading or 0.0), covariance, values)
+    least = settings.sigma**2 + moved, settings.heading_sigma**2 + turned
+    covariance = given.combined(Covariance(least[0], 0.0, least[0], 0.0, 0.0, least[1]))
+    return replace(measured, covariance=covariance)

@@ -6,12 +6,13 @@ state      begins with                                    ends with
 unplaced   the start; a restart of odometry, or a pose    a placement: by an operator, or by
            set in it after a gap                          ``AGREEING`` fixes in a row of a source
                                                           that ``places`` and that agree
-placed     a placement; a fix while only the uncertainty  a cause of the two other states
+placed     a placement; fixes while only the uncertainty  a cause of the two other states
            made it lost
-lost       an uncertainty above ``lost_sigma`` or         a fix that the gate takes
+lost       an uncertainty above ``lost_sigma`` or         ``AGREEING`` fixes in a row that agree
            ``lost_heading_sigma``
 lost       ``AGREEING`` refused fixes in a row of one     a placement by an operator
-           source that agree with each other
+           source that agree with each other, while no
+           other source confirms the pose
 ========== ============================================== =====================================
 
 A fix names the odometry sample at which it was measured. Samples and used fixes are kept for 2 s: a
@@ -81,6 +82,8 @@ class Localizer:
                 return
             if odometry.epoch != before.epoch:
                 self._continue(before, odometry, sample)
+            else:
+                sample = sample.after(self._samples[-1], Covariance.of(before.pose_covariance))
         elif before is not None:
             self._unplace()
         self._odometry = odometry
@@ -137,15 +140,23 @@ class Localizer:
     def _state(self) -> tuple[m.MapState, Phrase, Located | None]:
         if not self._used:
             return "unplaced", Phrase("map.restart" if self._restarted else "map.unplaced"), None
-        located, of = self._used[-1].transform.at(self._samples[-1]), self._settings
+        located = self._newest()
         sigma, heading = located.covariance.sigma, located.covariance.heading_sigma
         fields: dict[str, m.Field] = {"sigma": sigma, "degrees": math.degrees(heading)}
         if self._contradicts:
             fields = {"source": self._contradicts, "count": AGREEING}
             return "lost", Phrase("map.contradicted", fields), located
-        if sigma > of.lost_sigma or heading > of.lost_heading_sigma:
+        if self._is_uncertain():
             return "lost", Phrase("map.uncertain", fields), located
         return "placed", Phrase("map.placed", fields), located
+
+    def _newest(self) -> Located:
+        return self._used[-1].transform.at(self._samples[-1])
+
+    def _is_uncertain(self) -> bool:
+        """Return whether the vehicle is placed, and its pose is not known well enough."""
+        covariance, of = self._newest().covariance, self._settings
+        return covariance.sigma > of.lost_sigma or covariance.heading_sigma > of.lost_heading_sigma
 
     # --- fixes ------------------------------------------------------------------------------
 
@@ -154,7 +165,10 @@ class Localizer:
         sample = self._sample_of(fix)
         if sample is None:
             return Phrase("fix.unknown_odometry")
-        taken = TakenFix(sample.halfway(), measured_of(fix, sample, source.settings))
+        measured = measured_of(fix, sample, source.settings)
+        if measured is None:
+            return Phrase("fix.covariance")
+        taken = TakenFix(sample.halfway(), measured)
         if reason := source.fault(taken):
             return reason
         if not self._used:
@@ -162,15 +176,24 @@ class Localizer:
         earlier = [each for each in self._used if each.seq <= sample.seq]
         if not earlier:
             return Phrase("fix.late")
+        return self._use(name, taken, earlier)
+
+    def _use(self, name: str, taken: TakenFix, earlier: list[Used]) -> Phrase | None:
+        """Use a fix after the earlier ones, or return why not."""
+        source, is_uncertain = self._sources[name], self._is_uncertain()
+        if is_uncertain and not source.agrees(taken):
+            return Phrase("fix.placing", {"count": AGREEING})
         distance = earlier[-1].transform.at(taken.sample).distance(taken.measured)
         if distance > GATE[taken.measured.values]:
-            if source.agrees(taken):
+            if is_uncertain or source.agrees(taken):
                 self._contradicts = self._contradicts or name
             return Phrase("fix.far", {"sigmas": math.sqrt(distance)})
         later = [each.fix for each in self._used[len(earlier) :] if each.fix is not None]
         for each in (taken, *later):
             earlier.append(earlier[-1].corrected(each))
-        self._used = earlier
+        self._used = earlier[-USED:]
+        for other in self._sources.values():
+            other.row.clear()  # a source that others do not confirm is outvoted
         return None
 
     def _sample_of(self, fix: m.Fix) -> Sample | None:
@@ -234,4 +257,4 @@ class Localizer:
     def _settle(self) -> None:
         """Forget all but the newest of the transforms that no fix can precede any more."""
         old = sum(each.seq < self._samples[0].seq for each in self._used)
-        self._used = self._used[max(old - 1, 0) :][-USED:]
+        self._used = self._used[max(old - 1, 0) :]

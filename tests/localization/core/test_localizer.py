@@ -10,7 +10,7 @@ from common.pose import Covariance, Pose
 from services.localization.core.estimate import Located
 from services.localization.core.fixes import AGREEING
 from services.localization.core.localizer import USED
-from t2.messages import Fix
+from t2.messages import Fix, MapPose
 from tests.localization.core.vehicle_fixture import Drive, diagonal
 
 PLACES = {"sigma": 0.02, "places": True}
@@ -70,10 +70,13 @@ def test_odometry_alone_keeps_the_pose_and_grows_less_certain_until_it_is_lost()
     assert pose.state == "lost"
     assert "known only to" in pose.text
     assert pose.x is not None  # still the best that is known
-    for _ in range(20):
-        drive.fix()
+    assert "5 fixes in a row agree" in drive.fix(wrong(drive, away=0.5)), "one is not enough"
+    for _ in range(AGREEING):
         pose = drive.go(linear=0.5)
-    assert pose.state == "placed", "a fix that the gate takes makes it known again"
+        assert pose.state == "lost"
+        drive.fix()
+    assert drive.go().state == "placed"
+    assert drive.error()[0] < 0.3
 
 
 def test_the_origin_of_odom_turns_odometry_into_the_map() -> None:
@@ -210,6 +213,9 @@ def test_fixes_that_cannot_be_used_are_refused_with_the_reason() -> None:
         (drive.measured(odom_boot=99), "another start of odometry"),
         (drive.measured(odom_seq=drive.seq + 1), "older than 2 s"),
         (drive.measured(covariance=(1.0, 5.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0, 1.0)), "definite"),
+        (drive.measured(covariance=(-5.0, 0.0, 0.0, 0.0, -5.0, 0.0, 0.0, 0.0, -5.0)), "definite"),
+        (drive.measured(covariance=(0.0,) * 9), "definite"),
+        (drive.measured(covariance=(1.0, 0.5, 0.0, -0.5, 1.0, 0.0, 0.0, 0.0, 1.0)), "definite"),
         (drive.measured(), "no newer odometry message"),
     ):
         assert reason in drive.fix(fix)
@@ -221,18 +227,88 @@ def test_fixes_that_cannot_be_used_are_refused_with_the_reason() -> None:
     drive.go(steps=60)
     assert "older than 2 s" in drive.fix(old)
     (state,) = drive.pose().sources
-    assert (state.used, state.refused, state.in_a_row) == (1, 6, 6)
+    assert (state.used, state.refused, state.in_a_row) == (1, 9, 9)
 
 
-def test_a_fix_counts_no_more_than_its_source_may() -> None:
+@pytest.mark.parametrize(
+    "covariance",
+    [diagonal(1e-6, 1e-6), (1e6, 1e6 - 1e-3, 0.0, 1e6 - 1e-3, 1e6, 0.0, 0.0, 0.0, 1e-6)],
+)
+def test_a_fix_counts_no_more_than_its_source_may(covariance: tuple[float, ...]) -> None:
     drive = placed(tags={"sigma": 0.5, "heading_sigma": 0.5})
     drive.go(linear=0.3)
     before = drive.pose().pose_covariance
-    drive.fix(drive.measured(sigma=1e-6))
+    drive.fix(drive.measured(covariance=covariance))
     after = drive.pose().pose_covariance
     assert before
     assert after
+    assert after[8] > 0.99 * before[8]
+    assert before
+    assert after
     assert after[0] > 0.99 * before[0]
+
+
+def least_eigenvalue(pose: MapPose) -> float:
+    """Return the least eigenvalue of a covariance."""
+    return float(np.linalg.eigvalsh(np.array(pose.pose_covariance).reshape(3, 3))[0])
+
+
+@pytest.mark.parametrize("linear", [0.0, 0.4])
+@pytest.mark.parametrize("gap_s", [0.2, 1, 3, 20])
+def test_counters_that_are_missing_for_a_while_leave_the_pose_honest(
+    gap_s: float, linear: float
+) -> None:
+    drive, refused = placed(), 0
+    for counts, seconds in ((True, 2.0), (False, gap_s), (True, 3.0)):
+        drive.counts = counts
+        for step in range(round(seconds * 25)):
+            assert least_eigenvalue(drive.go(linear=linear)) > 0
+            refused += bool(step % 3 == 0 and drive.fix())
+            assert least_eigenvalue(drive.pose()) > 0
+    assert (drive.pose().state, refused <= 1) == ("placed", True)
+    assert drive.error() == pytest.approx((0.0, 0.0), abs=0.1)
+
+
+def test_a_heading_that_is_too_uncertain_is_lost() -> None:
+    drive = placed()
+    certain = Covariance.of(diagonal(0.1, 0.6))
+    assert drive.localizer.place(Located(drive.true, certain), drive.now_ns) is None
+    assert drive.pose().state == "lost"
+
+
+def test_contradictions_do_not_survive_a_placement_or_a_fix_that_is_used() -> None:
+    drive = placed()
+    for end in (drive.place, drive.fix, drive.place):
+        for _ in range(AGREEING - 1):
+            drive.go(linear=0.3)
+            drive.fix(wrong(drive))
+        drive.go()
+        end()
+        assert drive.pose().state == "placed"
+
+
+def test_a_source_that_another_one_outvotes_loses_nothing() -> None:
+    drive = placed(tags=TAGS, gnss=TAGS)
+    for _ in range(40):
+        drive.go(linear=0.3)
+        drive.fix(source="tags")
+        drive.fix(wrong(drive), source="gnss")
+    states = {each.source: each.in_a_row for each in drive.pose().sources}
+    assert (drive.pose().state, states) == ("placed", {"tags": 0, "gnss": 40})
+    assert drive.error()[0] < 0.1
+
+
+def test_a_fix_of_the_place_before_a_placement_is_no_frozen_one() -> None:
+    drive = placed()
+    drive.go()
+    fix = drive.measured()
+    drive.fix(fix)
+    drive.go(linear=0.5, steps=10)
+    drive.go()
+    drive.place()
+    drive.go()
+    again = drive.measured(x=fix.x, y=fix.y, heading=fix.heading)
+    assert "repeats" not in drive.fix(again)
 
 
 def test_a_source_that_places_needs_fixes_in_a_row_that_agree() -> None:
@@ -282,10 +358,12 @@ def test_a_restart_of_odometry_must_be_placed_again() -> None:
     drive = placed()
     drive.go(linear=0.3, steps=10)
     drive.restart()
+    drive.fix()
+    drive.restart()
     pose = drive.go()
     assert pose.state == "unplaced"
     assert "began anew" in pose.text
-    assert "not placed" in drive.fix()
+    assert "not placed" in drive.fix(), "its numbers begin anew, too"
 
 
 def test_odometry_that_is_repeated_or_reordered_changes_nothing() -> None:

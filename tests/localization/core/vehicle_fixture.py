@@ -33,6 +33,7 @@ class Drive:
         self.true = start
         self.seq, self.now_ns, self.boot = 0, 0, BOOT
         self.half = (0.0, 0.0)
+        self.counts = True  # whether counters arrive
         self.noise = Odom()
         self.localizer = Localizer(
             Localization(sources={name: FixSource(**of) for name, of in sources.items()})
@@ -70,8 +71,9 @@ class Drive:
         self.turn = math.remainder(self.turn + turn, math.tau)
         velocity = Velocity(linear=linear, angular=angular)
         self.estimator.on_velocity(velocity, self.now_ns)
-        counters = Mileage(distance=self.distance, heading=self.turn, epoch=0)
-        self.estimator.on_mileage(counters, self.now_ns)
+        if self.counts:
+            counters = Mileage(distance=self.distance, heading=self.turn, epoch=0)
+            self.estimator.on_mileage(counters, self.now_ns)
         self.odometry = self.header(self.estimator.estimate(self.now_ns))
 
     def header(self, odometry: Odometry | None) -> Odometry:
