@@ -96,12 +96,12 @@ class Run:
     def _on_odometry(self, arrival: Any) -> None:
         self._odometry = arrival.message
 
-    def go(self) -> Result:
+    def go(self, seconds: float) -> Result:
         """Place the vehicle, drive, and compare once a second."""
         self._stack.sources["teleop"].message = m.Drive(linear=0.0, angular=0.0, echo=0)
         self._stack.run(READY_MS)
         self._place()
-        nees, error, sigma, placed, ticks = [], 0.0, 0.0, 0, round(DRIVE_S * 1000 / TICK_MS)
+        nees, error, sigma, placed, ticks = [], 0.0, 0.0, 0, round(seconds * 1000 / TICK_MS)
         for tick in range(ticks):
             if tick % 20 == 0:
                 self._request()
@@ -187,6 +187,6 @@ class Run:
         return nees, pose.state == "placed", math.hypot(*error[:2]), sigma
 
 
-def measure(seed: int) -> Result:
+def measure(seed: int, seconds: float = DRIVE_S) -> Result:
     """Run one vehicle."""
-    return Run(seed).go()
+    return Run(seed).go(seconds)

@@ -1,14 +1,14 @@
-"""The proof of localization, on two vehicles."""
+"""The proof of localization, on one vehicle whose board loses its counters."""
 
-import pytest
+from statistics import fmean
 
 from verification.localization.run import measure
 
 
-@pytest.mark.parametrize("seed", [2, 5])
-def test_a_pose_is_as_good_as_it_says(seed: int) -> None:
-    found = measure(seed)
+def test_a_pose_is_as_good_as_it_says() -> None:
+    found = measure(6, seconds=50.0)
+    assert found.source.mute
     assert found.placed == 1.0
-    assert found.used > 25
-    assert found.error < 1.0
-    assert sum(found.nees) / len(found.nees) < 5.0
+    assert found.used > 10
+    assert found.error < 0.5
+    assert fmean(found.nees) < 4.0
