@@ -12,10 +12,12 @@ def main() -> int:
     """Print a line for each vehicle that something is to be said of, and the totals."""
     parser = argparse.ArgumentParser(prog="verification.fit", description=__doc__)
     parser.add_argument("--runs", type=int, default=300, help="random vehicles")
-    runs = parser.parse_args().runs
+    parser.add_argument("--skip", type=int, default=0, help="vehicles of an earlier run, the first")
+    options = parser.parse_args()
+    chosen = vehicles(options.runs)[options.skip :]
     results = []
     with Pool(initializer=prepare_worker) as pool:
-        for each in pool.imap(measure, vehicles(runs), chunksize=1):
+        for each in pool.imap(measure, chosen, chunksize=1):
             results.append(each)
             for text in (*each.missing[:1], *each.unsafe, *each.outside, *each.wrong):
                 print(f"{each.name}: {text}", flush=True)
