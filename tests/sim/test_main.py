@@ -34,7 +34,8 @@ def test_nobody_on_board_keeps_it_waiting() -> None:
 def test_bad_settings_end_it_with_what_is_wrong(
     words: list[str], named: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(words) == EXIT_CONFIG
+    # This process would keep the priority.
+    assert main([*words, "--set", "host.realtime=false"]) == EXIT_CONFIG
     assert named in capsys.readouterr().err
 
 
