@@ -98,7 +98,7 @@ class DrivePublisher(SourcePublisher):
 
 
 class FixPublisher:
-    """Sends the fixes of one source; the router tells whether somebody receives them."""
+    """Sends the fixes of one source, once the router announces a receiver."""
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
         self.boot: int = BOOTS[str(session.info.routers_zid())]
