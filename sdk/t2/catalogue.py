@@ -479,7 +479,7 @@ PHRASES: dict[str, Words] = {
     ),
     "map.uncertain": (
         "The position is lost: it is known only to {sigma:.2f} m and {degrees:.0f} degrees. Place "
-        "the vehicle (`t2 call localization/place`), or wait for a fix.",
+        "the vehicle (`t2 call localization/place`), or wait for fixes.",
         "位置已丢失：标准差达 {sigma:.2f} m 和 {degrees:.0f} 度。请设定车辆位置"
         "（`t2 call localization/place`），或等待定位修正。",
     ),

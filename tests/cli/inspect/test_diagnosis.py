@@ -178,7 +178,7 @@ def fixes(state: Any = "placed", **given: Any) -> m.MapPose:
            remedy("place"))]),
         (factories.map_pose("lost"),
          [("wrong", "The position is lost: it is known only to 0.20 m and 3 degrees. Place the "
-           "vehicle (`t2 call localization/place`), or wait for a fix.", remedy("place"))]),
+           "vehicle (`t2 call localization/place`), or wait for fixes.", remedy("place"))]),
         (fixes(age=None), [("note", "tags: no fix was received",
                             remedy("fixes").format(source="tags"))]),
         (fixes(age=11.0), [("note", "tags: no fix for 11 s",
