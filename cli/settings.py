@@ -12,6 +12,7 @@ from services.dashboard.config import Dashboard
 from services.localization.config import Localization
 from services.metrics.config import Metrics
 from services.odom.config import Odom
+from services.patrol.config import Patrol
 from services.recorder.config import Recorder
 from services.ros2.config import Ros2
 from services.safety.config import Safety, SafetyConfig
@@ -28,6 +29,7 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     safety: Safety = Safety()
     odom: Odom = Odom()
     localization: Localization = Localization()
+    patrol: Patrol = Patrol()
     teleop: Teleop = Teleop()
     dashboard: Dashboard = Dashboard()
     recorder: Recorder = Recorder()

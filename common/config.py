@@ -34,15 +34,15 @@ DEFAULT = "default"  # the origin of a setting that no source names
 FILE_SETTINGS = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 
 PATHS = (*FILE_SETTINGS, "dashboard.token_file", "dashboard.certificate", "dashboard.private_key",
-         "recorder.folder", "sim.world")  # fmt: skip
+         "recorder.folder", "patrol.folder", "sim.world")  # fmt: skip
 ENDPOINTS = ("bus.listen", "bus.connect", "bus.uplink", "bus.drive")
 SOCKET = "unixsock-stream/"  # before the path in an endpoint
 QUOTES = tuple("\"'\u2018\u2019\u201c\u201d\u201e\u00ab")
 
 # Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
-    "robot", "host", "bus", "board", "wire", "log", "vehicle",
-    "safety", "odom", "localization", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
+    "robot", "host", "bus", "board", "wire", "log", "vehicle", "safety", "odom", "localization",
+    "patrol", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
 )  # fmt: skip
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from t2 import catalogue
-from t2.catalogue import Words
 from t2.messages import Field, Phrase, Phrases
+from t2.patrol_texts import Words
 from t2.words import Language, render
 
 Level = Literal["ok", "note", "wrong", "unknown"]

@@ -92,6 +92,7 @@ def everything(options: argparse.Namespace) -> Commands:
     if options.no_sim:
         del made["sim"]
     made["localization"] = command("services.localization", *passed)
+    made["patrol"] = command("services.patrol", *passed)
     if find_spec("mcap"):
         made["recorder"] = command("services.recorder", *passed)
     if options.ros2:

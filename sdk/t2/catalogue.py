@@ -6,9 +6,9 @@ else. The tables of causes and events in the documents are generated from this f
 
 from typing import Any, NamedTuple
 
+from t2 import patrol_texts
 from t2.messages import CauseName, EventName
-
-Words = tuple[str, str]  # English, Chinese
+from t2.patrol_texts import Words
 
 
 class Entry(NamedTuple):
@@ -867,6 +867,65 @@ EVENTS: tuple[EventRow, ...] = (
         ("Fixes of this source are used again.", "该来源的定位修正已恢复使用。"), NOTHING,
     ),
     EventRow(
+        "patrol", "round_start", "info", ("A round begins.", "巡逻开始。"), NOTHING,
+    ),
+    EventRow(
+        "patrol", "station", "info", ("Arrived at a station.", "已到达站点。"), NOTHING,
+    ),
+    EventRow(
+        "patrol", "round_waiting", "info",
+        ("A round waits: the way is not free.", "巡逻等待中：通道受阻。"),
+        ("nothing to do: it goes on by itself", "无需处理：自动继续"),
+    ),
+    EventRow(
+        "patrol", "round_blocked", "warning",
+        ("A round is blocked for longer than its patience.", "巡逻受阻超过等待时限。"),
+        ("free the way, or `t2 rounds return`", "请清空通道，或运行 `t2 rounds return`"),
+    ),
+    EventRow(
+        "patrol", "round_paused", "info",
+        ("A round is paused, by a call or by another source.", "巡逻已暂停：由调用或其他请求源引起。"),
+        ("`t2 rounds resume` goes on", "`t2 rounds resume` 可继续"),
+    ),
+    EventRow(
+        "patrol", "round_stopped", "warning",
+        ("A round has stopped, with the reason.", "巡逻已停止，并给出原因。"),
+        ("as in the text; then `t2 rounds resume`", "按文中所述处理；然后运行 `t2 rounds resume`"),
+    ),
+    EventRow(
+        "patrol", "round_resumed", "info", ("A round goes on.", "巡逻继续。"), NOTHING,
+    ),
+    EventRow(
+        "patrol", "round_return", "info", ("A round turns back home.", "巡逻返回起点。"), NOTHING,
+    ),
+    EventRow(
+        "patrol", "round_end", "info, warning",
+        ("A round is over; warning when it was aborted.", "巡逻结束；中止时级别为 warning。"),
+        ("after an abort, drive the vehicle home", "中止后，请将车辆驾驶回起点"),
+    ),
+    EventRow(
+        "patrol", "round_skipped", "warning",
+        ("A scheduled round is skipped, with the reason.", "跳过定时巡逻，并给出原因。"),
+        ("as in the text", "按文中所述处理"),
+    ),
+    EventRow(
+        "patrol", "round_unwritten", "error",
+        ("The ledger cannot be written.", "无法写入台账。"),
+        ("free disk space; it is tried again", "请释放磁盘空间；会自动重试"),
+    ),
+    EventRow(
+        "patrol", "teaching", "info, warning",
+        (
+            "Teaching begins, ends, or records nothing more, with the reason.",
+            "示教开始、结束或不再记录，并给出原因。",
+        ),
+        ("as in the text", "按文中所述处理"),
+    ),
+    EventRow(
+        "patrol", "route_changed", "info",
+        ("A route is saved or deleted.", "路线已保存或删除。"), NOTHING,
+    ),
+    EventRow(
         "teleop", "gamepad", "info", ("Gamepad: {device}.", "手柄：{device}。"),
         (
             "nothing to do; a disconnected one counts as let go",
@@ -1069,10 +1128,12 @@ WORDS: dict[str, Words] = {
     "uncommanded_motion": ("uncommanded motion", "无指令移动"),
     "flapping": ("repeated input failures", "输入反复失效"),
     "runaway": ("runaway", "未按指令运动"),
+    **patrol_texts.STATES,
 }  # fmt: skip
 
 TEXTS: dict[str, Words] = {
     **PHRASES,
+    **patrol_texts.PHRASES,
     **{name: entry.text for name, entry in CAUSES.items()},
     # An event of a cause that latches has the phrases of the cause.
     **{

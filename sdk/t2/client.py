@@ -51,6 +51,7 @@ OVERRULED_TICKS = 10  # 0.5 s: the client's own requests may be on their way
 ESTOP_TICKS = 60  # 3 s at 20 Hz
 ESTOP_WAIT_S = 30.0  # from the press; without a link it is sent on reconnect until then
 KEPT_TICKS = 10  # 0.5 s: a reset that was sent before has arrived
+PASSING = {"no_request", "blocked"}  # stops that end without a neutral request
 
 
 def request(linear: float = 0.0, angular: float = 0.0, release: ReleaseRequest = "none") -> Drive:
@@ -222,3 +223,13 @@ def confirms(seen: SafetyState, done: ResetDone, state: SafetyState) -> bool:
         return False
     cleared, named = set(done.cleared), set(reset_request(seen).causes)
     return bool(cleared) and cleared <= named and not {one.id for one in state.causes} & cleared
+
+
+def is_stopped(state: SafetyState) -> bool:
+    """Return whether a cause stops the vehicle that wants a neutral request in the end."""
+    return any(each.action != "slow" and each.name not in PASSING for each in state.causes)
+
+
+def is_blocked(state: SafetyState) -> bool:
+    """Return whether the sonars see an obstacle in the way."""
+    return any(each.name == "blocked" for each in state.causes)

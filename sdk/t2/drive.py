@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import zenoh
 
-from t2.client import Contest, request
+from t2.client import Contest, is_blocked, is_stopped, request
 from t2.errors import (
     Blocked,
     Latched,
@@ -22,7 +22,7 @@ from t2.errors import (
     Stopped,
     T2Error,
 )
-from t2.messages import MapPose, Odometry, PlaneFrame, SafetyState
+from t2.messages import MapPose, Odometry, PlaneFrame
 from t2.motion import (
     CORRECTION,
     FASTEST,
@@ -61,7 +61,6 @@ SPEED, TURN_SPEED = 0.3, 0.5  # m/s, rad/s, of motions
 ATTEMPTS = 3  # to reach the end of a path in the map
 STANDING = 0.02  # m/s and rad/s
 CLOSED = "this drive is closed, or not entered yet: use `with robot.drive(...) as drive`"
-PASSING = {"no_request", "blocked"}  # stops that end without a neutral request
 
 
 OPEN = set[tuple[int, str]]()  # boots and keys of the open drives of this program
@@ -546,13 +545,3 @@ def is_corrected(before: Odometry | MapPose, now: Odometry | MapPose) -> bool:
     driven = FASTEST * (now.mono_ns - before.mono_ns) / 1e9
     turned = abs(math.remainder(b.heading - a.heading, math.tau))
     return math.dist((a.x, a.y), (b.x, b.y)) > CORRECTION + driven or turned > CORRECTION + driven
-
-
-def is_stopped(state: SafetyState) -> bool:
-    """Return whether a cause stops the vehicle that wants a neutral request in the end."""
-    return any(each.action != "slow" and each.name not in PASSING for each in state.causes)
-
-
-def is_blocked(state: SafetyState) -> bool:
-    """Return whether the sonars see an obstacle in the way."""
-    return any(each.name == "blocked" for each in state.causes)

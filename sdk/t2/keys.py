@@ -16,8 +16,8 @@ from t2 import messages as m
 ROOT = "t2/v1"
 
 SERVICES = (
-    "bridge", "safety", "odom", "localization", "teleop", "dashboard", "recorder", "metrics",
-    "ros2",
+    "bridge", "safety", "odom", "localization", "patrol", "teleop", "dashboard", "recorder",
+    "metrics", "ros2",
 )  # fmt: skip
 
 MessageT = TypeVar("MessageT", bound=m.Message)
@@ -105,6 +105,9 @@ ODOMETRY = Topic("tel/odom/odometry", m.Odometry, 25, FAST, "odom", "pose and tw
 MAP_POSE = Topic(
     "tel/localization/pose", m.MapPose, 25, FAST, "localization", "pose in the map, and its fixes"
 )
+PATROL = Topic(
+    "tel/patrol/state", m.PatrolState, 5, SLOW, "patrol", "the round, its progress, the next one"
+)
 SAFETY = Topic(
     "tel/safety/state",
     m.SafetyState,
@@ -155,13 +158,17 @@ SET_POSE = Call("srv/odom/reset", m.PoseRequest, m.Done, "odom", "start odometry
 PLACE = Call(
     "srv/localization/place", m.PlaceRequest, m.Done, "localization", "say where the vehicle is"
 )
+TEACH = Call("srv/patrol/teach", m.TeachRequest, m.Done, "patrol", "teach or change a route")
+ROUTES = Call("srv/patrol/routes", m.RoutesRequest, m.RoutesReply, "patrol", "read the routes")
+ROUND = Call("srv/patrol/round", m.RoundRequest, m.Done, "patrol", "start, pause or end a round")
+ROUNDS = Call("srv/patrol/rounds", m.RoundsRequest, m.RoundsReply, "patrol", "read the ledger")
 
 TOPICS: tuple[Topic[m.Message], ...] = (
     VELOCITY, MILEAGE, ULTRASONIC, BUMPER, DRIVER, SWITCHES, LINK,
-    ODOMETRY, MAP_POSE, SAFETY, HEALTH, SETTINGS, EVENTS, DRIVE, LIMIT, FIX, MOTION,
+    ODOMETRY, MAP_POSE, PATROL, SAFETY, HEALTH, SETTINGS, EVENTS, DRIVE, LIMIT, FIX, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
-    SET_SWITCHES, SET_LED, RESET, SET_POSE, PLACE,
+    SET_SWITCHES, SET_LED, RESET, SET_POSE, PLACE, TEACH, ROUTES, ROUND, ROUNDS,
 )  # type: ignore[assignment]  # fmt: skip
 
 

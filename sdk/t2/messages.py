@@ -27,6 +27,14 @@ Direction = Literal["forward", "backward"]
 ReleaseRequest = Literal["none", "forward", "backward"]  # off a pressed bumper
 # Where the vehicle is in the map: not known yet, known, or not known well enough any more.
 MapState = Literal["unplaced", "placed", "lost"]
+# Where a round is in its course: ``services/patrol/core/course.py`` has the table.
+RoundState = Literal[
+    "idle", "announcing", "driving", "staying", "waiting", "paused", "returning", "stopped", "done",
+]  # fmt: skip
+RoundAction = Literal["start", "depart", "pause", "resume", "return", "abort"]
+RoundResult = Literal["home", "returned", "aborted"]
+WhenBlocked = Literal["wait", "return", "stop"]
+TeachAction = Literal["begin", "station", "end", "cancel", "save", "delete"]
 LimitEffect = Literal["none", "slow", "stop", "brake"]
 # Of a source of speed limits: without effect, STOP, or BRAKE and a latch, as of a pendant.
 Silence = Literal["ignore", "stop", "latch"]
@@ -60,9 +68,11 @@ if TYPE_CHECKING:
         "placed", "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
         "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
         "release_refused", "reset", "reset_refused", "reset_request", "reset_unconfirmed",
-        "ros_fix_refused", "runaway", "second_authority", "silent", "slip", "slip_over", "source",
-        "stop", "switches_unverified", "take_over", "terminal_slow", "uncommanded_motion",
-        "unheard", "unplaced", "velocity_back",
+        "ros_fix_refused", "round_blocked", "round_end", "round_paused", "round_resumed",
+        "round_return", "round_skipped", "round_start", "round_stopped", "round_unwritten",
+        "round_waiting", "route_changed", "runaway", "second_authority", "silent", "slip",
+        "slip_over", "source", "station", "stop", "switches_unverified", "take_over",
+        "teaching", "terminal_slow", "uncommanded_motion", "unheard", "unplaced", "velocity_back",
     ]  # fmt: skip
 else:
     EventName = Name
@@ -79,6 +89,11 @@ Covariance2 = Annotated[tuple[Number, ...], Meta(min_length=4, max_length=4)]
 InMap = Annotated[float, Meta(ge=-1e6, le=1e6)]  # m: less than a number, so that poses are numbers
 
 Cap = Annotated[float, Meta(ge=0.0, le=MAX_NUMBER)]
+# A letter or a digit of any script first: it is the name of a file, too.
+RouteName = Annotated[str, Meta(pattern=r"^\w[\w-]*\Z", max_length=32)]
+StationName = Annotated[str, Meta(pattern=r"^(\w[\w -]*)?\Z", max_length=32)]  # empty: no station
+MAX_POINTS = 10_000  # of a route
+MAX_TRACK = 2000  # poses of a driven round
 MAX_REASON = 80  # characters
 Reason = Annotated[str, Meta(max_length=MAX_REASON)]
 
@@ -319,6 +334,131 @@ class SafetyState(Message, frozen=True, kw_only=True):
     doubted_sonars: Annotated[tuple[Name, ...], Few] = ()  # names of those that are not trusted
 
 
+# --- tel/patrol -----------------------------------------------------------------------------
+
+
+class RoutePoint(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A point of a route, and the station at it."""
+
+    x: InMap  # m
+    y: InMap  # m
+    station: StationName = ""  # empty: none
+    stay: Annotated[float, Meta(ge=0.0, le=86_400.0)] = 0.0  # s; the time to stay at the station
+
+
+class Route(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A path in ``map`` that rounds repeat: straight lines through its points, and a corridor.
+
+    The first point is a station, home. A file of a route has these fields as JSON.
+    """
+
+    name: RouteName
+    robot: Name  # whose map it is
+    speed: Annotated[float, Meta(ge=0.05, le=1.5)] = 0.5  # m/s
+    corridor: Annotated[float, Meta(ge=0.2, le=5.0)] = 0.5  # m to either side
+    blocked: WhenBlocked = "wait"  # what a round does that has waited for ``patrol.patience``
+    points: Annotated[tuple[RoutePoint, ...], Meta(min_length=2, max_length=MAX_POINTS)]
+
+
+class RouteSummary(Struct, frozen=True, kw_only=True):
+    """A route of the folder, without its points."""
+
+    name: Name
+    length: Number | None = None  # m; None of a file with a problem
+    stations: Annotated[tuple[Name, ...], Few] = ()
+    problem: Text = ""  # why it cannot be driven; empty if it can
+    phrases: Phrases = ()  # the same, for other languages
+
+
+class Teaching(Struct, frozen=True, kw_only=True):
+    """A route that is being taught."""
+
+    route: Name
+    length: Number  # m
+    points: int
+    stations: Annotated[tuple[Name, ...], Few]
+    text: Text = ""  # why nothing more is recorded; empty while it is
+    phrases: Phrases = ()  # the same, for other languages
+
+
+class NextRound(Struct, frozen=True, kw_only=True):
+    """The next round of the schedule."""
+
+    schedule: Name
+    route: Name
+    t_ns: int  # wall clock of the robot
+
+
+class PatrolState(Message, frozen=True, kw_only=True):
+    """The round that is driven, or the last one; what may be asked of it now; the next one."""
+
+    state: RoundState
+    text: Text  # what it does, or why it does not go on, and the next step
+    phrases: Phrases = ()  # the same, for other languages
+    actions: Annotated[tuple[RoundAction, ...], Few] = ()  # that are possible now
+    round: Name = ""  # its id; empty before the first one
+    route: Name = ""
+    homeward: bool = False  # whether it is on its way back along the route
+    progress: Number | None = None  # m along the route from home
+    length: Number | None = None  # m of the route
+    station: Name = ""  # the one ahead, or where it stays
+    left: Number | None = None  # s of an announcement, a stay, or the patience with an obstacle
+    deviation: Number | None = None  # m from the route
+    sigma: Number | None = None  # m, standard deviation of the position across the route
+    corridor: Number | None = None  # m
+    teaching: Teaching | None = None
+    next: NextRound | None = None
+
+
+class Visit(Struct, frozen=True, kw_only=True):
+    """The arrival at a station."""
+
+    station: Name
+    t_ns: int  # wall clock
+
+
+class Halt(Struct, frozen=True, kw_only=True):
+    """A period in which a round did not get on."""
+
+    state: RoundState  # waiting, paused or stopped
+    t_ns: int  # wall clock, its begin
+    seconds: Number
+    x: Number  # m, in ``map``
+    y: Number  # m
+    text: Text
+    phrases: Phrases = ()  # the same, for other languages
+
+
+class Round(Struct, frozen=True, kw_only=True):
+    """One execution of a route; a line of the ledger is its JSON."""
+
+    id: Name
+    route: Name
+    robot: Name
+    schedule: Name = ""  # that started it; empty: a call
+    start_ns: int  # wall clock
+    end_ns: int = 0  # wall clock; 0 while it is not over
+    result: RoundResult | None = None  # None while it is not over
+    text: Text = ""  # how it ended
+    phrases: Phrases = ()  # the same, for other languages
+    distance: Number = 0.0  # m driven
+    visits: Annotated[tuple[Visit, ...], Many] = ()
+    halts: Annotated[tuple[Halt, ...], Many] = ()
+    deviation: Number = 0.0  # m, the greatest from the route
+    sigma: Number = 0.0  # m, the greatest across the route
+    margin: Number | None = None  # m, the least: corridor - deviation - 2 sigma
+    recordings: Annotated[tuple[Name, ...], Few] = ()  # black boxes of this time
+
+
+class TrackPoint(Struct, frozen=True, array_like=True):
+    """A pose of a driven round."""
+
+    x: Number  # m, in ``map``
+    y: Number  # m
+    deviation: Number  # m from the route
+    sigma: Number  # m across the route
+
+
 # --- @cmd -----------------------------------------------------------------------------------
 
 
@@ -479,6 +619,53 @@ class PlaceRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     sigma: Annotated[float, Meta(ge=0.001, le=100.0)] = 0.1  # m, standard deviation of x and y
     heading_sigma: Annotated[float, Meta(ge=0.001, le=4.0)] = 0.1  # rad
     echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+
+
+class TeachRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Teach a route by driving it, or change the folder of routes."""
+
+    action: TeachAction
+    route: RouteName | None = None  # its name, of "begin" and "delete"
+    station: StationName = ""  # of "begin" (home) and "station"
+    stay: Annotated[float, Meta(ge=0.0, le=86_400.0)] = 0.0  # s, of "begin" and "station"
+    points: Route | None = None  # of "save": it replaces the route of its name
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+
+
+class RoutesRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """List the routes, or return one."""
+
+    route: RouteName | None = None  # None: list all
+
+
+class RoutesReply(Struct, frozen=True, kw_only=True):
+    """The routes of the folder, or one of them."""
+
+    routes: Annotated[tuple[RouteSummary, ...], Many] = ()
+    route: Route | None = None
+
+
+class RoundRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Start a round, or act on the one that is driven."""
+
+    action: RoundAction
+    route: RouteName | None = None  # of "start"
+    echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
+
+
+class RoundsRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """List the rounds of the ledger, the newest first, or return one with its track."""
+
+    round: Name = ""  # its id; empty: list
+    most: Annotated[int, Meta(ge=1, le=1000)] = 50
+
+
+class RoundsReply(Struct, frozen=True, kw_only=True):
+    """Rounds of the ledger, or one with its route and the driven poses."""
+
+    rounds: Annotated[tuple[Round, ...], Many] = ()
+    route: Route | None = None
+    track: Annotated[tuple[TrackPoint, ...], Meta(max_length=MAX_TRACK)] = ()
 
 
 class Refusal(Struct, frozen=True, kw_only=True):

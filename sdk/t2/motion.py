@@ -1,8 +1,9 @@
 """Motions by odometry: how much is left, and which velocity to request. Pure."""
 
 import math
+from collections import deque
 from collections.abc import Iterable
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 from t2.messages import MAX_NUMBER
@@ -177,11 +178,17 @@ class Path:
     unit = "m"
 
     def __init__(
-        self, start: Place, points: Iterable[tuple[float, float]], speed: float, turning: float
+        self,
+        start: Place,
+        points: Iterable[tuple[float, float]],
+        speed: float,
+        turning: float,
+        ahead: float = AHEAD,
     ) -> None:
-        self.speed, self._turning = resolved(speed), turning
+        self.speed, self._turning, self._ahead = resolved(speed), turning, ahead
         corners = [(start.x, start.y), *((finite(x), finite(y)) for x, y in points)]
-        self._lines = [(a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b]
+        self._lines = deque((a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b)
+        self._after = sum(length for *_, length in islice(self._lines, 1, None))  # of the first
         self.turning: float = 0.0
 
     def left(self, pose: Place) -> float:
@@ -189,8 +196,9 @@ class Path:
         while self._lines:
             left = self._left_of_line(pose)
             if left > 0:
-                return left + sum(length for *_, length in self._lines[1:])
-            del self._lines[0]  # passed
+                return left + self._after
+            self._lines.popleft()  # passed
+            self._after -= self._lines[0][2] if self._lines else 0.0
         return 0.0
 
     def _left_of_line(self, pose: Place) -> float:
@@ -198,8 +206,8 @@ class Path:
         return ((bx - pose.x) * (bx - ax) + (by - pose.y) * (by - ay)) / length
 
     def _aim(self, pose: Place) -> tuple[float, float]:
-        """Return the point ``AHEAD`` along the lines, or the next sharp corner, or the end."""
-        ahead = AHEAD + self._lines[0][2] - self._left_of_line(pose)
+        """Return the point ``ahead`` m along the lines, or the next sharp corner, or the end."""
+        ahead = self._ahead + self._lines[0][2] - self._left_of_line(pose)
         before = None
         for (ax, ay), (bx, by), length in self._lines:
             direction = math.atan2(by - ay, bx - ax)
@@ -220,7 +228,7 @@ class Path:
         if is_turning:
             return 0.0, math.copysign(slowing(abs(off), self._turning, TURNING, SLOWEST_TURN), off)
         linear = slowing(left, self.speed * math.cos(off), ACCELERATION, SLOWEST)
-        curvature = 2 * math.sin(off) / max(math.dist((x, y), (pose.x, pose.y)), AHEAD)
+        curvature = 2 * math.sin(off) / max(math.dist((x, y), (pose.x, pose.y)), self._ahead)
         return linear, linear * curvature
 
 

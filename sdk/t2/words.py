@@ -10,8 +10,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
-from t2.catalogue import TEXTS, WORDS, Words
+from t2.catalogue import TEXTS, WORDS
 from t2.messages import Done, Field, Phrase, Refusal
+from t2.patrol_texts import Words
 
 Language = Literal["en", "zh"]
 LANGUAGES: tuple[Language, ...] = get_args(Language)

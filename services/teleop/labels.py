@@ -6,8 +6,8 @@ A name has the form ``PANEL.WHAT``. Texts that go over the bus are in ``t2.catal
 from collections.abc import Iterable
 
 from t2 import catalogue
-from t2.catalogue import Words
 from t2.messages import Field, Phrase
+from t2.patrol_texts import Words
 from t2.words import Language, render
 
 LABELS: dict[str, Words] = {

@@ -12,7 +12,7 @@ import t2
 import t2.client
 import t2.drive
 from sim.requests import Sonar
-from t2.drive import is_blocked
+from t2.client import is_blocked
 from t2.messages import Drive, Odometry
 from t2.motion import Straight
 from tests.sdk.library_robot import blocked

@@ -1,0 +1,1 @@
+"""Patrol: routes that are taught by driving, rounds that repeat them, schedule and ledger."""

@@ -1,0 +1,1 @@
+"""What patrol decides: pure."""
