@@ -182,6 +182,7 @@ PHRASES: dict[str, Words] = {
     "teach.jump": (
         "The position has jumped by {distance:.2f} m.", "位置跳变了 {distance:.2f} m。",
     ),
+    "teach.restarted": ("Patrol has restarted.", "巡逻服务已重启。"),
     "teach.full": ("The route has {points} points, which is the limit.", "路线已有 {points} 个点，达到上限。"),
     # problems of a route's file
     "route.none": ("There is no route {route}.", "没有路线 {route}。"),

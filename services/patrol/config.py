@@ -23,7 +23,7 @@ class ScheduledRound(settings.Section, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         try:
-            CronSim(self.cron, EPOCH)
+            CronSim(f"0 {self.cron}", EPOCH)  # with seconds, of which there are none
         except CronSimError as error:
             raise ValueError(
                 f'cron is {self.cron!r} ({error}), allowed is a cron expression as "30 22 * * 1-5"'

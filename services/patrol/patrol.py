@@ -30,6 +30,7 @@ QUEUED = 16  # poses, until the loop wakes up: each counts while a route is taug
 ECHOES = 64  # queued safety states; a call that echoes a dropped one is refused
 PERIOD_S = 1 / keys.PATROL.rate_hz
 WRITTEN_M = 1.0  # of progress, between two notes of the open round
+TAUGHT_S = 5.0  # between two notes of the route that is being taught
 RETRY_S = 10.0  # after a failure of the disk
 LAMP_OFF = 0  # mode
 ALWAYS = {"pause", "abort"}  # actions that stop: however late they arrive
@@ -46,9 +47,10 @@ class PatrolService:
         self._store = Store(Path(settings.folder))
         self._schedule = Schedule(settings.schedule, zone(settings.timezone), _now())
         self._echoes = Echoes()
-        self._sent = ("", "", 0)  # what changed of the state last: published at once
+        self._sent: tuple[object, ...] = ()  # what changed of the state last: published at once
         self._published_ns = 0
         self._written: tuple[str, float] = ("", 0.0)  # state and place of the noted round
+        self._taught = 0  # points of the noted route
         self._is_lit = False
         bus = node.bus
         self._source = DriveSource(bus, SOURCE)
@@ -63,6 +65,7 @@ class PatrolService:
         node.loop.every(TICK_S, self._tick)
         node.loop.every(1.0, self._check_schedule)
         node.loop.every(RETRY_S, self._write_waiting)
+        node.loop.every(TAUGHT_S, self._write_teaching)
         node.on_exit = self._leave
         self._restore()
 
@@ -95,8 +98,8 @@ class PatrolService:
         message = self._patrol.message(now_ns)
         self._write(message)
         self._light(message)
-        teaching = message.teaching.points if message.teaching else 0
-        changed = message.round, message.text, teaching
+        teaching = message.teaching
+        changed = message.round, message.text, teaching and (teaching.stations, teaching.text)
         if changed != self._sent or now_ns - self._published_ns >= PERIOD_S * NS_PER_S:
             self._sent, self._published_ns = changed, now_ns
             self._to_state.put(self._with_next(message))
@@ -220,10 +223,10 @@ class PatrolService:
             route = self._store.route(name)
             if isinstance(route, Phrase):
                 return route
-            wall_ns = time.time_ns()
-            reason = self._patrol.start(route, _round_id(name), schedule, now_ns, wall_ns)
+            new_id = self._store.new_id(f"{_now():%Y%m%d-%H%M%S}", name)
+            reason = self._patrol.start(route, new_id, schedule, now_ns, time.time_ns())
             if reason is None and self._patrol.course is not None:
-                self._store.write_open(self._patrol.course.open, sync=True)
+                self._store.begin(self._patrol.course.open, route)
         except OSError as error:
             self._patrol.forget()
             return self._disk(error)
@@ -234,8 +237,7 @@ class PatrolService:
             if not request.round:
                 caller.reply(m.RoundsReply(rounds=tuple(self._store.rounds(request.most))))
                 return
-            of_id = (it for it in self._store.rounds(10_000) if it.id == request.round)
-            found, tracked = next(of_id, None), self._store.tracked(request.round)
+            found, tracked = self._store.round(request.round), self._store.tracked(request.round)
         except OSError as error:
             caller.refuse(self._disk(error))
             return
@@ -267,7 +269,11 @@ class PatrolService:
         """Take up the round that was not over when the service ended."""
         try:
             if (found := self._store.read_open()) is not None:
-                self._patrol.restore(found, time.time_ns())
+                self._patrol.restore(*found, time.time_ns())
+            taught = self._store.read_teaching()
+            if taught is not None and not self._store.has(taught.route):
+                self._patrol.restore_teaching(taught)
+                self._taught = len(taught.points)
         except OSError as error:
             self._unwritten(error)
 
@@ -287,6 +293,16 @@ class PatrolService:
                 self._store.end(course.diary.record, course.route, course.diary.track)
         except OSError as error:
             self._unwritten(error)
+
+    def _write_teaching(self, _: int) -> None:
+        taught = self._patrol.open_teaching
+        points = 0 if taught is None else len(taught.points)
+        if points != self._taught:
+            self._taught = points
+            try:
+                self._store.write_teaching(taught)
+            except OSError as error:
+                self._node.log.warning(str(error))
 
     def _write_waiting(self, _: int) -> None:
         if self._store.waiting:
@@ -310,6 +326,7 @@ class PatrolService:
     def _leave(self) -> None:
         """Note where an open round is, so that the next start resumes it."""
         course = self._patrol.course
+        self._write_teaching(0)
         if course is not None and self._patrol.is_open:
             try:
                 self._store.write_open(course.open, sync=True)
@@ -330,7 +347,3 @@ def zone(name: str) -> tzinfo:
 
 def _now() -> datetime:
     return datetime.now(UTC)
-
-
-def _round_id(route: str) -> str:
-    return f"{_now():%Y%m%d-%H%M%S}-{route}"

@@ -5,6 +5,7 @@ routes/NAME.json  a route; people may edit it
 rounds.jsonl      the ledger: a line for each round, appended and synchronized
 rounds/ID.json    the route and the driven poses of a round, for its report
 round.json        the round that is not over: a restarted service resumes it
+teaching.json     the route that is being taught
 ================= ============================================================================
 
 A file is replaced as a whole, so that a power loss leaves the old one or the new one. A line of the
@@ -14,6 +15,7 @@ ledger that was cut is skipped.
 import contextlib
 import os
 from collections.abc import Iterator
+from itertools import chain, count
 from pathlib import Path
 
 import msgspec
@@ -22,6 +24,7 @@ from msgspec.structs import asdict
 
 from services.patrol.core.course import OpenRound
 from services.patrol.core.routes import length, problem, stations
+from services.patrol.core.teaching import OpenTeaching
 from t2 import messages as m
 from t2.messages import Phrase
 from t2.text_file import read_text
@@ -30,6 +33,7 @@ from t2.words import render
 LINES = 5000  # of the ledger; the older half is removed at twice as many
 TRACKS = 500  # the newest ones are kept
 ROUTES, STATIONS = 500, 128  # that are listed, of a route
+NAME = 200  # characters of a file that is no route
 WAITING = 100  # lines at most that wait for a disk
 
 
@@ -48,6 +52,8 @@ class Store:
         self.waiting: list[m.Round] = []  # rounds that are not written yet
         self._routes, self._rounds = folder / "routes", folder / "rounds"
         self._ledger, self._open = folder / "rounds.jsonl", folder / "round.json"
+        self._teaching = folder / "teaching.json"
+        self._known: dict[str, tuple[tuple[int, int], m.RouteSummary]] = {}  # by time and size
 
     # --- routes -----------------------------------------------------------------------------
 
@@ -84,13 +90,28 @@ class Store:
         _sync_folder(self._routes)
 
     def _summary(self, name: str) -> m.RouteSummary:
-        found = self.route(name)
-        if isinstance(found, Phrase):
-            return m.RouteSummary(name=name, problem=render([found]), phrases=(found,))
-        return m.RouteSummary(name=name, length=length(found), stations=stations(found)[:STATIONS])
+        """Return what a route is; its file is read only when it has changed."""
+        about = self._route_file(name).stat()
+        version = about.st_mtime_ns, about.st_size
+        if name not in self._known or self._known[name][0] != version:
+            self._known[name] = version, _summary(name, self.route(name))
+        return self._known[name][1]
 
     def _route_file(self, name: str) -> Path:
         return self._routes / f"{name}.json"
+
+    def write_teaching(self, of: OpenTeaching | None) -> None:
+        """Note the route that is being taught; None: there is none any more."""
+        if of is None:
+            self._teaching.unlink(missing_ok=True)
+        else:
+            _replace(self._teaching, msgspec.json.encode(of), sync=False)
+
+    def read_teaching(self) -> OpenTeaching | None:
+        """Return the route that was being taught when the service ended."""
+        with contextlib.suppress(FileNotFoundError, ValueError):
+            return msgspec.json.decode(self._teaching.read_bytes(), type=OpenTeaching)
+        return None
 
     # --- rounds -----------------------------------------------------------------------------
 
@@ -98,24 +119,42 @@ class Store:
         """Note the round that is driven; ``sync`` waits for the disk."""
         _replace(self._open, msgspec.json.encode(of), sync=sync)
 
-    def read_open(self) -> OpenRound | None:
+    def read_open(self) -> tuple[OpenRound, m.Route] | None:
         """Return the round that was not over when the service ended; None without any."""
         try:
-            return msgspec.json.decode(self._open.read_bytes(), type=OpenRound)
+            found = msgspec.json.decode(self._open.read_bytes(), type=OpenRound)
         except FileNotFoundError:
             return None
         except ValueError as error:
             raise OSError(0, f"{self._open.name} cannot be read ({error})") from None
+        if self.round(found.round.id) is not None:  # the power failed after its line was written
+            return None
+        tracked = self.tracked(found.round.id)
+        if tracked is None:
+            raise OSError(0, f"the route of the open round {found.round.id} cannot be read")
+        return found, tracked.route
+
+    def begin(self, of: OpenRound, route: m.Route) -> None:
+        """Note a round that begins."""
+        self._write_track(of.round, route, [])
+        self.write_open(of, sync=True)
 
     def end(self, record: m.Round, route: m.Route, track: list[m.TrackPoint]) -> None:
         """Note a round that is over; what cannot be written waits for ``write_waiting``."""
         self.waiting = [*self.waiting, record][-WAITING:]
-        self.write_waiting()
-        tracked = Tracked(route=route, track=tuple(track))
-        _replace(self._track_file(record.id), msgspec.json.encode(tracked))
-        self._open.unlink(missing_ok=True)
+        try:
+            self.write_waiting()
+            self._write_track(record, route, track)
+        finally:
+            self._open.unlink(missing_ok=True)
         for old in sorted(self._rounds.glob("*.json"))[:-TRACKS]:
             old.unlink()
+
+    def new_id(self, stamp: str, route: str) -> str:
+        """Return an id that no round has."""
+        first = f"{stamp}-{route}"
+        ids = chain([first], (f"{first}-{number}" for number in count(2)))
+        return next(each for each in ids if not self._track_file(each).exists())
 
     def write_waiting(self) -> None:
         """Append the waiting rounds to the ledger."""
@@ -131,6 +170,14 @@ class Store:
             return [*_decoded(lines), *self.waiting][::-1][:most]
         return self.waiting[::-1][:most]
 
+    def round(self, round_id: str) -> m.Round | None:
+        """Return a round of the ledger; None for an unknown id."""
+        of_id = [each for each in self.waiting if each.id == round_id]
+        with contextlib.suppress(FileNotFoundError):
+            lines = self._ledger.read_bytes().splitlines()
+            of_id += _decoded([line for line in lines if round_id.encode() in line])
+        return next((each for each in of_id if each.id == round_id), None)
+
     def tracked(self, round_id: str) -> Tracked | None:
         """Return route and driven poses of a round; None without its file."""
         if "/" in round_id or "\0" in round_id:
@@ -141,6 +188,10 @@ class Store:
 
     def _track_file(self, round_id: str) -> Path:
         return self._rounds / f"{round_id}.json"
+
+    def _write_track(self, record: m.Round, route: m.Route, track: list[m.TrackPoint]) -> None:
+        tracked = Tracked(route=route, track=tuple(track))
+        _replace(self._track_file(record.id), msgspec.json.encode(tracked))
 
     def _append(self, record: m.Round) -> None:
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -158,6 +209,12 @@ class Store:
             lines = self._ledger.read_bytes().splitlines(keepends=True)
             if len(lines) > 2 * LINES:
                 _replace(self._ledger, b"".join(lines[-LINES:]))
+
+
+def _summary(name: str, found: m.Route | Phrase) -> m.RouteSummary:
+    if isinstance(found, Phrase):
+        return m.RouteSummary(name=name[:NAME], problem=render([found]), phrases=(found,))
+    return m.RouteSummary(name=name, length=length(found), stations=stations(found)[:STATIONS])
 
 
 def _text(route: m.Route) -> bytes:

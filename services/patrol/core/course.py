@@ -80,10 +80,9 @@ class Note(Struct, frozen=True):
 
 
 class OpenRound(Struct, frozen=True, kw_only=True):
-    """What a restarted service needs, to resume a round."""
+    """What a restarted service needs to resume a round, besides its route."""
 
     round: m.Round
-    route: m.Route
     along: float
     stop: int
     homeward: bool
@@ -126,12 +125,29 @@ class Course:
         self._told_blocked = False
         self._cause: Phrases = ()  # of the last stop by safety
         self._stays_at = ""  # the station
+        self._seen: Phrase | None = None  # a latch or a lost position since the announcement
+
+    # --- inputs -----------------------------------------------------------------------------
+
+    def see_safety(self, state: m.SafetyState) -> None:
+        """Note a latch, which may be reset before the next tick."""
+        if state.latched:
+            self._seen = self._seen or Phrase("patrol.latched", {"causes": state.latched})
+
+    def see_pose(self, pose: m.MapPose) -> None:
+        """Note a lost position, which may be back before the next tick."""
+        if not is_known(pose):
+            self._seen = self._seen or lost(pose)
 
     # --- calls ------------------------------------------------------------------------------
 
-    def announce(self, seconds: float, now_ns: int, *, is_resumed: bool = False) -> None:
+    def announce(
+        self, seconds: float, now_ns: int, wall_ns: int, *, is_resumed: bool = False
+    ) -> None:
         """Announce that the vehicle is about to move."""
         state, pose = self._state, self._pose
+        self.diary.go_on(wall_ns)
+        self._seen = None
         self._boots = state.boot, pose.boot, pose.placement
         self._ticked_ns, self._other_ns = now_ns, None
         self.until_ns = now_ns + round(seconds * NS_PER_S)
@@ -169,8 +185,9 @@ class Course:
         """Stand until somebody resumes."""
         self._halt("paused", wall_ns, "round_paused", "info", Phrase("patrol.paused"))
 
-    def turn_home(self, now_ns: int) -> None:
+    def turn_home(self, now_ns: int, wall_ns: int) -> None:
         """Drive home along the route, in the opposite direction."""
+        self.diary.go_on(wall_ns)
         self._turned = True
         self._homeward()
         self._note("round_return", "info", Phrase("patrol.returning", {"route": self.route.name}))
@@ -193,7 +210,6 @@ class Course:
         """What a restarted service needs."""
         return OpenRound(
             round=self.diary.record,
-            route=self.route,
             along=self.along,
             stop=self._stop,
             homeward=self.way.homeward,
@@ -311,6 +327,7 @@ class Course:
             self.diary.visit(self.way.home, wall_ns)
             self._end("returned" if self._turned else "home", wall_ns)
         elif self.way.is_closed:
+            self.diary.visit(self.way.home, wall_ns)
             self._end("home", wall_ns)
         else:
             self._homeward()
@@ -352,7 +369,7 @@ class Course:
             return
         self._note("round_blocked", "warning", Phrase("patrol.blocked", fields), *self._cause)
         if self.route.blocked == "return" and not self.way.homeward:
-            self.turn_home(now_ns)
+            self.turn_home(now_ns, wall_ns)
 
     def _velocity(self, now_ns: int) -> tuple[float, float]:
         """Return the velocity to request, m/s and rad/s; zero while a stop wants it."""
@@ -433,8 +450,8 @@ class Course:
         safety = self._inputs.safety
         if safety is None or safety.age_s(now_ns) > FRESH_S:
             return Phrase("patrol.safety_silent")
-        if reason := self._latched(now_ns):
-            return reason
+        if latched := safety.value.latched:
+            return Phrase("patrol.latched", {"causes": latched})
         if (source := safety.value.source) not in {None, SOURCE}:
             return Phrase("patrol.other_drives", {"source": source})
         return None
@@ -443,7 +460,7 @@ class Course:
         pose = self._inputs.pose
         if pose is None or pose.age_s(now_ns) > FRESH_S:
             return Phrase("patrol.map_silent")
-        return self._lost(now_ns)
+        return None if is_known(pose.value) else lost(pose.value)
 
     def _held_up(self, now_ns: int) -> Phrase | None:
         gap_s = (now_ns - (self._ticked_ns or now_ns)) / NS_PER_S
@@ -457,9 +474,8 @@ class Course:
             return Phrase("patrol.map_silent")
         return None
 
-    def _latched(self, _: int) -> Phrase | None:
-        latched = self._state.latched
-        return Phrase("patrol.latched", {"causes": latched}) if latched else None
+    def _latched_or_lost(self, _: int) -> Phrase | None:
+        return self._seen
 
     def _restarted(self, _: int) -> Phrase | None:
         safety, localization, placement = self._boots
@@ -470,12 +486,6 @@ class Course:
         if self._pose.placement != placement:
             return Phrase("patrol.placed")
         return None
-
-    def _lost(self, _: int) -> Phrase | None:
-        pose = self._pose
-        if is_known(pose):
-            return None
-        return pose.phrases[0] if pose.phrases else Phrase("teach.lost")
 
     def _overruled(self, now_ns: int) -> Phrase | None:
         source = self._state.source
@@ -516,6 +526,11 @@ def is_known(pose: m.MapPose) -> bool:
     return pose.state == "placed" and None not in parts
 
 
+def lost(pose: m.MapPose) -> Phrase:
+    """Return why a pose is not known."""
+    return pose.phrases[0] if pose.phrases else Phrase("teach.lost")
+
+
 def located_of(pose: m.MapPose) -> tuple[Pose, Covariance]:
     """Return the pose in the map; only while it is known."""
     assert pose.x is not None
@@ -537,8 +552,7 @@ RULES = (
     Rule("stopped", Course._held_up),
     Rule("stopped", Course._silent),
     Rule("stopped", Course._restarted),
-    Rule("stopped", Course._latched),
-    Rule("stopped", Course._lost),
+    Rule("stopped", Course._latched_or_lost),
     Rule("paused", Course._overruled),
     Rule("stopped", Course._left_corridor, moving=True),
     Rule("stopped", Course._unheard, moving=True),

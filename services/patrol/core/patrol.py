@@ -5,7 +5,7 @@ from msgspec.structs import replace
 from common.freshness import NS_PER_S, Latest
 from services.patrol.core.course import Course, Inputs, Note, OpenRound, is_known
 from services.patrol.core.routes import length, stations
-from services.patrol.core.teaching import Refused, Teaching
+from services.patrol.core.teaching import OpenTeaching, Refused, Teaching
 from t2 import messages as m
 from t2.messages import Phrase, Phrases
 from t2.words import render
@@ -29,10 +29,14 @@ class Patrol:
     def on_safety(self, state: m.SafetyState, now_ns: int) -> None:
         """Process a state of safety."""
         self._inputs.safety = Latest(state, now_ns)
+        if self.course is not None:
+            self.course.see_safety(state)
 
     def on_pose(self, pose: m.MapPose, now_ns: int) -> None:
         """Process a pose in the map."""
         self._inputs.pose = Latest(pose, now_ns)
+        if self.course is not None:
+            self.course.see_pose(pose)
         teaching = self._teaching
         if teaching is not None and teaching.reason is None:
             teaching.on_pose(pose)
@@ -68,7 +72,7 @@ class Patrol:
             return reason
         course.rejoin()
         self.course = course
-        course.announce(self._announce_s, now_ns)
+        course.announce(self._announce_s, now_ns, wall_ns)
         self._take_notes(course)
         return None
 
@@ -85,9 +89,9 @@ class Patrol:
         """Forget a round that has just been announced, and cannot be written."""
         self.course, self.notes = None, []
 
-    def restore(self, of: OpenRound, wall_ns: int) -> None:
+    def restore(self, of: OpenRound, route: m.Route, wall_ns: int) -> None:
         """Take up the round of an earlier start of this service."""
-        self.course = Course(of.route, of.round, self._inputs, self._patience_s)
+        self.course = Course(route, of.round, self._inputs, self._patience_s)
         self.course.restore(of, wall_ns)
         self._take_notes(self.course)
 
@@ -106,9 +110,9 @@ class Patrol:
         if stands and action in {"resume", "return"}:
             course.rejoin()
         if action == "return":
-            course.turn_home(now_ns)
+            course.turn_home(now_ns, wall_ns)
         if stands and action in {"resume", "return"}:
-            course.announce(self._announce_s, now_ns, is_resumed=True)
+            course.announce(self._announce_s, now_ns, wall_ns, is_resumed=True)
         return None
 
     def _start_refusal(self, route: m.Route) -> Phrase | None:
@@ -150,6 +154,16 @@ class Patrol:
             raise Refused(Phrase("teach.lost"))
         self._teaching = Teaching(name, self._robot, home, stay, pose.value)
         return self._noted("teaching", Phrase("teach.begun", {"route": name}))
+
+    def restore_teaching(self, of: OpenTeaching) -> None:
+        """Take up the route that was being taught at an earlier start of this service."""
+        self._teaching = Teaching.restored(of, self._robot)
+        self.notes.append(Note("teaching", "warning", self._teaching.phrases))
+
+    @property
+    def open_teaching(self) -> OpenTeaching | None:
+        """What was taught so far; None while no route is taught."""
+        return None if self._teaching is None else self._teaching.open
 
     def station(self, name: str, stay: float) -> Phrases:
         """Mark a station; raise ``Refused``."""

@@ -8,13 +8,16 @@ it is kept.
 import math
 from itertools import pairwise
 
+from msgspec import Struct
+
 from common.pose import Covariance
 from services.patrol.core.routes import LEAST, problem
-from services.patrol.core.track import Point
+from services.patrol.core.track import Point, Track
 from t2 import messages as m
 from t2.messages import MAX_POINTS, Phrase
 
 SPACING, TOLERANCE = 0.1, 0.03  # m
+TURNED, LEAST_STEP = 0.3, 0.01  # rad, m: a corner is recorded before the next spacing
 LONGEST = 10.0  # m, of a straight line: bounds the work for each point
 BACKWARD = 0.2  # m that a vehicle may be driven backward
 JUMP = 0.3  # m between two poses, which are 0.04 s apart
@@ -30,6 +33,13 @@ class Refused(Exception):  # noqa: N818 - as the answer to a call
         self.reason = reason
 
 
+class OpenTeaching(Struct, frozen=True):
+    """What was taught when the service ended."""
+
+    route: str
+    points: tuple[m.RoutePoint, ...]
+
+
 class Teaching:
     """One route that is being taught."""
 
@@ -41,11 +51,28 @@ class Teaching:
         self._placement = pose.boot, pose.placement
         self._before = _place(pose)  # the last pose
         self._last = self._before[:2]  # the last recorded point
+        self._heading = self._before[2]  # there
         self._points = [_point(self._last, home, stay)]
         self._pending: list[Point] = []  # recorded ones since the last of ``_points``
         self._length = 0.0  # m, until the last recorded point
         self._back = 0.0  # m driven backward from the foremost place
         self.reason: Phrase | None = None  # why nothing more is recorded
+
+    @classmethod
+    def restored(cls, of: OpenTeaching, robot: str) -> "Teaching":
+        """Return what was taught before the service restarted; nothing more is recorded."""
+        made = cls.__new__(cls)
+        made.name, made._robot = of.route, robot
+        made._points, made._pending = [*of.points], []
+        made._length = Track([(each.x, each.y) for each in of.points]).length
+        made.reason = Phrase("teach.restarted")
+        return made
+
+    @property
+    def open(self) -> OpenTeaching:
+        """What a restarted service needs."""
+        last = [_point(each) for each in self._pending[-1:]]
+        return OpenTeaching(self.name, (*self._points, *last))
 
     @property
     def stations(self) -> tuple[str, ...]:
@@ -68,6 +95,8 @@ class Teaching:
         """Record a pose of the vehicle."""
         if self.reason is None:
             self.reason = unusable(pose) or self._changed(pose) or self._advance(_place(pose))
+            if self.reason is not None:
+                self._record_here()
 
     def station(self, name: str, stay: float) -> None:
         """Mark a station where the vehicle is; raise ``Refused``."""
@@ -75,15 +104,14 @@ class Teaching:
             raise Refused(self.reason)
         if name in self.stations:
             raise Refused(Phrase("teach.station_twice", {"station": name}))
-        x, y, _ = self._before
-        self._record((x, y))
-        self._points.append(_point((x, y), name, stay))
+        self._record_here()
+        self._points.append(_point(self._before[:2], name, stay))
         self._pending.clear()
 
     def route(self, speed: float) -> m.Route:
         """Return the route that was taught; raise ``Refused`` if it cannot be driven."""
         if self.reason is None:
-            self._record(self._before[:2])
+            self._record_here()
         if self._length < LEAST:
             raise Refused(Phrase("teach.short", {"length": self._length, "least": LEAST}))
         points = [*self._points, *(_point(each) for each in self._pending[-1:])]
@@ -109,17 +137,33 @@ class Teaching:
         return None
 
     def _advance(self, place: tuple[float, float, float]) -> Phrase | None:
-        (x0, y0, heading), (x, y, _) = self._before, place
+        (x0, y0, _), (x, y, heading) = self._before, place
         step = (x - x0) * math.cos(heading) + (y - y0) * math.sin(heading)
         self._back = max(0.0, self._back - step)
         if self._back > BACKWARD:
             return Phrase("teach.backward")
         self._before = place
-        if self._back == 0.0 and math.dist(self._last, (x, y)) >= SPACING:
+        way, turn = math.dist(self._last, (x, y)), math.remainder(heading - self._heading, math.tau)
+        if self._back == 0.0 and (way >= SPACING or (abs(turn) > TURNED and way > LEAST_STEP)):
             self._record((x, y))
+            self._heading = heading
         if len(self._points) > MAX_POINTS - 3:  # the end, its station, and home
             return Phrase("teach.full", {"points": MAX_POINTS})
         return None
+
+    def _record_here(self) -> None:
+        """Record where the vehicle is, or where it was before it drove too far backward."""
+        if self._back > BACKWARD:
+            return
+        here = self._before[:2]
+        if self._back > 0:  # it was driven back to this place
+            while self._pending and math.dist(self._pending[-1], here) <= BACKWARD:
+                self._pending.pop()
+            corner = self._points[-1].x, self._points[-1].y
+            self._last = self._pending[-1] if self._pending else corner
+            line = [*((each.x, each.y) for each in self._points), *self._pending]
+            self._length, self._back = Track(line).length, 0.0
+        self._record(here)
 
     def _record(self, point: Point) -> None:
         """Record a point, and leave out those before it that are on its line."""

@@ -1,0 +1,352 @@
+"""Rounds: states, what stops them, and how they go on."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from common.pose import Pose
+from services.patrol.core.course import RULES, STATES
+from t2 import messages as m
+from tests.patrol.core.vehicle_fixture import LOOP, PATIENCE_S, Vehicle, route
+
+ACTIVE: tuple[m.RoundState, ...] = ("announcing", "driving", "staying", "waiting", "returning")
+
+
+def vehicle_in(state: m.RoundState) -> Vehicle:
+    """Return a vehicle whose round is in a state, on the way to the gate at x = 4 m."""
+    vehicle = Vehicle()
+    if state == "idle":
+        vehicle.step()
+    elif state == "announcing":
+        assert vehicle.start() is None
+    elif state == "staying":
+        assert vehicle.start(route(LOOP, stay=5.0)) is None
+        vehicle.until("staying")
+    elif state == "done":
+        vehicle.driving()
+        vehicle.act("abort")
+    else:
+        vehicle.driving()
+        _lead(vehicle, state)
+    assert vehicle.state == state
+    return vehicle
+
+
+def _lead(vehicle: Vehicle, state: m.RoundState) -> None:
+    if state == "waiting":
+        vehicle.causes = ("blocked",)
+        vehicle.until("waiting")
+    elif state == "returning":
+        vehicle.act("return")
+    elif state == "paused":
+        vehicle.act("pause")
+    elif state == "stopped":
+        vehicle.latched = ("estop",)
+        vehicle.until("stopped")
+        vehicle.latched = ()
+
+
+def test_a_loop_ends_at_home_and_its_stations_are_visited() -> None:
+    vehicle = Vehicle()
+    assert vehicle.start(route(LOOP, stay=2.0)) is None
+    vehicle.until("staying")
+    assert vehicle.message.station == "gate"
+    vehicle.until("done")
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert (record.result, [each.station for each in record.visits]) == ("home", ["gate", "home"])
+    assert record.distance == pytest.approx(14.0, abs=0.5)
+    assert record.deviation < 0.3
+    assert math.dist((vehicle.at.x, vehicle.at.y), (0.0, 0.0)) < 0.1
+    assert vehicle.events == ["round_start", "station", "round_end"]
+
+
+def test_an_open_route_is_driven_back_home() -> None:
+    vehicle = Vehicle()
+    assert vehicle.start() is None
+    vehicle.until("returning")
+    assert vehicle.message.homeward
+    vehicle.until("done")
+    assert vehicle.reasons == ("patrol.home",)
+    assert math.dist((vehicle.at.x, vehicle.at.y), (0.0, 0.0)) < 0.1
+
+
+def test_nothing_moves_before_the_announcement_is_over() -> None:
+    vehicle = vehicle_in("announcing")
+    vehicle.run(0.8)
+    assert not vehicle.requests
+    vehicle.run(1.0)
+    assert vehicle.moves
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.6, math.pi, -2.0])
+def test_a_round_begins_at_any_heading_by_a_turn_on_the_spot(heading: float) -> None:
+    vehicle = Vehicle(Pose(0.0, 0.0, heading))
+    assert vehicle.start() is None
+    vehicle.until("done")
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert record.deviation < 0.3
+
+
+@pytest.mark.parametrize(
+    ("at", "sigma", "reason"),
+    [
+        (Pose(0.2, 0.1, 0.0), 0.05, None),
+        (Pose(0.0, 2.0, 0.0), 0.05, "patrol.not_home"),
+        (Pose(4.0, 0.0, 0.0), 0.05, "patrol.not_home"),
+        (Pose(0.2, 0.0, 0.0), 0.2, "patrol.uncertain"),
+    ],
+)
+def test_a_round_begins_only_at_home(at: Pose, sigma: float, reason: str | None) -> None:
+    vehicle = Vehicle(at)
+    vehicle.sigma = sigma
+    assert vehicle.start() == reason
+
+
+def test_a_route_of_another_robot_is_refused() -> None:
+    assert Vehicle().start(route(robot="002")) == "patrol.other_robot"
+
+
+def test_one_round_at_a_time() -> None:
+    vehicle = vehicle_in("driving")
+    assert vehicle.start() == "patrol.busy"
+    vehicle.act("pause")
+    assert vehicle.start() == "patrol.busy"
+    vehicle.act("abort")
+    vehicle.at = Pose(0.0, 0.0, 0.0)
+    assert vehicle.start() is None
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("action", ["depart", "pause", "resume", "return", "abort"])
+def test_only_the_listed_actions_are_possible(state: m.RoundState, action: m.RoundAction) -> None:
+    vehicle = vehicle_in(state)
+    is_possible = action in vehicle.message.actions
+    assert (vehicle.act(action) is None) == is_possible
+    assert is_possible == (action in STATES[state].actions)
+
+
+@pytest.mark.parametrize("state", ACTIVE)
+def test_an_emergency_stop_stops_a_round_and_a_reset_does_not_resume_it(
+    state: m.RoundState,
+) -> None:
+    vehicle = vehicle_in(state)
+    vehicle.causes, vehicle.latched = (), ("estop",)
+    vehicle.run(0.2)
+    assert vehicle.state == "stopped"
+    assert vehicle.act("resume") == "patrol.latched"
+    vehicle.latched = ()
+    vehicle.run(5.0)
+    assert (vehicle.state, vehicle.moves) == ("stopped", False)
+    assert vehicle.act("resume") is None
+    vehicle.until("done")
+
+
+def test_a_latch_that_is_reset_between_two_ticks_stops_too() -> None:
+    vehicle = vehicle_in("driving")
+    vehicle.latched = ("estop",)
+    vehicle.patrol.on_safety(vehicle._state(), vehicle.now_ns)
+    vehicle.latched = ()
+    vehicle.run(0.5)
+    assert vehicle.state == "stopped"
+
+
+Trouble = Callable[[Vehicle], None]
+TROUBLES: dict[str, tuple[Trouble, str]] = {
+    "safety silent": (lambda it: it.silent.add("safety"), "patrol.safety_silent"),
+    "localization silent": (lambda it: it.silent.add("localization"), "patrol.map_silent"),
+    "safety restarts": (lambda it: it.boots.update(safety=2), "patrol.safety_restarted"),
+    "localization restarts": (lambda it: it.boots.update(localization=2), "patrol.map_restarted"),
+    "placed anew": (lambda it: setattr(it, "placement", 2), "patrol.placed"),
+    "position lost": (lambda it: setattr(it, "map_state", "lost"), "map.uncertain"),
+    "not placed any more": (lambda it: setattr(it, "map_state", "unplaced"), "map.unplaced"),
+    "computer sleeps": (lambda it: setattr(it, "now_ns", it.now_ns + 60 * 10**9), "patrol.held_up"),
+}
+
+
+@pytest.mark.parametrize("state", ACTIVE)
+@pytest.mark.parametrize("trouble", TROUBLES)
+def test_what_needs_a_person_stops_a_round(state: m.RoundState, trouble: str) -> None:
+    vehicle = vehicle_in(state)
+    cause, reason = TROUBLES[trouble]
+    cause(vehicle)
+    vehicle.run(3.0)
+    assert (vehicle.state, vehicle.reasons) == ("stopped", (reason, "patrol.resume"))
+    vehicle.silent.clear()
+    vehicle.map_state, vehicle.causes = "placed", ()
+    vehicle.run(5.0)
+    assert (vehicle.state, vehicle.moves) == ("stopped", False)
+    assert vehicle.act("resume") is None
+    vehicle.until("done")
+
+
+@pytest.mark.parametrize("state", ACTIVE)
+def test_another_source_pauses_a_round_and_its_end_does_not_resume_it(state: m.RoundState) -> None:
+    vehicle = vehicle_in(state)
+    vehicle.causes, vehicle.source = (), "teleop"
+    vehicle.run(1.0)
+    assert (vehicle.state, vehicle.reasons) == ("paused", ("patrol.overruled",))
+    assert vehicle.act("resume") == "patrol.other_drives"
+    vehicle.source = None
+    vehicle.run(5.0)
+    assert (vehicle.state, vehicle.moves) == ("paused", False)
+    assert vehicle.act("resume") is None
+    vehicle.until("done")
+
+
+def test_every_rule_is_the_reason_of_a_tested_stop() -> None:
+    assert len(RULES) == 7  # add a case above for a new one
+
+
+@pytest.mark.parametrize(
+    ("push", "turn", "reason"), [(0.3, 1.5, None), (-0.3, 3.0, None), (3.0, 0.0, "patrol.outside")]
+)
+def test_a_pushed_vehicle_resumes_only_inside_the_corridor(
+    push: float, turn: float, reason: str | None
+) -> None:
+    vehicle = vehicle_in("paused")
+    vehicle.push(y=push, turn=turn)
+    assert vehicle.act("resume") == reason
+    if reason is None:
+        vehicle.until("done")
+
+
+@pytest.mark.parametrize("along", [2.5, -0.9])
+def test_a_vehicle_that_was_moved_along_the_route_goes_on_from_there(along: float) -> None:
+    vehicle = vehicle_in("paused")
+    vehicle.push(x=along)
+    assert vehicle.act("resume") is None
+    vehicle.until("returning")
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert [each.station for each in record.visits] == ["gate"]
+
+
+@pytest.mark.parametrize("cause", ["blocked", "limit_stop"])
+def test_it_waits_and_goes_on_by_itself(cause: m.CauseName) -> None:
+    vehicle = vehicle_in("driving")
+    vehicle.causes = (cause,)
+    vehicle.run(1.0)
+    assert (vehicle.state, vehicle.reasons) == ("waiting", ("patrol.waiting", "blocked"))
+    assert vehicle.moves == (cause == "blocked")  # the others want a neutral request
+    vehicle.causes = ()
+    vehicle.until("done")
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert [each.state for each in record.halts] == ["waiting"]
+    assert record.halts[0].seconds == pytest.approx(1.5, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("blocked", "state"), [("wait", "waiting"), ("return", "waiting"), ("stop", "stopped")]
+)
+def test_after_its_patience_a_round_does_what_the_route_says(
+    blocked: m.WhenBlocked, state: m.RoundState
+) -> None:
+    vehicle = Vehicle().driving(route(blocked=blocked))
+    vehicle.causes = ("blocked",)
+    vehicle.run(PATIENCE_S + 2.0)
+    assert vehicle.state == state
+    assert vehicle.message.homeward == (blocked == "return")
+    assert vehicle.events.count("round_blocked") == (blocked != "stop")
+    vehicle.run(PATIENCE_S + 2.0)
+    assert vehicle.state == state
+    vehicle.causes = ()
+    if state == "waiting":
+        vehicle.until("done")
+        assert vehicle.reasons == ("patrol.returned" if blocked == "return" else "patrol.home",)
+
+
+def test_a_vehicle_that_does_not_move_though_the_way_is_free_stops() -> None:
+    vehicle = vehicle_in("driving")
+    place = vehicle.at
+    for _ in range(round((PATIENCE_S + 1) / 0.05)):
+        vehicle.at = place
+        vehicle.step()
+    assert vehicle.reasons == ("patrol.stuck", "patrol.resume")
+
+
+def test_a_safety_that_does_not_know_the_source_is_named() -> None:
+    vehicle = Vehicle()
+    assert vehicle.start() is None
+    vehicle.run(1.0)
+    place = vehicle.at
+    for _ in range(100):
+        vehicle.at, vehicle.requests = place, []  # without requests safety names no source
+        vehicle.step()
+    assert vehicle.reasons == ("patrol.unheard", "patrol.resume")
+
+
+@pytest.mark.parametrize(
+    ("y", "sigma", "reason"),
+    [(0.0, 0.24, None), (0.0, 0.26, "patrol.uncertain"), (0.6, 0.05, "patrol.outside")],
+)
+def test_it_stops_where_it_cannot_be_sure_to_be_in_the_corridor(
+    y: float, sigma: float, reason: str | None
+) -> None:
+    vehicle = vehicle_in("driving")
+    vehicle.push(y=y)
+    vehicle.sigma = sigma
+    vehicle.run(0.2)
+    assert vehicle.state == ("driving" if reason is None else "stopped")
+    assert reason is None or vehicle.reasons[0] == reason
+
+
+def test_a_stay_ends_by_a_call() -> None:
+    vehicle = vehicle_in("staying")
+    assert vehicle.message.left == pytest.approx(5.0, abs=0.2)
+    assert vehicle.act("depart") is None
+    assert vehicle.state == "driving"
+
+
+def test_two_stations_at_one_place_are_both_visited() -> None:
+    points = [(0.0, 0.0, "home"), (2.0, 0.0, "door"), (2.0, 0.0, "window"), (0.0, 0.0)]
+    vehicle = Vehicle()
+    assert vehicle.start(route(points)) is None
+    vehicle.until("done")
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert [each.station for each in record.visits] == ["door", "window", "home"]
+
+
+def test_a_route_that_crosses_itself_is_driven_in_its_order() -> None:
+    eight = [(0.0, 0.0, "home"), (4.0, 4.0, "far"), (4.0, 0.0), (0.0, 4.0, "end"), (0.0, 0.0)]
+    vehicle = Vehicle()
+    assert vehicle.start(route(eight)) is None
+    vehicle.until("done", within=240)
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert [each.station for each in record.visits] == ["far", "end", "home"]
+    assert record.distance > 17
+
+
+def test_returning_is_backward_along_the_route() -> None:
+    vehicle = Vehicle()
+    assert vehicle.start(route(LOOP)) is None
+    while vehicle.at.y < 1.0:
+        vehicle.step()
+    assert vehicle.act("return") is None
+    vehicle.until("done")
+    assert vehicle.reasons == ("patrol.returned",)
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert record.deviation < 0.3
+
+
+@pytest.mark.parametrize("state", [*ACTIVE, "paused", "stopped"])
+def test_a_restarted_service_waits_for_a_person(state: m.RoundState) -> None:
+    vehicle = vehicle_in(state)
+    course = vehicle.patrol.course
+    assert course
+    after = Vehicle(vehicle.at)
+    after.placement = vehicle.placement
+    after.patrol.restore(course.open, course.route, after.wall_ns)
+    after.run(5.0)
+    assert (after.state, after.moves) == ("stopped", False)
+    assert after.reasons == ("patrol.restarted", "patrol.resume")
+    assert after.act("resume") is None
+    after.until("done")
+    assert after.patrol.course
+    assert after.patrol.course.diary.record.id == "one"

@@ -1,0 +1,176 @@
+"""Teaching: what is recorded of a drive, and what ends the recording."""
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import msgspec
+import pytest
+
+from common.pose import Pose
+from services.patrol.core.routes import length, problem
+from services.patrol.core.teaching import Refused, Teaching
+from t2 import messages as m
+from tests.factories import map_pose
+
+STEP = 0.02  # m of one pose
+
+
+def pose_at(at: Pose, sigma: float = 0.05, **fields: Any) -> m.MapPose:
+    variance = sigma**2
+    covariance = (variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance)
+    return map_pose(x=at.x, y=at.y, heading=at.heading, pose_covariance=covariance, **fields)
+
+
+class Lesson:
+    """A drive that is taught."""
+
+    def __init__(self) -> None:
+        self.at = Pose(0.0, 0.0, 0.0)
+        self.teaching = Teaching("yard", "001", "home", 0.0, pose_at(self.at))
+
+    def forward(self, distance: float, radius: float = math.inf, step: float = STEP) -> "Lesson":
+        """Drive, m; negative is backward."""
+        count, step = round(abs(distance) / step), math.copysign(step, distance)
+        for _ in range(count):
+            self.at = self.at.moved(step, step / radius)
+            self.teaching.on_pose(pose_at(self.at))
+        return self
+
+    def turn(self, angle: float) -> "Lesson":
+        """Turn on the spot, rad."""
+        for _ in range(20):
+            self.at = self.at.moved(0.0, angle / 20)
+            self.teaching.on_pose(pose_at(self.at))
+        return self
+
+    @property
+    def reason(self) -> str | None:
+        """Why nothing more is recorded."""
+        return self.teaching.reason.name if self.teaching.reason else None
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """The points of the route."""
+        return [(each.x, each.y) for each in self.teaching.route(0.5).points]
+
+
+def near(points: list[tuple[float, float]], within: float = 0.06) -> Any:
+    return [pytest.approx(each, abs=within) for each in points]
+
+
+def test_straight_lines_become_their_ends() -> None:
+    lesson = Lesson().forward(5.0).turn(math.pi / 2).forward(3.0)
+    assert lesson.corners == near([(0.0, 0.0), (5.0, 0.0), (5.0, 3.0)])
+
+
+def test_a_loop_ends_exactly_at_home() -> None:
+    lesson = Lesson()
+    for _ in range(4):
+        lesson.forward(3.0).turn(math.pi / 2)
+    lesson.forward(0.1)
+    assert lesson.corners[0] == lesson.corners[-1] == (0.0, 0.0)
+    assert length(lesson.teaching.route(0.5)) == pytest.approx(12.0, abs=0.1)
+
+
+def test_a_curve_is_followed_to_three_centimetres() -> None:
+    lesson = Lesson().forward(2 * math.pi, radius=2.0)
+    points = lesson.corners
+    assert 5 < len(points) < 20
+    for (ax, ay), (bx, by) in pairwise(points):
+        middle = (ax + bx) / 2, (ay + by) / 2
+        assert abs(math.dist(middle, (0.0, 2.0)) - 2.0) < 0.05
+
+
+def test_four_kilometres_straight_on_are_a_few_hundred_points() -> None:
+    lesson = Lesson().forward(4000.0, step=0.2)
+    assert lesson.reason is None
+    assert 350 < len(lesson.corners) < 500
+    assert length(lesson.teaching.route(0.5)) == pytest.approx(4000.0, rel=1e-3)
+
+
+def test_a_route_is_full_at_the_limit_of_its_type(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.patrol.core.teaching.MAX_POINTS", 20)
+    lesson = Lesson().forward(100.0, radius=1.0)
+    assert lesson.reason == "teach.full"
+    assert len(lesson.teaching.route(0.5).points) <= 20
+
+
+def test_stations_are_exact_points_in_their_order() -> None:
+    lesson = Lesson().forward(1.03)
+    lesson.teaching.station("北门", 10.0)
+    lesson.teaching.station("gate", 0.0)
+    route = lesson.forward(2.0).teaching.route(0.5)
+    assert [(each.station, each.x, each.stay) for each in route.points if each.station] == [
+        ("home", 0.0, 0.0),
+        ("北门", pytest.approx(1.04), 10.0),
+        ("gate", pytest.approx(1.04), 0.0),
+    ]
+    assert problem(route) is None
+    msgspec.json.decode(msgspec.json.encode(route), type=m.Route)  # with its limits
+
+
+def test_a_station_has_one_place() -> None:
+    lesson = Lesson().forward(1.0)
+    with pytest.raises(Refused, match="station_twice"):
+        lesson.teaching.station("home", 0.0)
+
+
+def test_small_motions_backward_are_no_part_of_the_route() -> None:
+    lesson = Lesson().forward(2.0).forward(-0.15).forward(1.0)
+    assert lesson.corners == near([(0.0, 0.0), (2.85, 0.0)])
+
+
+def test_a_station_may_be_marked_a_bit_backward() -> None:
+    lesson = Lesson().forward(2.0).forward(-0.15)
+    lesson.teaching.station("gate", 0.0)
+    assert lesson.forward(1.0).corners == near([(0.0, 0.0), (1.85, 0.0), (2.85, 0.0)])
+
+
+def test_driving_backward_ends_the_recording_and_keeps_the_part_before() -> None:
+    lesson = Lesson().forward(2.0).forward(-0.5).forward(3.0)
+    assert lesson.reason == "teach.backward"
+    assert [each.name for each in lesson.teaching.phrases] == ["teach.backward", "teach.ends_here"]
+    assert lesson.corners == near([(0.0, 0.0), (2.0, 0.0)], within=0.11)
+    with pytest.raises(Refused, match="backward"):
+        lesson.teaching.station("gate", 0.0)
+
+
+@pytest.mark.parametrize(
+    ("pose", "reason"),
+    [
+        (map_pose("lost"), "teach.lost"),
+        (map_pose("unplaced"), "teach.lost"),
+        (pose_at(Pose(2.0, 0.0, 0.0), sigma=0.3), "teach.uncertain"),
+        (pose_at(Pose(2.0, 0.4, 0.0)), "teach.jump"),
+        (pose_at(Pose(2.0, 0.0, 0.0), placement=2), "teach.jump"),
+        (pose_at(Pose(2.0, 0.0, 0.0), boot=9), "teach.jump"),
+    ],
+)
+def test_an_unknown_position_ends_the_recording(pose: m.MapPose, reason: str) -> None:
+    lesson = Lesson().forward(2.0)
+    lesson.teaching.on_pose(pose)
+    lesson.forward(3.0)
+    assert lesson.reason == reason
+    assert lesson.corners == near([(0.0, 0.0), (2.0, 0.0)])
+
+
+def test_teaching_needs_a_known_position() -> None:
+    with pytest.raises(Refused, match="lost"):
+        Teaching("yard", "001", "home", 0.0, map_pose("lost"))
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.3])
+def test_a_route_has_a_least_length(distance: float) -> None:
+    with pytest.raises(Refused, match="short"):
+        Lesson().forward(distance).teaching.route(0.5)
+
+
+def test_what_was_taught_survives_a_restart() -> None:
+    lesson = Lesson().forward(3.0).turn(1.0).forward(1.0)
+    route = lesson.teaching.route(0.5)
+    restored = Teaching.restored(lesson.teaching.open, "001")
+    restored.on_pose(pose_at(Pose(9.0, 9.0, 0.0)))
+    assert restored.reason
+    assert restored.reason.name == "teach.restarted"
+    assert restored.route(0.5) == route
