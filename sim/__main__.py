@@ -12,6 +12,7 @@ from typing import BinaryIO
 import msgspec
 
 from common import clock, log, realtime
+from common.bus.bus import Bus
 from common.cli_args import add_sources, file_path, run_program, sources
 from common.config import load
 from common.errors import ConfigError
@@ -19,6 +20,7 @@ from common.freshness import NS_PER_S
 from common.log import Logger
 from common.loop import Loop
 from sim.config import Config, add_profiles, load_model, load_plan, profile_list
+from sim.localizer import Localizer
 from sim.model import Model
 from sim.simulation import STEP_NS, Simulation
 from sim.sockets import HOST, BoardSocket, answer_requests, bound
@@ -47,8 +49,16 @@ class Process:
             if config.sim.control_port:
                 self._control = bound(HOST, config.sim.control_port, "sim.control_port")
                 self.loop.watch(stack.enter_context(self._control), self._serve_control)
+            self._localizer = self._localize(config, stack) if config.sim.fix_source else None
             self._opened = stack.pop_all()
         self.loop.every(STEP_NS / NS_PER_S, self._step)
+
+    def _localize(self, config: Config, stack: ExitStack) -> Localizer:
+        bus = Bus(config.bus, config.robot.id, self.loop.post)
+        localizer = Localizer(bus, config.sim, self.simulation.truth)
+        bus.open()
+        stack.callback(bus.close)
+        return localizer
 
     def run(self) -> None:
         """Run until the loop is stopped."""
@@ -63,6 +73,8 @@ class Process:
     def _step(self, now_ns: int) -> None:
         self.simulation.advance(now_ns)
         self._deliver()
+        if self._localizer is not None:
+            self._localizer.step(now_ns)
 
     def _receive(self, now_ns: int) -> None:
         # Advance first, so that answers are current even after a stall of this process.

@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 
 from common.config import DEFAULT, Setting, build, flatten, read_toml
 from common.errors import ConfigError
-from common.settings import Board, Section, Shared, Vehicle, Wire
+from common.settings import Board, Section, Shared, Vehicle, Wire, allowed
 from sim.geometry import Rectangle
 from sim.model import Model
 from sim.world import Plan, World
@@ -34,6 +34,14 @@ class Sim(Section, frozen=True, kw_only=True):
     world: str = "office"  # a name in sim/worlds, or the path of a TOML file
     seed: Annotated[int, Meta(ge=0)] = 1  # of all noise and faults
     control_port: Annotated[int, Meta(ge=0, le=65535)] = 0  # UDP on 127.0.0.1; 0: none
+    # a source of localization.sources: the true pose is measured, and sent as it; empty: none
+    fix_source: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
+    fix_rate: Annotated[float, allowed("Hz", ge=0.1, le=20.0)] = 2.0
+    fix_sigma: Annotated[float, allowed("m", gt=0.0, le=10.0)] = 0.03  # of x and y
+    fix_heading_sigma: Annotated[float, allowed("rad", gt=0.0, le=3.0)] = 0.02
+    fix_delay: Annotated[float, allowed("s", ge=0.0, le=10.0)] = 0.1
+    fix_outliers: Annotated[float, allowed(ge=0.0, le=1.0)] = 0.0  # share, some metres off
+    fix_gap: Annotated[float, allowed("s", ge=0.0, le=60.0)] = 0.0  # without any, in each minute
 
 
 class Config(Shared, frozen=True, kw_only=True):
