@@ -294,7 +294,8 @@ class Drive:
     ) -> Odometry:
         """Drive forward along straight lines through points (x, y), m; then turn to a heading, rad.
 
-        It cuts corners by up to 0.2 m, and turns on the spot where the next line is not ahead. With
+        It cuts corners by up to 0.2 m, at more than 0.3 m/s by two thirds of what it drives in 1 s,
+        and turns on the spot where the next line is not ahead. With
         ``frame="map"`` points and heading are in the map, and the vehicle comes back to the lines
         after each correction of its pose; raises ``Lost`` while the pose is not known well enough.
         The result is in ``odom`` all the same.

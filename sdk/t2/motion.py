@@ -15,7 +15,7 @@ STEP, STEP_TURN = 0.001, 0.002  # m, rad: progress
 START_S = 0.5  # until a vehicle that stands shows progress: the least patience
 RESOLUTION, RESOLUTION_TURN = 0.001, math.radians(0.1)  # m/s, rad/s: of the board's commands
 KEEP_HEADING, MAX_CORRECTION = 1.5, 0.4  # rad/s per rad, rad/s
-AHEAD = 0.3  # m along a path, of the point that is aimed at
+AHEAD, AHEAD_S = 0.3, 1.0  # m and s along a path, of the point that is aimed at: the longer one
 FACING, TURNED = 0.8, 0.1  # rad: off the aim, a path is left for a turn on the spot, until turned
 
 CORRECTION, FASTEST = 0.1, 2.0  # m or rad, and that per s: what moves more was corrected
@@ -178,14 +178,10 @@ class Path:
     unit = "m"
 
     def __init__(
-        self,
-        start: Place,
-        points: Iterable[tuple[float, float]],
-        speed: float,
-        turning: float,
-        ahead: float = AHEAD,
+        self, start: Place, points: Iterable[tuple[float, float]], speed: float, turning: float
     ) -> None:
-        self.speed, self._turning, self._ahead = resolved(speed), turning, ahead
+        self.speed, self._turning = resolved(speed), turning
+        self._ahead = max(AHEAD, AHEAD_S * speed)
         corners = [(start.x, start.y), *((finite(x), finite(y)) for x, y in points)]
         self._lines = deque((a, b, math.dist(a, b)) for a, b in pairwise(corners) if a != b)
         self._after = sum(length for *_, length in islice(self._lines, 1, None))  # of the first

@@ -18,10 +18,10 @@ from tests.fake_bus import FakeBus
 STEP_NS = 10_000_000
 
 
-def fixes(seconds: float, truth: Any = None, **settings: Any) -> list[tuple[float, m.Fix]]:
+def fixes(seconds: float, **settings: Any) -> list[tuple[float, m.Fix]]:
     """Return the fixes of some seconds at a pose, with the time of each, s."""
     bus = FakeBus()
-    true = truth or SimpleNamespace(x=1.0, y=2.0, heading=0.5)
+    true: Any = SimpleNamespace(x=1.0, y=2.0, heading=0.5)
     of = Sim(fix_source="tags", **settings)
     localizer = Localizer(bus, of, lambda _: true)
     begin_ns, found = localizer._next_ns, list[tuple[float, m.Fix]]()

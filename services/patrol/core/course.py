@@ -46,7 +46,6 @@ PROGRESS = 0.1  # m along the route
 REJOIN, NEAR = 5.0, 3.0  # m along the route: where a resumed round looks for it, and a driving one
 ARRIVED = 0.05  # m before a stop
 TURN_SPEED = 0.5  # rad/s
-AHEAD, AHEAD_S = 0.3, 0.6  # m and s: the point that is aimed at
 CONVERGE = 1.0  # m until a vehicle beside the route is back on it
 
 
@@ -296,9 +295,8 @@ class Course:
 
     def _begin_leg(self, pose: Pose) -> None:
         self._stop = self.way.next_stop(self._stop, self.along + ARRIVED)
-        speed = self.route.speed
         points = self.way.points_to(self._stop, self.along, CONVERGE)
-        self._path = Path(pose, points, speed, TURN_SPEED, AHEAD + AHEAD_S * speed)
+        self._path = Path(pose, points, self.route.speed, TURN_SPEED)
         if self.state != "waiting":
             self._enter(*self._moving())
 
