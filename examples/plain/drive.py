@@ -1,35 +1,35 @@
-"""Drive forward at 0.2 m/s for 2 s as the source "patrol"."""
+"""Drive forward at 0.2 m/s for 2 s as the source "shuttle"."""
 
 import sys
 import time
 
 from robot_bus import Source, open_session
 
-NAME = "patrol"  # one of safety.sources
+NAME = "shuttle"  # one of safety.sources
 PERIOD = 0.05  # s: 20 Hz
 
 
-def drive(patrol):
+def drive(shuttle):
     """Return why it ended early; None otherwise."""
-    if not take_control(patrol):
-        why = reason(patrol.state) or "safety.sources or your certificate does not name it"
+    if not take_control(shuttle):
+        why = reason(shuttle.state) or "safety.sources or your certificate does not name it"
         return f"safety does not obey {NAME}: {why}"
     end = time.monotonic() + 2.0
     while time.monotonic() < end:
-        patrol.put(linear=0.2, angular=0.0)  # m/s, rad/s
+        shuttle.put(linear=0.2, angular=0.0)  # m/s, rad/s
         time.sleep(PERIOD)
-        if stopped := reason(patrol.state):
+        if stopped := reason(shuttle.state):
             return stopped
     return None
 
 
-def take_control(patrol):
+def take_control(shuttle):
     """Put neutral requests until safety would let this source drive, for 2 s at most."""
     for tick in range(40):
-        patrol.put(linear=0.0, angular=0.0)
+        shuttle.put(linear=0.0, angular=0.0)
         time.sleep(PERIOD)
-        in_control = patrol.state and patrol.state["source"] == NAME
-        if tick > 10 and in_control and not reason(patrol.state):
+        in_control = shuttle.state and shuttle.state["source"] == NAME
+        if tick > 10 and in_control and not reason(shuttle.state):
             return True
     return False
 

@@ -26,7 +26,7 @@ NAMED = re.compile(r"^```\w+ (?P<name>[\w./]+)\n(?P<text>.*?)^```$", re.DOTALL |
 TRIES = 3  # safety stops the vehicle when a busy host stalls a program
 # The longest that need no override, for such a host.
 LEASES = (
-    "safety.sources.patrol={priority=12, lease=0.5}",
+    "safety.sources.shuttle={priority=12, lease=0.5}",
     'safety.limits.detector={lease=1.0, silence="stop"}',
 )
 

@@ -41,7 +41,7 @@ def programs(request: pytest.FixtureRequest) -> Programs:
     """Return the three programs in one language."""
     names = ("read", "drive", "limit")
     if request.param == "sdk":
-        library = "nearest_obstacle.py", "patrol.py", "limit_speed.py"
+        library = "nearest_obstacle.py", "shuttle.py", "limit_speed.py"
         return dict(zip(names, library, strict=True))
     if request.param == "rust":
         return {name: str(TARGET / "debug" / name) for name in names}

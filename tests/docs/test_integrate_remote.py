@@ -65,7 +65,7 @@ def test_the_package_reports_a_certificate_that_may_not_drive(it: Integrator) ->
         it.limited("plain/limit.py"),
         connected(it, "viewer.screen") as robot,
         pytest.raises(t2.NotAllowed, match="this certificate may not drive"),
-        robot.drive("patrol"),
+        robot.drive("shuttle"),
     ):
         pass
 
@@ -92,7 +92,7 @@ def test_the_test_file_of_the_page(tmp_path: Path) -> None:
     words = ["-p", "no:cacheprovider", "-c", os.devnull, "--rootdir", str(tmp_path)]
     for _ in range(TRIES):
         done = subprocess.run(
-            [sys.executable, "-m", "pytest", *words, "test_patrol.py"],
+            [sys.executable, "-m", "pytest", *words, "test_shuttle.py"],
             cwd=tmp_path, env={**ENVIRONMENT, **env},
             capture_output=True, text=True, timeout=90, check=False,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-//! Drive forward at 0.2 m/s for 2 s as the source "patrol".
+//! Drive forward at 0.2 m/s for 2 s as the source "shuttle".
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use t2_examples::{open_session, Failure, SafetyState, Source};
 
-const NAME: &str = "patrol"; // one of safety.sources
+const NAME: &str = "shuttle"; // one of safety.sources
 const PERIOD: Duration = Duration::from_millis(50); // 20 Hz
 const STILL: Drive = Drive {
     linear: 0.0,
@@ -25,22 +25,22 @@ struct Drive {
 
 fn main() -> Result<(), Failure> {
     let session = open_session()?;
-    let mut patrol = Source::declare(&session, "drive", NAME)?;
-    let done = drive(&mut patrol);
+    let mut shuttle = Source::declare(&session, "drive", NAME)?;
+    let done = drive(&mut shuttle);
     for _ in 0..3 {
-        patrol.put(&STILL)?; // three: one may be lost
+        shuttle.put(&STILL)?; // three: one may be lost
         sleep(PERIOD);
     }
     done
 }
 
-fn drive(patrol: &mut Source) -> Result<(), Failure> {
-    take_control(patrol)?;
+fn drive(shuttle: &mut Source) -> Result<(), Failure> {
+    take_control(shuttle)?;
     let end = Instant::now() + Duration::from_secs(2);
     while Instant::now() < end {
-        patrol.put(&FORWARD)?;
+        shuttle.put(&FORWARD)?;
         sleep(PERIOD);
-        if let Some(stopped) = reason(patrol.state.as_ref()) {
+        if let Some(stopped) = reason(shuttle.state.as_ref()) {
             return Err(stopped.into());
         }
     }
@@ -48,17 +48,17 @@ fn drive(patrol: &mut Source) -> Result<(), Failure> {
 }
 
 /// Put neutral requests until safety would let this source drive, for 2 s at most.
-fn take_control(patrol: &mut Source) -> Result<(), Failure> {
+fn take_control(shuttle: &mut Source) -> Result<(), Failure> {
     for tick in 0..40 {
-        patrol.put(&STILL)?;
+        shuttle.put(&STILL)?;
         sleep(PERIOD);
-        let state = patrol.state.as_ref();
+        let state = shuttle.state.as_ref();
         let in_control = state.is_some_and(|it| it.source.as_deref() == Some(NAME));
         if tick > 10 && in_control && reason(state).is_none() {
             return Ok(());
         }
     }
-    let why = reason(patrol.state.as_ref())
+    let why = reason(shuttle.state.as_ref())
         .unwrap_or("safety.sources or your certificate does not name it".into());
     Err(format!("safety does not obey {NAME}: {why}").into())
 }

@@ -8,7 +8,7 @@ from t2.pytest_plugin import robot_fixture
 robot = robot_fixture("empty", configs=["robot.toml"])  # ready to drive
 
 
-def patrol(robot):
+def shuttle(robot):
     """Run the program; return its exit code and its error text."""
     words = [sys.executable, "plain/drive.py", robot.endpoint]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
@@ -18,7 +18,7 @@ def patrol(robot):
 def test_it_drives_forward(robot):
     """The program drives, and ends without an error."""
     before = robot.odometry.latest().x
-    assert patrol(robot) == (0, "")
+    assert shuttle(robot) == (0, "")
     assert robot.odometry.latest().x > before + 0.2
 
 
@@ -28,6 +28,6 @@ def test_it_reports_a_bumper_hit(robot):
     for state in robot.safety:
         if "contact" in state.latched:
             break
-    code, text = patrol(robot)
+    code, text = shuttle(robot)
     assert code == 1
     assert "bumper" in text

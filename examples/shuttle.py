@@ -1,6 +1,6 @@
-"""Drive 0.4 m forward, turn left and turn back, as the source "patrol".
+"""Drive 0.4 m forward, turn left and turn back, as the source "shuttle".
 
-python patrol.py [tcp/127.0.0.1:7447], with [safety.sources] patrol in safety's settings
+python shuttle.py [tcp/127.0.0.1:7447], with [safety.sources] shuttle in safety's settings
 """
 
 import math
@@ -9,9 +9,9 @@ import sys
 import t2
 
 
-def patrol(endpoint: str) -> None:
+def shuttle(endpoint: str) -> None:
     """Drive; raises ``t2.Latched``, ``t2.Blocked``, ``t2.Overruled``, ``t2.NotAllowed``, ..."""
-    with t2.connect("001", endpoint=endpoint) as robot, robot.drive("patrol") as drive:
+    with t2.connect("001", endpoint=endpoint) as robot, robot.drive("shuttle") as drive:
         drive.forward(0.4, on_stop="wait")
         drive.turn(math.pi / 2, on_stop="wait")
         drive.turn(-math.pi / 2, on_stop="wait")
@@ -19,6 +19,6 @@ def patrol(endpoint: str) -> None:
 
 if __name__ == "__main__":
     try:
-        patrol("".join(sys.argv[1:]))
+        shuttle("".join(sys.argv[1:]))
     except t2.T2Error as error:
         sys.exit(f"{type(error).__name__}: {error}")
