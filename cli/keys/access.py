@@ -59,7 +59,9 @@ COMMANDS: Mapping[str, Sequence[keys.Topic[Any]]] = {  # besides the emergency s
     "driver": (keys.DRIVE, keys.LIMIT),
     "device": (keys.LIMIT, keys.FIX),
 }
-PROGRAMS_CALLS = (keys.SET_LED, keys.SET_POSE)  # without an operator's source
+READERS_CALLS = (keys.ROUTES, keys.ROUNDS)  # of every robot, as its messages
+# Without an operator's source.
+PROGRAMS_CALLS = (keys.SET_LED, keys.SET_POSE, keys.TEACH, keys.ROUND)
 ROS_TWISTS = ("TwistStamped", "Twist")
 ROS_CALLS = ("hardware/e_stop_trigger", "hardware/e_stop_reset")
 ROS_TOKENS = (7, 11, 12)  # chunks after the domain: of a node, an endpoint, one with backends
@@ -141,7 +143,11 @@ def laptop(member: Profile) -> Rights:
         "read": EVERYTHING,
         "know": (EVERY_KEY, KEPT),
         "recall": (*RECALLED, EVERY_APP),
-        "ask": (*QUERYABLE, *(call.on(each) for each in robots for call in calls)),
+        "ask": (
+            *QUERYABLE,
+            *(call.on(ANY) for call in READERS_CALLS),
+            *(call.on(each) for each in robots for call in calls),
+        ),
         "write": (*own["write"], *apps, *commands, *map(keys.estop_key, robots)),
         "serve": (*own["serve"], *apps),
         "live": (*own["live"], *apps),

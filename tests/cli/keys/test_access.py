@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from cli.keys.access import (
     LAPTOP_SERVICES,
+    READERS_CALLS,
     RouterSettings,
     Verb,
     access_control,
@@ -26,7 +27,7 @@ from tools.rights_table import MINE, OTHER, ROLES, may
 
 UNTIL = datetime(2030, 1, 1, tzinfo=UTC)
 ROUTER = RouterSettings(robot=MINE)
-ON_BOARD = ("bridge", "safety", "odom", "recorder")
+ON_BOARD = ("bridge", "safety", "odom", "localization", "patrol", "recorder")
 
 
 def member(role: Role, name: str = "anna", robots: tuple[str, ...] = ()) -> Member:
@@ -39,9 +40,23 @@ DRIVE, LIMIT = keys.DRIVE, keys.LIMIT
 MEMBERS = ("viewer", "driver of 001", "device lidar of 001", "fleet")
 
 
-def test_no_member_may_write_motion_commands() -> None:
-    able = {role for role, given in ROLES.items() if may(given, "write", keys.MOTION.on(MINE))}
+@pytest.mark.parametrize("topic", [keys.MOTION, keys.MAP_POSE, keys.PATROL])
+def test_no_member_may_write_what_services_decide(topic: keys.Topic[Any]) -> None:
+    able = {role for role, given in ROLES.items() if may(given, "write", topic.on(MINE))}
     assert able == {"router of 001"}
+
+
+@pytest.mark.parametrize("role", MEMBERS)
+@pytest.mark.parametrize("robot", [MINE, OTHER])
+def test_a_member_may_read_routes_and_rounds_of_each_robot(role: str, robot: str) -> None:
+    for call in READERS_CALLS:
+        assert may(ROLES[role], "ask", call.on(robot))
+
+
+@pytest.mark.parametrize("call", [keys.TEACH, keys.ROUND])
+def test_only_drivers_of_a_robot_may_call_its_patrol(call: keys.Call[Any, Any]) -> None:
+    able = {role for role, given in ROLES.items() if may(given, "ask", call.on(MINE))}
+    assert able == {"driver of 001", "driver of 001 as nav", "site's router"}
 
 
 @pytest.mark.parametrize(
@@ -53,9 +68,10 @@ def test_a_driver_is_limited_to_its_sources(sources: tuple[str, ...], resets: bo
     """Of its robots; only an operator's source may reset, each may stop."""
     given = rights(replace(member("driver", "bo", (MINE,)), sources=sources), ROUTER)
     assert not may(given, "write", keys.estop_key(OTHER))
-    assert not any(may(given, "ask", call.on(OTHER)) for call in keys.CALLS)
+    assert {call for call in keys.CALLS if may(given, "ask", call.on(OTHER))} == {*READERS_CALLS}
     for call in keys.CALLS:
-        assert may(given, "ask", call.on(MINE)) is (resets or call in (keys.SET_LED, keys.SET_POSE))
+        is_open = call in (*READERS_CALLS, keys.SET_LED, keys.SET_POSE, keys.TEACH, keys.ROUND)
+        assert may(given, "ask", call.on(MINE)) is (resets or is_open)
     for source in ("nav", "ros2", "teleop", "web", "pendant", "*"):
         for topic in (DRIVE, LIMIT):
             assert may(given, "write", topic.on(MINE, source=source)) is (source in sources)
@@ -76,7 +92,7 @@ def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> Non
         keys.estop_key(OTHER),
     ):
         assert not may(given, "write", key), key
-    assert not any(may(given, "ask", call.on(MINE)) for call in keys.CALLS)
+    assert {call for call in keys.CALLS if may(given, "ask", call.on(MINE))} == {*READERS_CALLS}
     assert not may(ROLES["driver of 001"], "write", LIMIT.on(MINE, source="lidar"))
     assert may(ROLES["site's router"], "write", LIMIT.on(OTHER, source="person"))
 
