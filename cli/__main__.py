@@ -26,6 +26,10 @@ GROUPS = {
         "sim": ("sim.__main__", "the simulated vehicle alone"),
         "ros2": ("services.ros2.__main__", "the gateway to ROS 2: topics, services and cmd_vel"),
     },
+    "Patrol": {
+        "routes": ("cli.patrol.routes", "teach, show, change and delete routes"),
+        "rounds": ("cli.patrol.rounds", "start and end rounds on routes; their list and reports"),
+    },
     "Inspect": {
         "doctor": ("cli.inspect.doctor", "diagnose the path from this laptop to the wheels"),
         "robots": ("cli.inspect.robots", "the robots on the bus: verdict, driver, reason"),

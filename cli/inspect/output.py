@@ -26,9 +26,14 @@ def warn(text: str) -> None:
     print(printable(text, "\n"), file=sys.stderr)
 
 
+def text(words: str) -> None:
+    """Print a text of the bus."""
+    print(printable(words, "\n"), flush=True)
+
+
 def value(thing: Any, *, as_json: bool) -> None:
     """Print a value as one JSON line, or as lines ``name: value``."""
-    line(thing) if as_json else print(printable(fields(thing), "\n"), flush=True)
+    line(thing) if as_json else text(fields(thing))
 
 
 def rows(things: Sequence[Mapping[str, Any]], *, as_json: bool) -> None:
@@ -72,25 +77,29 @@ def plain(thing: Any) -> Any:
             return str(thing)
 
 
+def width(text: str) -> int:
+    """Return the columns of a terminal that a text takes: a Chinese character takes two."""
+    return len(text) + sum(unicodedata.east_asian_width(char) in "WF" for char in text)
+
+
 def padded(text: str, columns: int) -> str:
-    """Return a text in so many columns of a terminal; a Chinese character takes two."""
-    wide = sum(unicodedata.east_asian_width(char) in "WF" for char in text)
-    return text + " " * (columns - len(text) - wide)
+    """Return a text in so many columns of a terminal."""
+    return text + " " * (columns - width(text))
 
 
 def table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
     """Return aligned columns; columns with only numbers are right-aligned."""
     body = [[printable(cell) for cell in row] for row in body]
     columns = list(zip(head, *body, strict=True))
-    widths = [max(map(len, column)) for column in columns]
+    widths = [max(map(width, column)) for column in columns]
     right = [
         bool(body) and not any(cell.strip("-+.,0123456789e") for cell in column[1:])
         for column in columns
     ]
     return "\n".join(
         "  ".join(
-            cell.rjust(width) if to_right else cell.ljust(width)
-            for cell, width, to_right in zip(row, widths, right, strict=True)
+            cell.rjust(size) if to_right else padded(cell, size)
+            for cell, size, to_right in zip(row, widths, right, strict=True)
         ).rstrip()
         for row in (head, *body)
     )

@@ -103,10 +103,10 @@ def _plan(frame: str, path: Sequence[PathSegment], begins: str) -> zp.Graph:
     for number, segment in enumerate(path):
         xs, ys = downsampled(segment.xs, segment.ys)
         graph.add(zp.PolyLine(xs, ys).color(MEASURED).strokewidth(1.6))
-        _mark(graph, (xs[0], ys[0]), "round", "start" if number == 0 else begins)
+        mark(graph, (xs[0], ys[0]), "round", "start" if number == 0 else begins)
         if number == len(path) - 1:
-            _mark(graph, (xs[-1], ys[-1]), "square", "end")
-    _fit(graph, path)
+            mark(graph, (xs[-1], ys[-1]), "square", "end")
+    fit(graph, [x for each in path for x in each.xs], [y for each in path for y in each.ys])
     return graph
 
 
@@ -223,19 +223,14 @@ def _span(graph: zp.Graph, begins_s: float, ends_s: float, color: str) -> None:
     graph.add(span.fill(color).color("none"))
 
 
-def _mark(graph: zp.Graph, place: tuple[float, float], shape: MarkerTypes, label: str) -> None:
+def mark(graph: zp.Graph, place: tuple[float, float], shape: MarkerTypes, label: str) -> None:
+    """Add a point with its name."""
     graph.add(zp.Point(place).marker(shape, 4).label(label).color(TEXT))
 
 
-def _fit(graph: zp.Graph, path: Sequence[PathSegment]) -> None:
-    """Show the whole path in a frame of ``PATH_ASPECT``, with equal scales."""
-    (left, right), (bottom, top) = (
-        (min(values), max(values))
-        for values in (
-            [x for segment in path for x in segment.xs],
-            [y for segment in path for y in segment.ys],
-        )
-    )
+def fit(graph: zp.Graph, xs: Sequence[float], ys: Sequence[float]) -> None:
+    """Show a whole path in a frame of ``PATH_ASPECT``, with equal scales."""
+    left, right, bottom, top = min(xs), max(xs), min(ys), max(ys)
     height = 1.1 * max((right - left) / PATH_ASPECT, top - bottom, 0.1)
     width = PATH_ASPECT * height
     graph.xrange((left + right - width) / 2, (left + right + width) / 2)

@@ -82,7 +82,7 @@ class Store:
 
     def save_route(self, route: m.Route) -> None:
         """Write a route."""
-        _replace(self._route_file(route.name), _text(route))
+        _replace(self._route_file(route.name), route_text(route))
 
     def delete_route(self, name: str) -> None:
         """Remove a route."""
@@ -217,7 +217,7 @@ def _summary(name: str, found: m.Route | Phrase) -> m.RouteSummary:
     return m.RouteSummary(name=name, length=length(found), stations=stations(found)[:STATIONS])
 
 
-def _text(route: m.Route) -> bytes:
+def route_text(route: m.Route) -> bytes:
     """Return the file of a route: a line for each field and each point."""
     fields = {key: value for key, value in asdict(route).items() if key != "points"}
     lines = [f" {quoted(key)}: {quoted(value)}," for key, value in fields.items()]

@@ -1,0 +1,1 @@
+"""Tests of t2 fit."""
