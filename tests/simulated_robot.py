@@ -8,6 +8,7 @@ each time.
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
@@ -26,6 +27,8 @@ from common.freshness import NS_PER_S
 from common.settings import Vehicle
 from services.localization.config import FixSource, Localization, LocalizationConfig
 from services.localization.localization import LocalizationService
+from services.patrol.config import Patrol, PatrolConfig
+from services.patrol.patrol import PatrolService
 from sim.config import load_plan
 from t2 import keys
 from t2 import messages as m
@@ -36,7 +39,13 @@ from verification.search.stack import Stack
 ENCODE = msgspec.msgpack.encode
 TICK_MS = 10
 TAGS = Localization(sources={"tags": FixSource()})
-CALLS = {call.on(ROBOT): call for call in (keys.RESET, keys.SET_POSE, keys.SET_LED, keys.PLACE)}
+CALLS = {
+    call.on(ROBOT): call
+    for call in (
+        keys.RESET, keys.SET_POSE, keys.SET_LED, keys.PLACE,
+        keys.TEACH, keys.ROUTES, keys.ROUND, keys.ROUNDS,
+    )
+}  # fmt: skip
 MODULES = (
     cli.demo.lap, t2.drive, t2.publisher, t2.robot, t2.stream, t2.third_party,
     verification.harness.waiting,
@@ -165,7 +174,8 @@ class SimulatedCondition:
 class SimulatedStack(Stack):
     """The stack in a world, with the shipped settings of the vehicle."""
 
-    def __init__(self, world: str = "office") -> None:
+    def __init__(self, world: str = "office", folder: Path | None = None) -> None:
+        """With a ``folder`` of its own patrol runs, too."""
         super().__init__(plan=load_plan(world, Vehicle()), step_ns=TICK_MS * MS)
         self.clock = SimulatedTime(self)
         self.library = self.process("sdk")
@@ -174,6 +184,12 @@ class SimulatedStack(Stack):
         with self.time():
             LocalizationService(localization)
         self.processes["localization"] = localization
+        if folder is not None:
+            patrol: Any = self.process("patrol")
+            patrol.config = PatrolConfig(patrol=Patrol(folder=str(folder)))
+            with self.time():
+                PatrolService(patrol)
+            self.processes["patrol"] = patrol
         self.answers: list[bool] = []  # to resets
 
     def suspend(self, duration_ms: int) -> None:

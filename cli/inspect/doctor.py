@@ -184,7 +184,8 @@ def observe(opened: Inspector, bus: BusSettings, robot: str, seconds: float) -> 
         seen.sources, seen.limits = (as_source(opened, robot, topic) for topic in SOURCES)
         seen.calls = [
             each.path.removeprefix("srv/") for each in keys.CALLS
-            if each.server in seen.instances and opened.has_server(each.on(robot))
+            if each not in keys.READING_CALLS
+            and each.server in seen.instances and opened.has_server(each.on(robot))
         ]  # fmt: skip
         is_fleet = common_name(bus).startswith("fleet.")  # it may stop, and nothing else
         seen.may_stop = is_fleet or bool(seen.sources) or not is_barred(opened, robot)

@@ -59,7 +59,6 @@ COMMANDS: Mapping[str, Sequence[keys.Topic[Any]]] = {  # besides the emergency s
     "driver": (keys.DRIVE, keys.LIMIT),
     "device": (keys.LIMIT, keys.FIX),
 }
-READERS_CALLS = (keys.ROUTES, keys.ROUNDS)  # of every robot, as its messages
 # Without an operator's source.
 PROGRAMS_CALLS = (keys.SET_LED, keys.SET_POSE, keys.TEACH, keys.ROUND)
 ROS_TWISTS = ("TwistStamped", "Twist")
@@ -145,7 +144,7 @@ def laptop(member: Profile) -> Rights:
         "recall": (*RECALLED, EVERY_APP),
         "ask": (
             *QUERYABLE,
-            *(call.on(ANY) for call in READERS_CALLS),
+            *(call.on(ANY) for call in keys.READING_CALLS),
             *(call.on(each) for each in robots for call in calls),
         ),
         "write": (*own["write"], *apps, *commands, *map(keys.estop_key, robots)),

@@ -15,6 +15,7 @@ from t2 import messages as messages
 
 if TYPE_CHECKING:
     from t2.aio import AsyncDrive as AsyncDrive
+    from t2.aio import AsyncPatrol as AsyncPatrol
     from t2.aio import AsyncRobot as AsyncRobot
     from t2.aio import AsyncStream as AsyncStream
     from t2.aio import aconnect as aconnect
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from t2.errors import Refused as Refused
     from t2.errors import Stopped as Stopped
     from t2.errors import T2Error as T2Error
+    from t2.patrol import Patrol as Patrol
     from t2.recording import Recording as Recording
     from t2.robot import Robot as Robot
     from t2.simulator import SimulatedRobot as SimulatedRobot
@@ -49,13 +51,14 @@ __version__: str = messages.VERSION
 
 # By module: what it exports here.
 _EXPORTS = {
-    "aio": ("AsyncDrive", "AsyncRobot", "AsyncStream", "aconnect"),
+    "aio": ("AsyncDrive", "AsyncPatrol", "AsyncRobot", "AsyncStream", "aconnect"),
     "connection": ("connect", "robots"),
     "drive": ("Drive",),
     "errors": (
         "Blocked", "Incompatible", "Latched", "Late", "LinkError", "Lost", "NoData",
         "NotAllowed", "NotConfirmed", "Overruled", "PoseSet", "Refused", "Stopped", "T2Error",
     ),
+    "patrol": ("Patrol",),
     "recording": ("Recording",),
     "robot": ("Robot",),
     "simulator": ("SimulatedRobot", "Simulator", "sim"),

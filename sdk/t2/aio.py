@@ -20,11 +20,13 @@ from t2.messages import (
     Message,
     Mileage,
     Odometry,
+    PatrolState,
     SafetyState,
     Switches,
     Ultrasonic,
     Velocity,
 )
+from t2.patrol import Patrol
 from t2.robot import Robot
 from t2.stream import Stream, Subscription
 
@@ -253,6 +255,74 @@ class AsyncDrive:
             raise
 
 
+class AsyncPatrol(AsyncStream[PatrolState]):
+    """A ``Patrol`` for asyncio.
+
+    >>> async def main():
+    ...     async with t2.aconnect("001", endpoint=ENDPOINT) as robot:
+    ...         print((await robot.patrol.latest(timeout=5.0)).state, await robot.patrol.routes())
+    >>> asyncio.run(main())
+    idle ()
+    """
+
+    twin: Patrol
+
+    def __init__(self, twin: Patrol) -> None:
+        super().__init__(twin)
+
+    @awaited(Patrol.start)
+    def start(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.depart)
+    def depart(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.pause)
+    def pause(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.resume)
+    def resume(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.go_home)
+    def go_home(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.abort)
+    def abort(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.rounds)
+    def rounds(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.round)
+    def round(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.routes)
+    def routes(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.route)
+    def route(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.save)
+    def save(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.delete)
+    def delete(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.teach)
+    def teach(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.station)
+    def station(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.end)
+    def end(self) -> None: ...  # noqa: D102
+
+    @awaited(Patrol.cancel)
+    def cancel(self) -> None: ...  # noqa: D102
+
+    async def run(self, call: Callable[[], R]) -> R:
+        """Wait for a call of the twin."""
+        return await asyncio.to_thread(call)
+
+
 class AsyncRobot:
     """A ``Robot`` for asyncio, from ``aconnect``; ``twin`` is the robot itself.
 
@@ -281,6 +351,7 @@ class AsyncRobot:
         self.switches: AsyncStream[Switches] = AsyncStream(twin.switches)
         self.link: AsyncStream[Link] = AsyncStream(twin.link)
         self.events: AsyncStream[Event] = AsyncStream(twin.events)
+        self.patrol: AsyncPatrol = AsyncPatrol(twin.patrol)
 
     @property
     def version(self) -> Coroutine[Any, Any, str]:

@@ -171,6 +171,8 @@ CALLS: tuple[Call[Struct, Struct], ...] = (
     SET_SWITCHES, SET_LED, RESET, SET_POSE, PLACE, TEACH, ROUTES, ROUND, ROUNDS,
 )  # type: ignore[assignment]  # fmt: skip
 
+READING_CALLS = (ROUTES, ROUNDS)  # they change nothing
+
 
 def estop_key(robot: str) -> str:
     """Return the key that stops one robot, or all for ``*``."""

@@ -34,6 +34,7 @@ from t2.errors import (
     T2Error,
 )
 from t2.motion import check_word, finite
+from t2.patrol import Patrol
 from t2.publisher import PERIOD_S, DrivePublisher, FixPublisher
 from t2.stream import LIVE_S, Stream, check_process, now_s, stack_version
 from t2.third_party import Keepalive, SpeedLimit
@@ -115,6 +116,8 @@ class Robot:
         self.events: Stream[m.Event] = self._stream(
             "events", keys.EVENTS, EVENTS_DEPTH, service="*"
         )
+        self.patrol: Patrol = Patrol(session, name, self.safety, self._call)
+        self._streams.append(self.patrol)
         OPEN.add(self)
         if ending.is_set():
             self.close()

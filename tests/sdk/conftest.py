@@ -1,6 +1,7 @@
 """Fixtures of the client library: a real stack for all tests, and a simulated one for each."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -26,9 +27,9 @@ def robot(stack: RunningStack) -> Iterator[t2.Robot]:
 
 
 @pytest.fixture
-def simulated_stack() -> Iterator[SimulatedStack]:
+def simulated_stack(tmp_path: Path) -> Iterator[SimulatedStack]:
     """Yield a stack in simulated time; its oracle has nothing to object to."""
-    stack = SimulatedStack("empty")
+    stack = SimulatedStack("empty", tmp_path)
     yield stack
     assert stack.oracle.violations == []
 

@@ -13,7 +13,7 @@ from tests.simulated_robot import SimulatedStack
 from verification.harness.stack import RunningStack
 
 CONNECTING = "aio", "connection"
-MODULES = "drive", "recording", "robot", "simulator", "stream", "third_party"
+MODULES = "drive", "patrol", "recording", "robot", "simulator", "stream", "third_party"
 
 
 def examples(*modules: str) -> dict[str, doctest.DocTest]:

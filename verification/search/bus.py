@@ -181,6 +181,8 @@ class Watch(Protocol):
 class Publisher:
     """Stamps messages as the real one does."""
 
+    passed_on = True  # there is a reader
+
     def __init__(self, process: "Process", key: str, private: bool) -> None:
         self._key = key
         self._process = process

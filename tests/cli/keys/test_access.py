@@ -10,7 +10,6 @@ from msgspec.structs import replace
 
 from cli.keys.access import (
     LAPTOP_SERVICES,
-    READERS_CALLS,
     RouterSettings,
     Verb,
     access_control,
@@ -49,7 +48,7 @@ def test_no_member_may_write_what_services_decide(topic: keys.Topic[Any]) -> Non
 @pytest.mark.parametrize("role", MEMBERS)
 @pytest.mark.parametrize("robot", [MINE, OTHER])
 def test_a_member_may_read_routes_and_rounds_of_each_robot(role: str, robot: str) -> None:
-    for call in READERS_CALLS:
+    for call in keys.READING_CALLS:
         assert may(ROLES[role], "ask", call.on(robot))
 
 
@@ -68,9 +67,11 @@ def test_a_driver_is_limited_to_its_sources(sources: tuple[str, ...], resets: bo
     """Of its robots; only an operator's source may reset, each may stop."""
     given = rights(replace(member("driver", "bo", (MINE,)), sources=sources), ROUTER)
     assert not may(given, "write", keys.estop_key(OTHER))
-    assert {call for call in keys.CALLS if may(given, "ask", call.on(OTHER))} == {*READERS_CALLS}
+    assert {call for call in keys.CALLS if may(given, "ask", call.on(OTHER))} == {
+        *keys.READING_CALLS
+    }
     for call in keys.CALLS:
-        is_open = call in (*READERS_CALLS, keys.SET_LED, keys.SET_POSE, keys.TEACH, keys.ROUND)
+        is_open = call in (*keys.READING_CALLS, keys.SET_LED, keys.SET_POSE, keys.TEACH, keys.ROUND)
         assert may(given, "ask", call.on(MINE)) is (resets or is_open)
     for source in ("nav", "ros2", "teleop", "web", "pendant", "*"):
         for topic in (DRIVE, LIMIT):
@@ -92,7 +93,9 @@ def test_a_device_is_limited_to_its_robots_and_sources_and_cannot_drive() -> Non
         keys.estop_key(OTHER),
     ):
         assert not may(given, "write", key), key
-    assert {call for call in keys.CALLS if may(given, "ask", call.on(MINE))} == {*READERS_CALLS}
+    assert {call for call in keys.CALLS if may(given, "ask", call.on(MINE))} == {
+        *keys.READING_CALLS
+    }
     assert not may(ROLES["driver of 001"], "write", LIMIT.on(MINE, source="lidar"))
     assert may(ROLES["site's router"], "write", LIMIT.on(OTHER, source="person"))
 
