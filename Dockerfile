@@ -21,6 +21,7 @@ COPY --from=build --chown=10001:10001 /opt/empty /run/t2
 # Copied subfolders keep their mode; bridge and safety need 700.
 COPY --from=build --chown=10001:10001 /opt/private /run
 COPY --from=build --chown=10001:10001 /opt/empty /recordings
+COPY --from=build --chown=10001:10001 /opt/empty /patrol
 ENV PATH=/opt/venv/bin HOME=/tmp LANG=C.UTF-8 PYTHONUNBUFFERED=1
 USER 10001:10001
 ENTRYPOINT ["python", "-m"]

@@ -14,7 +14,18 @@ from common.root_cause import FROM_LINK
 from services.localization.core.fixes import AGREEING
 from t2 import keys
 from t2.catalogue import CAUSES, NOTHING
-from t2.messages import Cause, Field, FixState, Health, Link, MapPose, Phrase, Relay, SafetyState
+from t2.messages import (
+    Cause,
+    Field,
+    FixState,
+    Health,
+    Link,
+    MapPose,
+    PatrolState,
+    Phrase,
+    Relay,
+    SafetyState,
+)
 
 STREAMS = (keys.VELOCITY, keys.MILEAGE, keys.BUMPER, keys.ULTRASONIC, keys.ODOMETRY)
 # Safety's causes that follow from a stream that is not sent.
@@ -52,6 +63,8 @@ class Observation:
     healths: dict[str, Health] = field(default_factory=dict)  # the newest by service
     links: list[Link] = field(default_factory=list)
     pose: MapPose | None = None  # the newest
+    patrol: PatrolState | None = None  # the newest
+    obeys_patrol: bool | None = None  # whether safety has the source; None if unknown
     state: SafetyState | None = None  # the newest
 
     def is_absent(self, service: str) -> bool:
@@ -83,6 +96,7 @@ def diagnose(seen: Observation, robot: str) -> Iterator[Finding]:
         yield from check(seen)
     yield from board(seen)
     yield from localization(seen)
+    yield from patrol(seen)
     if seen.is_absent("bridge") or any(link.state != "up" for link in seen.links[-1:]):
         yield from safety(seen, FROM_LINK)
     else:
@@ -291,6 +305,20 @@ def _fixes(of: FixState, pose: MapPose) -> Finding:
     refused = Phrase(f"{PREFIX}map.refused", {"count": of.in_a_row, **name})
     phrases = refused, *said(of.phrases, of.text)
     return Finding("map", "wrong" if is_faulty else "note", "map.refused", phrases)
+
+
+def patrol(seen: Observation) -> Iterator[Finding]:
+    """Report a round that needs a person; a robot that drives no rounds needs no patrol."""
+    state = seen.patrol
+    if state is None:
+        return
+    if seen.obeys_patrol is False:
+        yield found("patrol", "note", "patrol.unknown_source", "patrol_source")
+    text = said(state.phrases, state.text)
+    if state.state == "stopped":
+        yield Finding("patrol", "wrong", "patrol.stopped", text)
+    elif state.state == "waiting" and state.left == 0.0:  # the patience is over
+        yield Finding("patrol", "note", "patrol.blocked", text)
 
 
 def safety(seen: Observation, following: Container[str] = ()) -> Iterator[Finding]:

@@ -35,7 +35,7 @@ from t2 import keys
 from t2.codec import Sample
 from t2.errors import LinkError, MessageError
 from t2.keys import Topic
-from t2.messages import Field, Health, Link, MapPose, Phrase, SafetyState
+from t2.messages import Field, Health, Link, MapPose, PatrolState, Phrase, SafetyState
 from t2.text_file import pem_problem
 from t2.words import Language, in_language
 
@@ -187,6 +187,8 @@ def observe(opened: Inspector, bus: BusSettings, robot: str, seconds: float) -> 
             if each not in keys.READING_CALLS
             and each.server in seen.instances and opened.has_server(each.on(robot))
         ]  # fmt: skip
+        if "patrol" in seen.instances and (names := configured(opened, robot, "safety.sources")):
+            seen.obeys_patrol = "patrol" in names
         is_fleet = common_name(bus).startswith("fleet.")  # it may stop, and nothing else
         seen.may_stop = is_fleet or bool(seen.sources) or not is_barred(opened, robot)
     for sample in opened.queued():  # the queries take seconds: judge what has arrived meanwhile
@@ -197,16 +199,20 @@ def observe(opened: Inspector, bus: BusSettings, robot: str, seconds: float) -> 
 def as_source(opened: Inspector, robot: str, topic: Topic[Any]) -> list[str]:
     """Return the sources of safety's settings as which this certificate may publish."""
     table, usual = SOURCES[topic]
-    names = {*usual}
-    for answer in opened.query(keys.info_key(robot, "safety", "config")):
-        if not answer.refusal:
-            names |= {
-                path.split(".")[2]
-                for path in msgspec.json.decode(answer.payload, type=dict[str, Any])
-                if path.startswith(f"{table}.")
-            }
+    names = {*usual} | configured(opened, robot, table)
     by_key = {topic.on(robot, source=name): name for name in names}
     return sorted(by_key[key] for key in opened.readers(by_key))
+
+
+def configured(opened: Inspector, robot: str, table: str) -> set[str]:
+    """Return the names of a table in safety's settings; none without an answer."""
+    return {
+        path.split(".")[2]
+        for answer in opened.query(keys.info_key(robot, "safety", "config"))
+        if not answer.refusal
+        for path in msgspec.json.decode(answer.payload, type=dict[str, Any])
+        if path.startswith(f"{table}.")
+    }
 
 
 def listen(opened: Inspector, robot: str, seconds: float, seen: Observation) -> None:
@@ -219,6 +225,9 @@ def listen(opened: Inspector, robot: str, seconds: float, seen: Observation) -> 
             counts[chunks(sample.key)[1]] += 1
             add_sample(sample, seen)
     seen.rates = {path: count / seconds for path, count in counts.items()}
+
+
+NEWEST = {MapPose: "pose", PatrolState: "patrol", SafetyState: "state"}  # fields of the observation
 
 
 def add_sample(sample: Sample, seen: Observation) -> None:
@@ -238,10 +247,8 @@ def add_sample(sample: Sample, seen: Observation) -> None:
             seen.healths[message.service] = message
         case Link():
             seen.links.append(message)
-        case MapPose():
-            seen.pose = message
-        case SafetyState():
-            seen.state = message
+        case MapPose() | PatrolState() | SafetyState():
+            setattr(seen, NEWEST[type(message)], message)
 
 
 def as_json(one: Finding) -> dict[str, str]:

@@ -146,6 +146,11 @@ FINDINGS: dict[str, Words] = {
     "map.refused": (
         "{source}: {count} fixes in a row refused:", "{source}：连续 {count} 次定位修正被拒绝：",
     ),
+    # patrol
+    "patrol.unknown_source": (
+        "safety does not obey the source patrol: no round can move the vehicle",
+        "安全服务不接受请求源 patrol：巡逻无法移动车辆",
+    ),
     # safety
     "safety.no_state": ("safety publishes no state", "安全服务不发布状态"),
     "safety.follows": ("follows from the above:", "由上述原因引起："),
@@ -284,6 +289,10 @@ REMEDIES: dict[str, Words] = {
         "is its program running, and `t2 hz @cmd/fix/{source}` above 0? A source may be out of sight",
         "请确认其程序在运行，且 `t2 hz @cmd/fix/{source}` 大于 0；定位来源也可能不在视野内",
     ),
+    "patrol_source": (
+        "restart the stack with --config config/patrol.toml, which adds it to safety.sources",
+        "请以 --config config/patrol.toml 重启服务，该文件将其加入 safety.sources",
+    ),
     "by_hand": ("push the vehicle off by hand; then reset", "请用手推开车辆，然后复位"),
 }  # fmt: skip
 
@@ -306,6 +315,7 @@ PLACES: dict[str, Words] = {
     "link": ("link", "主控板"),
     "streams": ("streams", "数据流"),
     "map": ("map", "地图"),
+    "patrol": ("patrol", "巡逻"),
     "safety": ("safety", "安全"),
 }
 MARKS: dict[Level, Words] = {

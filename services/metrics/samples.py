@@ -15,15 +15,18 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from common.pose import Covariance
 from services.metrics.robot import RobotState
 from t2 import keys
-from t2.messages import Durations, LinkState, MapPose, MapState, Message, Verdict
+from t2.messages import Durations, LinkState, MapPose, MapState, Message, RoundState, Verdict
 
 STREAMS: dict[str, keys.Topic[Any]] = {
     "safety": keys.SAFETY,
     "link": keys.LINK,
     "odometry": keys.ODOMETRY,
     "localization": keys.MAP_POSE,
+    "patrol": keys.PATROL,
 }
 UNITS = {
+    "progress": "_meters", "length": "_meters", "deviation": "_meters", "sigma": "_meters",
+    "corridor": "_meters",
     "x": "_meters", "y": "_meters", "residual": "_meters", "heading": "_radians",
     "linear": "_meters_per_second", "forward": "_meters_per_second",
     "backward": "_meters_per_second", "angular": "_radians_per_second",
@@ -35,6 +38,7 @@ WORDS = {
     "t2_link_state": get_args(LinkState),
     "t2_link_relay_state": get_args(LinkState),
     "t2_localization_state": get_args(MapState),
+    "t2_patrol_state": get_args(RoundState),
     "t2_safety_verdict": get_args(Verdict),
 }
 # Sentences, ids and times that say nothing as a number; matrices; labels.
@@ -42,6 +46,7 @@ OMITTED = {
     *Message.__struct_fields__, "text", "waiting", "release_refusal", "heartbeat", "latched_by",
     "estop", "ports", "frame_id", "child_frame_id", "pose_covariance", "twist_covariance",
     "service", "limit_sources", "odom", "odom_boot", "odom_seq", "placement", "sources",
+    "actions", "round", "route", "station", "teaching", "next",
 }  # fmt: skip
 # Metrics that are no fields of messages.
 METRICS = {

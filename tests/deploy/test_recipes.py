@@ -22,10 +22,11 @@ ROOT = Path(__file__).parents[2]
 ZENOHD, TLS = "deploy/compose/zenohd.yaml", "deploy/compose/tls.yaml"
 REALTIME = "deploy/compose/realtime.yaml"
 CHAIN = {"router", "bridge", "safety"}
-OF_T2 = CHAIN | {"odom", "localization", "recorder", "dashboard"}
+OF_T2 = CHAIN | {"odom", "localization", "patrol", "recorder", "dashboard"}
 # Services with a profile.
 OPTIONAL = {"sim": "sim", "laptop": "laptop", "ros2": "ros2", "router-settings": "zenohd"}
-HOST_NETWORK, NO_NETWORK = {"bridge", "sim"}, {"safety", "odom", "localization", "recorder"}
+HOST_NETWORK = {"bridge", "sim"}
+NO_NETWORK = {"safety", "odom", "localization", "patrol", "recorder"}
 ISOLATED = (  # each container
     "\n    read_only: true\n", "\n    init: true\n", "\n    cap_drop:\n +- ALL\n",
     "no-new-privileges:true", " cpus(et)?: ", " mem_limit: ", " memswap_limit: ", " pids_limit: ",

@@ -14,6 +14,7 @@ NOW_NS = 1_000_000 * NS_PER_S  # any time but zero
 SAFETY, LINK, ODOMETRY = "tel/safety/state", "tel/bridge/link", "tel/odom/odometry"
 SERVICES = "bridge", "safety", "odom", "recorder"
 MAP_POSE = "tel/localization/pose"
+PATROL = "tel/patrol/state"
 Values = dict[tuple[str, frozenset[tuple[str, str]]], float]
 
 
@@ -25,6 +26,12 @@ def safety(*latched: Any, **fields: Any) -> m.SafetyState:
     causes = tuple(m.Cause(name=name, action="brake", age=1.0, text=name) for name in latched)
     verdict = "brake" if latched else "run"
     return factories.safety_state(verdict=verdict, latched=latched, causes=causes, **fields)
+
+
+def patrol(state: m.RoundState) -> m.PatrolState:
+    return m.PatrolState(
+        state=state, text="", round="1", route="yard", progress=3.0, deviation=0.2, sigma=0.1
+    )
 
 
 def event(name: Any) -> m.Event:

@@ -9,7 +9,7 @@ import pytest
 
 from services.metrics.samples import metric_families
 from tests.factories import health
-from tests.metrics.robots import NOW_NS, SAFETY, safety, whole
+from tests.metrics.robots import NOW_NS, PATROL, SAFETY, patrol, safety, whole
 
 FOLDER = Path(__file__).parent.parent.parent / "deploy" / "prometheus"
 ALERTS = FOLDER / "alerts.yml"
@@ -19,6 +19,7 @@ PARTS = ("", "_total")
 def test_alerts_use_existing_metrics() -> None:
     robot = whole()
     robot.on_message(SAFETY, safety("estop"), NOW_NS)
+    robot.on_message(PATROL, patrol("stopped"), NOW_NS)
     robot.on_message("tel/bridge/health", health(counters={"overrun": 1}), NOW_NS)
     families = metric_families({"007": robot}, NOW_NS, connected=True)
     exported = {family.name + part for family in families for part in PARTS}

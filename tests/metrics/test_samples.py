@@ -1,10 +1,12 @@
 """Exported samples: names, labels and freshness."""
 
 import re
+from typing import get_args
 
 from common.freshness import NS_PER_S
 from services.metrics.robot import FRESH_S, RobotState
 from services.metrics.samples import metric_families
+from t2 import messages as m
 from t2.messages import Durations
 from tests.factories import fix_state, health, map_pose, odometry
 from tests.metrics.robots import (
@@ -12,12 +14,14 @@ from tests.metrics.robots import (
     MAP_POSE,
     NOW_NS,
     ODOMETRY,
+    PATROL,
     SAFETY,
     Values,
     event,
     flat,
     link,
     names,
+    patrol,
     safety,
     whole,
 )
@@ -62,6 +66,18 @@ def test_words_of_a_fixed_set_are_one_or_zero_and_others_are_one_while_they_hold
     assert of_name(found, "t2_safety_latched") == {"contact": 1, "estop": 1}
     robot.on_message(SAFETY, safety("limit", "limit"), NOW_NS)  # listed twice
     assert of_name(values(robot), "t2_safety_causes") == {"limit": 1}
+
+
+def test_a_round() -> None:
+    robot = whole()
+    robot.on_message(PATROL, patrol("stopped"), NOW_NS)
+    found = values(robot)
+    states = of_name(found, "t2_patrol_state")
+    assert {name for name, number in states.items() if number} == {"stopped"}
+    assert set(states) == {*get_args(m.RoundState)}
+    for name, number in (("progress", 3.0), ("deviation", 0.2), ("sigma", 0.1)):
+        assert value(found, f"t2_patrol_{name}_meters") == number
+    assert not {"t2_patrol_route", "t2_patrol_round", "t2_patrol_actions"} & names(found)
 
 
 def test_the_pose_in_the_map_and_its_uncertainty() -> None:

@@ -19,7 +19,7 @@ from verification.system.frame import ROOT, Container, Vehicle, attempt, run
 
 OVERLAYS = ("compose.yaml", "deploy/compose/tls.yaml")
 CHAIN = ("router", "bridge", "safety")
-HEALTHY = (*CHAIN, "odom", "localization", "recorder", "dashboard")  # have a health check
+HEALTHY = (*CHAIN, "odom", "localization", "patrol", "recorder", "dashboard")  # have a health check
 SERVICES = (*HEALTHY, "sim")
 USER, ROBOT_MB = 10001, 120.0
 TOOLS = ("sh", "bash", "busybox", "apt", "dpkg", "pip", "perl")

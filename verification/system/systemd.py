@@ -23,7 +23,7 @@ from verification.system.frame import (
 
 UNITS = [
     f"t2-{name}.service"
-    for name in ("router", "safety", "bridge", "odom", "localization", "recorder")
+    for name in ("router", "safety", "bridge", "odom", "localization", "patrol", "recorder")
 ]
 ROUTER, SAFETY, BRIDGE, ODOM, _ = UNITS
 INSTALL = ("sh", "/wheelhouse/t2-install.sh")

@@ -285,3 +285,27 @@ def test_normal_causes_exist() -> None:
 def test_both_languages_have_the_same_fields() -> None:
     for english, chinese in TEXTS.values():
         assert sorted(PLACEHOLDER.findall(english)) == sorted(PLACEHOLDER.findall(chinese)), english
+
+
+def round_(state: m.RoundState, name: str = "patrol.idle", left: float = 9.0) -> m.PatrolState:
+    return m.PatrolState(state=state, text="?", phrases=(m.Phrase(name),), left=left)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, []),
+        ({"patrol": round_("driving"), "obeys_patrol": True}, []),
+        ({"patrol": round_("idle")}, []),  # the settings are not known
+        ({"patrol": round_("idle"), "obeys_patrol": False}, [
+            ("note", "safety does not obey the source patrol: no round can move the vehicle",
+             remedy("patrol_source"))]),
+        ({"patrol": round_("stopped", "patrol.restarted")},
+         [("wrong", "Patrol has restarted during the round.", "")]),
+        ({"patrol": round_("waiting", "patrol.waiting")}, []),
+        ({"patrol": round_("waiting", "patrol.waiting", 0.0)},
+         [("note", "Waiting: it goes on by itself when the way is free.", "")]),
+    ],
+)  # fmt: skip
+def test_rounds(given: dict[str, Any], expected: list[tuple[str, str, str]]) -> None:
+    assert problems(seen(**given)) == expected

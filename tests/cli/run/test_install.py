@@ -46,7 +46,17 @@ def test_all_units_except_the_simulator(tmp_path: Path) -> None:
     assert t2_install(tmp_path) == 0
     written = files(tmp_path)
     services = {Path(name).name for name in written if name.endswith(".service")}
-    names = ("router", "bridge", "safety", "odom", "localization", "recorder", "dashboard", "ros2")
+    names = (
+        "router",
+        "bridge",
+        "safety",
+        "odom",
+        "localization",
+        "patrol",
+        "recorder",
+        "dashboard",
+        "ros2",
+    )
     assert services == {f"t2-{name}.service" for name in names}
     assert not any("@PREFIX@" in text for text in written.values())
     start = f"ExecStart={PREFIX}/bin/python -P -m services.safety --config /etc/t2/t2.toml"
@@ -71,6 +81,7 @@ def test_initial_settings_are_valid_and_existing_keys_are_used(tmp_path: Path) -
     assert config.board.address == "10.7.5.224"
     assert config.bus.endpoints == ("unixsock-stream//run/t2/bus.sock",)
     assert config.recorder.folder == "/var/lib/t2/recordings"
+    assert config.patrol.folder == "/var/lib/t2/patrol"
 
 
 def test_a_simulated_vehicle_stays(tmp_path: Path) -> None:
