@@ -6,7 +6,7 @@ from pathlib import Path
 
 from verification.harness.ports import free_port
 
-STACK = {"router", "sim", "bridge", "safety", "odom", "localization", "recorder"}
+STACK = {"router", "sim", "bridge", "safety", "odom", "localization", "patrol", "recorder"}
 
 
 def ports() -> list[str]:

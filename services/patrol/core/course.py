@@ -123,6 +123,7 @@ class Course:
         self._progress = 0.0, 0  # m, and when
         self._told_blocked = False
         self._cause: Phrases = ()  # of the last stop by safety
+        self._place = self.way.track.points[0]  # the newest known one, m
         self._stays_at = ""  # the station
         self._seen: Phrase | None = None  # a latch or a lost position since the announcement
 
@@ -199,8 +200,8 @@ class Course:
 
     def restore(self, of: OpenRound, wall_ns: int) -> None:
         """Take up the round of an earlier start of this service: it is stopped."""
-        if of.homeward:
-            self.way = Way(self.route, homeward=True)
+        self.way = Way(self.route, homeward=of.homeward)
+        self._place = self.way.track.point(of.along)
         self.along, self._stop, self._turned = of.along, of.stop, of.turned
         self._stopped(Phrase("patrol.restarted"), wall_ns)
 
@@ -224,8 +225,8 @@ class Course:
     @property
     def station(self) -> str:
         """The station ahead, or where the vehicle stays."""
-        if self.state == "staying":
-            return self._stays_at
+        if self.state in {"staying", "done"}:
+            return self._stays_at if self.state == "staying" else ""
         ahead = (stop.station for stop in self.way.stops[self._stop :] if stop.station)
         return next(ahead, self.way.home if self.way.homeward or self.way.is_closed else "")
 
@@ -256,6 +257,7 @@ class Course:
         if pose is None or not is_known(pose.value):
             return
         located, covariance = located_of(pose.value)
+        self._place = located.x, located.y
         self.fit = self.way.fit(located, covariance, self.along, NEAR)
         if STATES[self.state].moves:
             self.diary.on_pose(located.x, located.y, self.fit)
@@ -365,7 +367,8 @@ class Course:
         if self.route.blocked == "stop" and not self.way.homeward:
             self._stopped(Phrase("patrol.blocked_stop", fields), wall_ns)
             return
-        self._note("round_blocked", "warning", Phrase("patrol.blocked", fields), *self._cause)
+        self._enter("waiting", Phrase("patrol.blocked", fields), *self._cause)
+        self._note("round_blocked", "warning")
         if self.route.blocked == "return" and not self.way.homeward:
             self.turn_home(now_ns, wall_ns)
 
@@ -414,7 +417,7 @@ class Course:
         self, state: m.RoundState, wall_ns: int, name: m.EventName, level: m.Level, *why: Phrase
     ) -> None:
         self.until_ns = None
-        self.diary.halt(state, why, wall_ns)
+        self.diary.halt(state, why, self._place, wall_ns)
         self._enter(state, *why)
         self._note(name, level)
 

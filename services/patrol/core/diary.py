@@ -56,10 +56,12 @@ class Diary:
         if len(self.record.recordings) < FILES:
             self.record = replace(self.record, recordings=(*self.record.recordings, name))
 
-    def halt(self, state: m.RoundState, phrases: Phrases, wall_ns: int) -> None:
-        """Note that the round does not get on, from now."""
+    def halt(
+        self, state: m.RoundState, phrases: Phrases, at: tuple[float, float], wall_ns: int
+    ) -> None:
+        """Note that the round does not get on from now, at (x, y), m."""
         self.go_on(wall_ns)
-        x, y = self._last or (0.0, 0.0)
+        x, y = at
         self._halt = m.Halt(
             state=state, t_ns=wall_ns, seconds=0.0, x=x, y=y, text=render(phrases), phrases=phrases
         )

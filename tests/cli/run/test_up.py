@@ -81,9 +81,9 @@ def options(*words: str) -> Namespace:
 @pytest.mark.parametrize(
     ("words", "names"),
     [
-        ((), "router sim bridge safety odom localization recorder"),
-        (("--no-sim",), "router bridge safety odom localization recorder"),
-        (("--no-router", "--ros2"), "sim bridge safety odom localization recorder ros2"),
+        ((), "router sim bridge safety odom localization patrol recorder"),
+        (("--no-sim",), "router bridge safety odom localization patrol recorder"),
+        (("--no-router", "--ros2"), "sim bridge safety odom localization patrol recorder ros2"),
         (("--only", "bridge"), "bridge"),
     ],
 )

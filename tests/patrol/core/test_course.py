@@ -196,6 +196,18 @@ def test_another_source_pauses_a_round_and_its_end_does_not_resume_it(state: m.R
     vehicle.until("done")
 
 
+def test_a_halt_is_noted_where_the_vehicle_is() -> None:
+    vehicle = Vehicle(Pose(0.1, 0.2, 0.0))
+    assert vehicle.start() is None
+    vehicle.source = "teleop"
+    vehicle.run(1.0)
+    vehicle.source = None
+    vehicle.act("abort")
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert [(each.state, each.x, each.y) for each in record.halts] == [("paused", 0.1, 0.2)]
+
+
 def test_every_rule_is_the_reason_of_a_tested_stop() -> None:
     assert len(RULES) == 7  # add a case above for a new one
 
@@ -249,6 +261,7 @@ def test_after_its_patience_a_round_does_what_the_route_says(
     vehicle.causes = ("blocked",)
     vehicle.run(PATIENCE_S + 2.0)
     assert vehicle.state == state
+    assert blocked != "wait" or vehicle.reasons == ("patrol.blocked", "blocked")
     assert vehicle.message.homeward == (blocked == "return")
     assert vehicle.events.count("round_blocked") == (blocked != "stop")
     vehicle.run(PATIENCE_S + 2.0)
