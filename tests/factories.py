@@ -11,6 +11,7 @@ from t2.messages import (
     Link,
     MapPose,
     Odometry,
+    PatrolState,
     Phrase,
     PlaneFrame,
     Release,
@@ -118,6 +119,20 @@ def map_pose(state: Any = "placed", **fields: Any) -> MapPose:
             "pose_covariance": (0.04, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0025), "placement": 1,
         }  # fmt: skip
     return MapPose(**usual | {"text": render([phrase]), "phrases": (phrase,)} | fields)
+
+
+def patrol_state(state: Any = "driving", **fields: Any) -> PatrolState:
+    """Return the state of patrol on a round, at 4 of 10 m."""
+    phrase = Phrase("patrol.driving", {"route": "yard", "station": "gate"})
+    usual: dict[str, Any] = {
+        "actions": ("pause", "return", "abort"), "round": "1-yard", "route": "yard",
+        "progress": 4.0, "length": 10.0, "station": "gate", "deviation": 0.1, "sigma": 0.05,
+        "corridor": 0.5, "phrases": (phrase,),
+    }  # fmt: skip
+    if state == "idle":
+        phrase = Phrase("patrol.idle")
+        usual = {"actions": ("start",), "phrases": (phrase,)}
+    return PatrolState(state=state, **usual | {"text": render([phrase])} | fields)
 
 
 def fix_state(source: str = "tags", **fields: Any) -> FixState:

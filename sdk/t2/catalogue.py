@@ -950,6 +950,14 @@ EVENTS: tuple[EventRow, ...] = (
         ("Reset requested by {by:operator}.", "{by:operator} 请求复位。"), NOTHING,
     ),
     EventRow(
+        "dashboard", "round_request", "info",
+        (
+            "{by:operator} requests of patrol: {action:word}.",
+            "{by:operator} 请求巡逻：{action:word}。",
+        ),
+        NOTHING,
+    ),
+    EventRow(
         "teleop, dashboard", "take_over", "info",
         (
             "{by:operator} takes control from {other:operator}.",
@@ -1129,6 +1137,7 @@ WORDS: dict[str, Words] = {
     "flapping": ("repeated input failures", "输入反复失效"),
     "runaway": ("runaway", "未按指令运动"),
     **patrol_texts.STATES,
+    **patrol_texts.ACTIONS,
 }  # fmt: skip
 
 TEXTS: dict[str, Words] = {

@@ -68,11 +68,12 @@ if TYPE_CHECKING:
         "placed", "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
         "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
         "release_refused", "reset", "reset_refused", "reset_request", "reset_unconfirmed",
-        "ros_fix_refused", "round_blocked", "round_end", "round_paused", "round_resumed",
-        "round_return", "round_skipped", "round_start", "round_stopped", "round_unwritten",
-        "round_waiting", "route_changed", "runaway", "second_authority", "silent", "slip",
-        "slip_over", "source", "station", "stop", "switches_unverified", "take_over",
-        "teaching", "terminal_slow", "uncommanded_motion", "unheard", "unplaced", "velocity_back",
+        "ros_fix_refused", "round_blocked", "round_end", "round_paused", "round_request",
+        "round_resumed", "round_return", "round_skipped", "round_start", "round_stopped",
+        "round_unwritten", "round_waiting", "route_changed", "runaway", "second_authority",
+        "silent", "slip", "slip_over", "source", "station", "stop", "switches_unverified",
+        "take_over", "teaching", "terminal_slow", "uncommanded_motion", "unheard", "unplaced",
+        "velocity_back",
     ]  # fmt: skip
 else:
     EventName = Name

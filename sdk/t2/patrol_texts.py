@@ -216,3 +216,17 @@ STATES: dict[str, Words] = {
     "stopped": ("stopped", "已停止"),
     "done": ("done", "已结束"),
 }
+
+# What is asked of patrol, for ``{action:word}``.
+ACTIONS: dict[str, Words] = {
+    "start": ("start", "开始"),
+    "depart": ("depart", "立即出发"),
+    "pause": ("pause", "暂停"),
+    "resume": ("resume", "继续"),
+    "return": ("return", "返回起点"),
+    "abort": ("abort", "中止"),
+    "teach_begin": ("begin to teach", "开始示教"),
+    "teach_station": ("mark a station", "标记站点"),
+    "teach_end": ("end teaching", "结束示教"),
+    "teach_cancel": ("cancel teaching", "取消示教"),
+}

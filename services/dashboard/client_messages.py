@@ -4,12 +4,12 @@
 see ``driver_lock.py`` for a hold.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
 from common.settings import GEARS
-from t2.messages import Direction, Number
+from t2.messages import Direction, Number, RoundAction, RouteName, StationName
 
 NAME_MAX = 40  # characters, of a viewer
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
@@ -76,4 +76,28 @@ class Reset(Named, frozen=True):
     echo: int
 
 
-AnyMessage = Take | Leave | Hold | Free | Gear | Alive | Estop | Reset
+class Round(Named, frozen=True):
+    """Start a round on a route, or act on the one that is driven."""
+
+    action: RoundAction
+    echo: int
+    route: RouteName | None = None  # of "start"
+
+
+class Teach(Named, frozen=True):
+    """Teach a route; the fields are those of ``TeachRequest``."""
+
+    action: Literal["begin", "station", "end", "cancel"]
+    echo: int
+    route: RouteName | None = None
+    station: StationName = ""
+    stay: Annotated[float, Meta(ge=0.0, le=86_400.0)] = 0.0
+
+
+class Routes(ClientMessage, frozen=True):
+    """Show a route, or the list of all."""
+
+    route: RouteName | None = None
+
+
+AnyMessage = Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Round | Teach | Routes

@@ -12,9 +12,11 @@ from common.bus.session import common_name, is_viewer
 from common.freshness import NS_PER_S
 from common.log import Logger
 from common.source import DriveSource, KeepalivePublisher
+from services.dashboard import client_messages as client
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive, Push
 from services.dashboard.i18n import Texts, label, phrase, rendered
+from services.dashboard.patrol import Routes
 from services.dashboard.snapshot import DriverState
 from services.dashboard.telemetry_cache import EVENTS_DEPTH, TelemetryCache, path_of
 from t2 import keys
@@ -36,7 +38,7 @@ Notify = Callable[[m.Level, Texts], None]
 
 FIXED_TOPICS: tuple[Topic[Any], ...] = (
     keys.VELOCITY, keys.ULTRASONIC, keys.BUMPER, keys.LINK, keys.SWITCHES,
-    keys.ODOMETRY, keys.MAP_POSE, keys.SAFETY, keys.MOTION,
+    keys.ODOMETRY, keys.MAP_POSE, keys.SAFETY, keys.MOTION, keys.PATROL,
 )  # fmt: skip
 WILDCARD_DEPTH = 16  # of a key with many publishers
 # How long an emergency stop is repeated without a confirmation, as on the page: the link to the
@@ -52,6 +54,7 @@ class Robot:
         self.bus = bus
         self.telemetry = TelemetryCache()
         self.driver_lock = DriverLock()
+        self.routes = Routes(bus)
         self.may_stop = not is_viewer(bus.where)
         self._gears = config.vehicle.gears_linear, config.vehicle.gears_angular
         self._broadcast = broadcast  # to all viewers of this robot
@@ -180,6 +183,35 @@ class Robot:
 
         self.bus.call(keys.RESET, reset_request(shown.value), answered, refused)
 
+    def patrol(self, asked: client.Round | client.Teach, requested_by: str, notify: Notify) -> None:
+        """Make a call to patrol, which judges the age of its echo; report the answer."""
+
+        def answered(done: m.Done) -> None:
+            notify("info", rendered(done.phrases, done.text))
+
+        def refused(refusal: m.Refusal) -> None:
+            notify("warning", rendered(refusal.phrases, refusal.text))
+
+        echo, route = asked.echo, asked.route
+        if isinstance(asked, client.Round):
+            self.event("round_request", "info", by=requested_by, action=asked.action)
+            request = m.RoundRequest(action=asked.action, route=route, echo=echo)
+            self.bus.call(keys.ROUND, request, answered, refused)
+            return
+        self.event("round_request", "info", by=requested_by, action=f"teach_{asked.action}")
+        self.bus.call(
+            keys.TEACH,
+            m.TeachRequest(
+                action=asked.action,
+                route=route,
+                station=asked.station,
+                stay=asked.stay,
+                echo=echo,
+            ),
+            answered,
+            refused,
+        )
+
     # --- requests -----------------------------------------------------------------------------
 
     def _on_denied(self) -> None:
@@ -229,6 +261,11 @@ class Robot:
 
     def _on_message(self, arrival: Arrival[Any]) -> None:
         self.telemetry.update(path_of(arrival.key), arrival.message, arrival.received_ns)
+        if isinstance(arrival.message, m.PatrolState):
+            self.routes.observe(arrival.message)
 
     def _on_event(self, arrival: Arrival[m.Event]) -> None:
-        self.telemetry.add_event(arrival.key.rpartition("/")[2], arrival.message)
+        service, event = arrival.key.rpartition("/")[2], arrival.message
+        self.telemetry.add_event(service, event)
+        if (service, event.name) == ("patrol", "route_changed"):
+            self.routes.change()

@@ -71,9 +71,11 @@ class RobotPage:
                 self._alive(viewer, message)
             case client.Take():
                 self._take(viewer, message)
+            case client.Routes(route):
+                self.robot.routes.ask(route, partial(self._send_route, viewer))
             case _ if self.robot.driver_lock.driver == viewer:
                 self._drive(viewer, message)
-            case client.Gear() | client.Reset():
+            case client.Gear() | client.Reset() | client.Round() | client.Teach():
                 self._notify(viewer, "warning", label("take_first"))
 
     def tick(self, now_ns: int, robots: Mapping[str, bool]) -> None:
@@ -92,7 +94,9 @@ class RobotPage:
         )
         self._send(self.viewers, fast, replaces=True)
         if self._ticks % SLOW_TICKS == 0:
-            slow = slow_snapshot(robot.telemetry, robots, len(self.viewers), now_ns)
+            slow = slow_snapshot(
+                robot.telemetry, robots, len(self.viewers), now_ns, routes=robot.routes.version
+            )
             self._send(self.viewers, slow, replaces=True)
         if self._ticks % SLOW_TICKS == 1:
             self._send_events()
@@ -131,6 +135,11 @@ class RobotPage:
                 lock.gear = gear
             case client.Reset(echo, name=name):
                 robot.reset(echo, name or f"viewer {viewer}", notify)
+            case client.Round() | client.Teach():
+                robot.patrol(message, message.name or f"viewer {viewer}", notify)
+
+    def _send_route(self, viewer: str, message: bytes) -> None:
+        self._send_text([viewer], message, False)
 
     def _notify(self, viewer: str, level: Level, text: Texts) -> None:
         self._send_text([viewer], notice(level, text), False)

@@ -15,6 +15,7 @@ from common.root_cause import RootCause, root_cause
 from common.text import line
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.i18n import Texts, rendered
+from services.dashboard.patrol import PatrolView, patrol_view
 from services.dashboard.telemetry_cache import TelemetryCache
 from t2 import keys
 from t2.messages import (
@@ -89,6 +90,7 @@ class MapView(Struct, frozen=True):
     text: Texts
     pose: tuple[float, ...] | None  # x, y and heading in the map
     ellipse: tuple[float, ...] | None  # half axes of two standard deviations; direction in ``odom``
+    odom: tuple[float, ...] | None  # x, y and heading of the origin of ``odom`` in the map
 
 
 class FastSnapshot(Struct, frozen=True, tag_field="k", tag="fast"):
@@ -121,6 +123,7 @@ class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
     right: Driver | None
     switches: Switches | None
     map: MapView | None
+    patrol: PatrolView | None  # None: the robot has none
 
 
 def fast_snapshot(
@@ -163,9 +166,14 @@ def fast_snapshot(
 
 
 def slow_snapshot(
-    telemetry: TelemetryCache, robots: Mapping[str, bool], viewers: int, now_ns: int
+    telemetry: TelemetryCache,
+    robots: Mapping[str, bool],
+    viewers: int,
+    now_ns: int,
+    *,
+    routes: int = 0,
 ) -> SlowSnapshot:
-    """Return the slow snapshot at this time."""
+    """Return the slow snapshot at this time; ``routes`` is the version of the routes."""
     services, pose = telemetry.services(), telemetry.newest(keys.MAP_POSE, now_ns)
     health = {name: telemetry.newest(keys.HEALTH, now_ns, service=name) for name in services}
     return SlowSnapshot(
@@ -177,6 +185,7 @@ def slow_snapshot(
         right=telemetry.newest(keys.DRIVER, now_ns, side="right"),
         switches=telemetry.newest(keys.SWITCHES, now_ns),
         map=map_view(pose) if pose else None,
+        patrol=patrol_view(telemetry, routes, now_ns),
     )
 
 
@@ -184,12 +193,13 @@ def map_view(pose: MapPose) -> MapView:
     """Return the part of a pose in the map that the page shows."""
     text = rendered(pose.phrases, pose.text)
     if pose.x is None or pose.y is None or pose.heading is None:
-        return MapView(pose.state, text, None, None)
-    ellipse = None
-    if pose.pose_covariance and pose.odom:
+        return MapView(pose.state, text, None, None, None)
+    ellipse, odom = None, pose.odom
+    if pose.pose_covariance and odom:
         axis, other, direction = Covariance.of(pose.pose_covariance).ellipse
-        ellipse = SIGMAS * axis, SIGMAS * other, direction - pose.odom.heading
-    return MapView(pose.state, text, (pose.x, pose.y, pose.heading), ellipse)
+        ellipse = SIGMAS * axis, SIGMAS * other, direction - odom.heading
+    frame = (odom.x, odom.y, odom.heading) if odom else None
+    return MapView(pose.state, text, (pose.x, pose.y, pose.heading), ellipse, frame)
 
 
 def safety_view(state: SafetyState) -> SafetyView:

@@ -82,6 +82,10 @@ class TelemetryCache:
             return None
         return latest.value if isinstance(latest.value, topic.message) else None
 
+    def has_received(self, topic: Topic[M]) -> bool:
+        """Return whether a stream had a message, however old."""
+        return topic.path in self._latest
+
     @property
     def events(self) -> list[EventLine]:
         """The newest events, in the order of their arrival."""

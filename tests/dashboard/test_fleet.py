@@ -19,7 +19,7 @@ from services.dashboard.fleet import IDLE_S, KNOWN_MAX, PAGES_MAX, Fleet
 from services.dashboard.i18n import label
 from services.dashboard.robot_page import SLOW_TICKS
 from t2 import keys
-from t2.messages import Event
+from t2.messages import Event, RoutesReply
 from tests.factories import safety_state
 from verification.harness.waiting import wait_until
 
@@ -207,3 +207,27 @@ def test_a_reset_of_an_unknown_state_is_refused(
     assert not buses["001"].call.called
     fleet.handle("001", "1", client.Reset(5))
     assert buses["001"].call.call_args.args[1].echo == 5
+
+
+def test_a_viewer_reads_routes_and_only_the_driver_makes_calls_to_patrol(
+    fleet: Fleet, buses: dict[str, Mock], sent: list[Sent]
+) -> None:
+    for viewer in ("1", "2"):
+        fleet.join("001", viewer)
+    fleet.handle("001", "1", client.Take())
+    fleet.handle("001", "2", client.Routes())
+    call, _, answered, _ = buses["001"].call.call_args.args
+    assert call is keys.ROUTES
+    answered(RoutesReply())
+    assert sent[-1] == (["2"], {"k": "routes", "version": 0, "routes": []})
+    calls: dict[Any, client.AnyMessage] = {
+        keys.ROUND: client.Round(action="pause", echo=5),
+        keys.TEACH: client.Teach(action="end", echo=5),
+    }
+    for number, (expected, asked) in enumerate(calls.items(), 1):
+        fleet.handle("001", "2", asked)
+        assert buses["001"].call.call_count == number
+        notices = [(to, it["text"]["en"]) for to, it in sent if it["k"] == "notice"]
+        assert notices == [(["2"], "Take control first.")] * number
+        fleet.handle("001", "1", asked)
+        assert buses["001"].call.call_args.args[0] is expected

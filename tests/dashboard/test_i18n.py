@@ -10,7 +10,7 @@ from services.dashboard import server
 from services.dashboard.driver_lock import HoldState
 from services.dashboard.i18n import HAPPENED, LABELS, LATCHES, Texts, of_event, rendered, table
 from t2.catalogue import EVENTS
-from t2.messages import Direction, Event, FaultName, LinkState, Phrase, Verdict
+from t2.messages import Direction, Event, FaultName, LinkState, Phrase, RoundAction, Verdict
 
 CODE = Path(server.__file__).parent
 HAN = re.compile("[\u4e00-\u9fff]")
@@ -28,7 +28,7 @@ def used_names() -> set[str]:
     for script in (CODE / "static").glob("*.js"):
         text = script.read_text(encoding="utf-8")
         found |= {name for pattern in IN_SCRIPTS for name in re.findall(pattern, text)}
-    for name in ("fleet.py", "robot_page.py", "robot.py", "i18n.py"):
+    for name in ("fleet.py", "robot_page.py", "robot.py", "i18n.py", "patrol.py"):
         code = (CODE / name).read_text(encoding="utf-8")
         found |= set(re.findall(r'\blabel\("(\w+)"', code))
     return found
@@ -53,6 +53,8 @@ def test_every_used_name_has_a_text() -> None:
         ("release_", get_args(Direction)),
         ("believed_", get_args(Direction)),
         ("release.forbidden_", get_args(Direction)),
+        ("round_", get_args(RoundAction)),
+        ("left_", ["announcing", "staying", "waiting"]),
     ],
 )
 def test_every_name_of_the_messages_has_its_text(prefix: str, names: list[str]) -> None:

@@ -1,6 +1,7 @@
 """The driver of one robot on the dashboard: overruled by another source, or without permission."""
 
 import math
+from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -8,6 +9,7 @@ from msgspec.structs import replace
 from common import clock
 from common.bus.publisher import Publisher
 from common.freshness import NS_PER_S
+from services.dashboard import client_messages as client
 from services.dashboard import robot
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import HoldState, Push
@@ -15,8 +17,10 @@ from services.dashboard.i18n import Texts, phrase
 from services.dashboard.robot import ESTOP_KEPT_S, Robot
 from t2 import keys
 from t2.client import DENIED_AFTER, ESTOP_TICKS, KEPT_TICKS, OVERRULED_TICKS
+from t2.keys import Call
 from t2.messages import (
     Direction,
+    Done,
     Drive,
     Event,
     Level,
@@ -24,10 +28,12 @@ from t2.messages import (
     Refusal,
     ResetDone,
     ResetRequest,
+    RoundRequest,
+    TeachRequest,
 )
 from t2.words import render
 from tests.dashboard.servers import CONTACT, NEWER
-from tests.factories import safety_state
+from tests.factories import patrol_state, safety_state
 from tests.fake_bus import FakeBus
 
 TICK_NS = 50_000_000
@@ -229,3 +235,49 @@ def test_an_event_names_the_certificate(
     fixture.robot.estop("Anna")
     assert isinstance(events.last, Event)
     assert events.last.text == "Emergency stop requested by Anna. Certificate: driver.hall."
+
+
+@pytest.mark.parametrize(
+    ("asked", "call", "request_", "text"),
+    [
+        (
+            client.Round(action="start", route="yard", echo=7),
+            keys.ROUND,
+            RoundRequest(action="start", route="yard", echo=7),
+            "Anna requests of patrol: start.",
+        ),
+        (
+            client.Teach(action="station", station="gate", stay=2.0, echo=7),
+            keys.TEACH,
+            TeachRequest(action="station", station="gate", stay=2.0, echo=7),
+            "Anna requests of patrol: mark a station.",
+        ),
+    ],
+)
+def test_a_call_to_patrol_has_the_echo_of_the_page_and_is_one_event(
+    fixture: RobotFixture,
+    asked: client.Round | client.Teach,
+    call: Call[Any, Any],
+    request_: object,
+    text: str,
+) -> None:
+    events = next(p for p in fixture.bus.publishers if p.topic is keys.EVENTS)
+    fixture.robot.patrol(asked, "Anna", fixture.notify)
+    assert fixture.bus.asked == [(call.path, request_)]
+    assert isinstance(events.last, Event)
+    assert (events.last.name, events.last.text) == ("round_request", text)
+    answered, refused = fixture.bus.answers[-1]
+    refused(Refusal(text="late", phrases=(Phrase("teach.none"),)))
+    answered(Done(text="Done.", phrases=(Phrase("patrol.done"),)))
+    assert fixture.notices == [("warning", "No route is being taught."), ("info", "Done.")]
+
+
+def test_a_changed_route_is_read_anew(fixture: RobotFixture) -> None:
+    assert fixture.robot.routes.version == 0
+    fixture.bus.deliver(keys.PATROL, patrol_state())
+    for service, version in (("patrol", 2), ("recorder", 2)):
+        changed = Event(name="route_changed", level="info", text="")
+        fixture.bus.deliver(
+            keys.EVENTS, changed, service=service, declared=keys.EVENTS.on("001", service="*")
+        )
+        assert fixture.robot.routes.version == version

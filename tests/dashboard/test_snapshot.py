@@ -109,8 +109,9 @@ def test_the_pose_in_the_map_has_its_ellipse_in_odom() -> None:
     turned = factories.map_pose("lost", odom=PlaneFrame(x=0.0, y=0.0, heading=0.5))
     ellipse = snapshot.map_view(turned).ellipse
     assert ellipse == pytest.approx((0.4, 0.2, -0.5))
+    assert snapshot.map_view(turned).odom == (0.0, 0.0, 0.5)
     unplaced = snapshot.map_view(factories.map_pose("unplaced"))
-    assert (unplaced.pose, unplaced.ellipse) == (None, None)
+    assert (unplaced.pose, unplaced.ellipse, unplaced.odom) == (None, None, None)
     assert "t2 call localization/place" in unplaced.text.en
     assert snapshot.slow_snapshot(full(), {}, 1, AT + NS_PER_S).map is None
 
