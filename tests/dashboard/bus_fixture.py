@@ -8,7 +8,7 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.loop import Loop
 from t2 import keys
-from t2.messages import Cause, Drive, Limit, LimitState, MapPose, Release
+from t2.messages import Cause, Drive, Limit, LimitState, MapPose, PatrolState, Release
 from tests import factories
 from tests.dashboard.viewer import Client
 from tests.factories import safety_state
@@ -29,6 +29,7 @@ class Peer:
         self.release: Release | None = None
         self.release_refusal = ""
         self.map_pose: MapPose | None = None
+        self.patrol: PatrolState | None = None
         self.keepalives: tuple[LimitState, ...] = ()
         self.kept_alive: list[Limit] = []
         self.boot = 0  # of safety
@@ -37,7 +38,7 @@ class Peer:
     def declare(self, bus: Bus) -> None:
         self.boot = bus.boot
         state, map_pose = bus.publisher(keys.SAFETY), bus.publisher(keys.MAP_POSE)
-        odometry = bus.publisher(keys.ODOMETRY)
+        odometry, patrol = bus.publisher(keys.ODOMETRY), bus.publisher(keys.PATROL)
         bus.subscribe(
             keys.DRIVE, lambda it: self.requests.append(it.message), source="web", depth=64
         )
@@ -50,6 +51,8 @@ class Peer:
             if self.map_pose:
                 map_pose.put(self.map_pose)
                 odometry.put(factories.odometry())
+            if self.patrol:
+                patrol.put(self.patrol)
             if self.safe:
                 state.put(
                     safety_state(

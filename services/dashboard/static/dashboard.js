@@ -6,6 +6,7 @@ import * as i18n from "./i18n.js";
 import { t } from "./i18n.js";
 import * as notices from "./notices.js";
 import * as panels from "./panels.js";
+import * as patrol from "./patrol.js";
 import * as sonarView from "./sonar_view.js";
 import * as stateBar from "./state_bar.js";
 import * as trail from "./trail.js";
@@ -84,6 +85,7 @@ const HANDLERS = {
   hello(message) {
     hello = message;
     delay.begin();
+    patrol.forget();
     events = [];
     sonarView.build(message.vehicle);
     trail.size(message.vehicle);
@@ -106,12 +108,15 @@ const HANDLERS = {
     slow = message;
     panels.showSlow(message);
     trail.locate(message.map);
+    patrol.show(message.patrol);
     showRobots();
   },
   events(message) {
     events = [...(message.all ? [] : events), ...message.lines].slice(-EVENTS_MAX); // in the order of their arrival
     panels.showEvents(events);
   },
+  routes: (message) => patrol.list(message),
+  route: (message) => patrol.route(message),
   notice: (message) => toast(message.text, message.level),
   taken: () => confirm("take_over", t("take_over_from", stateBar.driverName(fast)),
     () => send({ k: "take", force: true, name: name() })),
@@ -136,6 +141,7 @@ function draw() {
   document.body.classList.toggle("stale", off());
   stateBar.show(view());
   driving.show(isDriver(), newest());
+  patrol.enable(isDriver() && !off(), driving.viewOnly(newest()));
   notices.place();
   $("awake").hidden = !wakeLock.update(isDriver() || (!!hello?.keepalive && newest()?.keeper === hello.id));
   driving.showGear(lost() ? 1 : fast.driver.gear, isDriver());
@@ -165,7 +171,10 @@ function showTexts() {
   document.documentElement.lang = i18n.language;
   for (const it of document.querySelectorAll("[data-t]")) it.textContent = t(it.dataset.t);
   showChange();
-  if (slow) panels.showSlow(slow);
+  if (slow) {
+    panels.showSlow(slow);
+    patrol.show(slow.patrol);
+  }
   panels.showEvents(events);
   drawn = undefined;
 }
@@ -217,6 +226,7 @@ function begin() {
   estop.begin({ send, off, cut, toast: stopToast, name, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
   showCamera($("page").dataset.camera.split("{robot}").join(robot));
   trail.begin();
+  patrol.begin({ send, toast, confirm, name, echo: () => echoOf(drawn), draw: trail.follow });
   showRobot();
   showTexts();
   connect();

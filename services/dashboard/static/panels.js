@@ -4,7 +4,7 @@ import { joined, t } from "./i18n.js";
 const $ = (id) => document.getElementById(id);
 const BITS = ["over_current", "over_voltage", "encoder", "under_voltage", "overload"];
 
-function create(tag, text = "", attributes = {}) {
+export function create(tag, text = "", attributes = {}) {
   const it = document.createElement(tag);
   it.textContent = text;
   for (const [name, value] of Object.entries(attributes)) it.setAttribute(name, value);
@@ -12,7 +12,7 @@ function create(tag, text = "", attributes = {}) {
 }
 
 // Redrawn only when the content changes, for text selections and screen readers.
-function fill(element, stamp, make) {
+export function fill(element, stamp, make) {
   if (element.dataset.stamp === stamp) return;
   element.dataset.stamp = stamp;
   element.replaceChildren(...make());

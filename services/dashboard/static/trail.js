@@ -1,20 +1,27 @@
-// The trajectory on a grid, in odom: x to the right, y up, metres.
+// The trajectory on a grid, in odom: x to the right, y up, metres; and a route, which is in the map.
 import { fitted } from "./charts.js";
 
 const SPACING = 0.05; // m between two stored points
 const KEPT = 20000;
-const [NEAR, FAR] = [300, 4]; // pixels per metre
+const [NEAR, FAR] = [300, 0.2]; // pixels per metre
 let points = [];
 let vehicle = { length: 1.1, width: 0.7 };
 let scale = 40;
 let center = [0, 0];
 let epoch = null;
 let pose = null;
+let route = null; // of patrol
+let frame = null; // of odom in the map: x, y, heading; null while the vehicle is not placed
 let uncertainty = null; // of the pose in the map: half axes, m, and the direction of the first, rad
 
 export const size = (given) => { vehicle = given; };
 
-export const locate = (map) => { uncertainty = map?.ellipse; };
+export const locate = (map) => {
+  uncertainty = map?.ellipse;
+  frame = map?.state === "placed" ? map.odom : null;
+};
+
+export const follow = (given) => { route = given; };
 
 export function add(snapshot) {
   if (!snapshot.pose) return;
@@ -35,6 +42,7 @@ export function draw(given) {
   const color = (name) => css.getPropertyValue(`--${name}`);
   const screen = ([x, y]) => [width / 2 + (x - center[0]) * scale, height / 2 - (y - center[1]) * scale];
   grid(pen, width, height, screen, color);
+  if (route && frame) corridor(pen, screen, color);
   pen.strokeStyle = color("measured");
   pen.lineWidth = 3;
   pen.lineJoin = "round";
@@ -44,6 +52,44 @@ export function draw(given) {
   pen.stroke();
   if (pose) body(pen, screen(pose), pose[2], color);
   if (pose && uncertainty) ellipse(pen, screen(pose), color);
+  if (route && frame) stations(pen, screen, color);
+}
+
+// From the axes of the map into those of odom.
+function inOdom([x, y]) {
+  const [dx, dy] = [x - frame[0], y - frame[1]];
+  const [cos, sin] = [Math.cos(frame[2]), Math.sin(frame[2])];
+  return [cos * dx + sin * dy, cos * dy - sin * dx];
+}
+
+/** Draw the line of the route on a band, its corridor. */
+function corridor(pen, screen, color) {
+  pen.strokeStyle = color("clear");
+  pen.lineJoin = pen.lineCap = "round";
+  pen.beginPath();
+  route.points.forEach((point, i) => pen[i ? "lineTo" : "moveTo"](...screen(inOdom(point))));
+  for (const [wide, alpha] of [[2 * route.corridor * scale, 0.2], [1.5, 1]]) {
+    pen.lineWidth = wide;
+    pen.globalAlpha = alpha;
+    pen.stroke();
+  }
+  pen.lineCap = "butt";
+}
+
+function stations(pen, screen, color) {
+  pen.font = "600 13px system-ui, sans-serif";
+  pen.lineWidth = 3;
+  pen.strokeStyle = color("field");
+  for (const [name, ...at] of route.stations) {
+    const [x, y] = screen(inOdom(at));
+    pen.fillStyle = color("clear");
+    pen.beginPath();
+    pen.arc(x, y, 5, 0, 2 * Math.PI);
+    pen.fill();
+    pen.fillStyle = color("text");
+    pen.strokeText(name, x + 9, y - 7);
+    pen.fillText(name, x + 9, y - 7);
+  }
 }
 
 function ellipse(pen, [x, y], color) {
