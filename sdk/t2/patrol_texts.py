@@ -20,15 +20,15 @@ PHRASES: dict[str, Words] = {
         "Waiting: it goes on by itself when the way is free.", "等待中：通道畅通后自动继续。",
     ),
     "patrol.blocked": (
-        "Blocked for {seconds:.0f} s: free the way, or `t2 rounds return`.",
-        "已受阻 {seconds:.0f} s：请清空通道，或运行 `t2 rounds return`。",
+        "Blocked for {seconds:.0f} s: free the way, or return home.",
+        "已受阻 {seconds:.0f} s：请清空通道，或返回起点。",
     ),
     "patrol.paused": (
-        "Paused; `t2 rounds resume` goes on.", "已暂停；`t2 rounds resume` 可继续。",
+        "Paused: resume the round to go on.", "已暂停：恢复巡逻后继续。",
     ),
     "patrol.overruled": (
-        "Paused: {source} has taken control; `t2 rounds resume` goes on.",
-        "已暂停：{source} 取得控制权；`t2 rounds resume` 可继续。",
+        "Paused: {source} has taken control. Resume the round to go on.",
+        "已暂停：{source} 取得控制权。恢复巡逻后继续。",
     ),
     "patrol.home": ("The round is complete, and the vehicle is at home.", "巡逻完成，车辆已回到起点。"),
     "patrol.returned": (
@@ -39,7 +39,7 @@ PHRASES: dict[str, Words] = {
         "The round was aborted: drive the vehicle home.", "巡逻已中止：请将车辆驾驶回起点。",
     ),
     "patrol.resume": (
-        "Fix the cause, then `t2 rounds resume`.", "请排除原因，然后运行 `t2 rounds resume`。",
+        "Fix the cause, then resume the round.", "请排除原因，然后恢复巡逻。",
     ),
     # why a round stops, or cannot go on
     "patrol.latched": (
@@ -95,8 +95,8 @@ PHRASES: dict[str, Words] = {
     "patrol.started": ("The round {round} on {route} begins.", "路线 {route} 的巡逻 {round} 开始。"),
     "patrol.done": ("Done.", "完成。"),
     "patrol.not_now": (
-        "{action} is not possible now. {state:word} allows: {actions}.",
-        "当前无法执行 {action}。“{state:word}”状态下可用：{actions}。",
+        "{action:word}: not possible now. {state:word} allows: {actions:word}.",
+        "当前无法执行“{action:word}”。“{state:word}”状态下可用：{actions:word}。",
     ),
     "patrol.no_name": ("Name a route.", "请指定路线名称。"),
     "patrol.busy": (

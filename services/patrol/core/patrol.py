@@ -133,7 +133,7 @@ class Patrol:
         if self.course is not None:
             state, actions = self.course.state, self.course.actions
         fields: dict[str, m.Field] = {
-            "action": action, "state": state, "actions": ", ".join(actions)
+            "action": action, "state": state, "actions": actions
         }  # fmt: skip
         return Phrase("patrol.not_now", fields)
 
