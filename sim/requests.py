@@ -98,6 +98,19 @@ class Place(Request, frozen=True, kw_only=True, tag="place"):
     heading: Angle = 0.0  # rad
 
 
+class Person(Request, frozen=True, kw_only=True, tag="person"):
+    """Let a person walk from here, or stand, and go away after a time; at most one at once.
+
+    A person does not walk into the vehicle; refused where the vehicle is.
+    """
+
+    x: Coordinate  # m
+    y: Coordinate  # m
+    heading: Angle = 0.0  # rad
+    speed: Annotated[float, Meta(ge=0.0, le=3.0)] = 0.0  # m/s
+    seconds: Seconds
+
+
 class GetTruth(Request, frozen=True, kw_only=True, tag="truth"):
     """Query the true state; changes nothing."""
 
@@ -113,5 +126,6 @@ Asked = (
     | Flood
     | Wire
     | Place
+    | Person
     | GetTruth
 )

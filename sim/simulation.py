@@ -10,12 +10,14 @@ same outputs. One step::
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import singledispatchmethod
 
+import msgspec
 from msgspec import Struct
 
 from common.freshness import NS_PER_S
-from common.motion import STILL
+from common.motion import STILL, Twist
 from common.wire import framing
 from common.wire import reports as r
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
@@ -30,14 +32,16 @@ from sim.geometry import Pose, Rectangle
 from sim.model import Model
 from sim.requests import Asked
 from sim.sonar import Sonars
-from sim.vehicle import Motors, move, rebounded
-from sim.world import Plan, World
+from sim.vehicle import Motors, move, moved, rebounded
+from sim.world import Plan, World, person_at
 from t2.messages import Command
 
 STEP_NS = NS_PER_S // 100
 STREAM_STEPS = 2  # velocity at 50 Hz
 SONAR_STEPS = 5  # one round of echoes: 20 Hz
 TRUTH_STEPS = 5  # 20 Hz
+PERSON_STEPS = 5  # 20 Hz
+PERSON_GAP = 0.1  # m, that a person keeps from the vehicle
 CATCH_UP_NS = NS_PER_S // 2  # a longer gap is skipped: the world is paused meanwhile
 
 COMMANDS = {
@@ -87,6 +91,9 @@ class Simulation:
         self._steps = 0
         self._driven = 0.0
         self._contact = self.world.contact(self.body, self.pose)
+        self._room = self.world  # without a person
+        self._person: q.Person | None = None  # where it is now
+        self._person_until_ns = now_ns
         self._silent_until_ns = now_ns
         self._powered = True
         self._flood, self._flood_until_ns = q.Flood(), now_ns
@@ -190,6 +197,22 @@ class Simulation:
         self._update_bumper(now_ns)
         return None
 
+    @_apply.register
+    def _(self, request: q.Person, now_ns: int) -> str | None:
+        if not self._let_stand(request):
+            return f"the vehicle is at x {request.x:g}, y {request.y:g}"
+        self._person_until_ns = now_ns + round(request.seconds * NS_PER_S)
+        return None
+
+    def _let_stand(self, person: q.Person) -> bool:
+        """Put the person where it wants to be; return whether the vehicle is not there."""
+        box = person_at(Pose(person.x, person.y, person.heading))
+        if World(walls=(), boxes=(box,)).clearance(self.body, self.pose) < PERSON_GAP:
+            return False
+        self._person = person
+        self.world = replace(self._room, boxes=(*self._room.boxes, box))
+        return True
+
     def truth(self, now_ns: int) -> t.Truth:
         """Return the true state."""
         clearance = self.world.clearance(self.body, self.pose)
@@ -216,6 +239,8 @@ class Simulation:
         self._steps += 1
         self._update_power()
         self._update_watchdog()
+        if self._person is not None and self._steps % PERSON_STEPS == 0:
+            self._walk(self._person)
         self._move(STEP_NS / NS_PER_S)
         if self._steps % SONAR_STEPS == 0:
             self._ranges = self._sonars.measure(self.world, self.pose)
@@ -228,6 +253,16 @@ class Simulation:
             self._send(self._output.merged(), self.now_ns)
         if self._steps % TRUTH_STEPS == 0:
             self._records.append(self.truth(self.now_ns))
+
+    def _walk(self, person: q.Person) -> None:
+        """Let the person walk on, wait before the vehicle, or be gone."""
+        if self.now_ns >= self._person_until_ns:
+            self._person, self.world = None, self._room
+        elif person.speed:
+            here = Pose(person.x, person.y, person.heading)
+            there = moved(here, Twist(person.speed, 0.0), PERSON_STEPS * STEP_NS / NS_PER_S)
+            self._let_stand(msgspec.structs.replace(person, x=there.x, y=there.y))
+        self._contact = self.world.contact(self.body, self.pose)
 
     def _update_power(self) -> None:
         if not self._powered and not self._silent(self.now_ns):

@@ -13,6 +13,7 @@ from msgspec import Meta, Struct
 
 from sim.geometry import Pose, Rectangle, Segment, point_gap
 
+PERSON = 0.4  # m, length and width
 BUMPER_TRAVEL = 0.005  # m; travel of the strip until the body itself touches
 
 Side = Annotated[float, Meta(ge=0.01, le=100.0)]
@@ -110,6 +111,11 @@ class World:
     def clearance(self, body: Rectangle, pose: Pose) -> float:
         """Return the distance to the nearest surface visible to sonar, in metres, or infinity."""
         return min((body.gap(pose, segment) for segment in self.visible), default=math.inf)
+
+
+def person_at(pose: Pose) -> Box:
+    """Return a person as a box."""
+    return Box(name="person", x=pose.x, y=pose.y, heading=pose.heading, length=PERSON, width=PERSON)
 
 
 def _outlines(boxes: Iterable[Box]) -> tuple[Segment, ...]:

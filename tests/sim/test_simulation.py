@@ -9,7 +9,7 @@ from common.wire import framing
 from common.wire import reports as r
 from common.wire.frame import Side
 from sim import trace as t
-from sim.requests import Driver, Flood, Freeze, Place, PowerCycle, Wire
+from sim.requests import Driver, Flood, Freeze, Person, Place, PowerCycle, Wire
 from sim.simulation import CATCH_UP_NS
 from tests.sim.sim_fixture import PORTS, START_NS, SimFixture, room
 
@@ -116,3 +116,16 @@ def test_it_is_placed_where_there_is_room() -> None:
 def test_an_incomplete_last_line_is_ignored() -> None:
     line = msgspec.json.encode(t.BumperSent(mono_ns=1, pressed=True)) + b"\n"
     assert t.read(line + b'{"event":"tru') == [t.BumperSent(mono_ns=1, pressed=True)]
+
+
+def test_a_person_walks_across_waits_before_the_vehicle_and_is_gone() -> None:
+    sim = SimFixture()
+    sim.do(Person(x=0.0, y=2.0, heading=-math.pi / 2, speed=1.0, seconds=4.0))
+    sim.after(1.0)
+    assert sim.truth.clearance == pytest.approx(0.45, abs=0.06)  # 1.0 less half of each body
+    sim.after(2.0)
+    assert sim.truth.clearance == pytest.approx(0.12, abs=0.03)
+    assert not sim.truth.contact
+    assert sim.do(Person(x=0.3, y=0.0, seconds=1.0)).error == "the vehicle is at x 0.3, y 0"
+    sim.after(1.5)
+    assert sim.truth.clearance is None
