@@ -25,7 +25,7 @@ def main() -> int:
                 f"{each.seed:5} mean {fmean(each.nees):6.2f}, below {LIMIT}: "
                 f"{share(each.nees):4.0%}; {each.error:.2f} m off at worst, sigma {each.sigma:.2f} "
                 f"m; placed {each.placed:.0%}; {each.used} used, {each.refused} refused; "
-                f"{each.source}"
+                f"{each.source}{', counters lost now and then' if each.mute else ''}"
             )
     print(
         f"{runs} vehicles, {len(values)} comparisons: mean squared error {fmean(values):.2f} "

@@ -2,19 +2,19 @@
 
 import math
 import random
-from collections import deque
 from typing import Any
 
 import numpy as np
 from msgspec import Struct
-from msgspec.structs import replace
 
-from services.localization.config import FixSource, Localization, LocalizationConfig
+from services.localization.config import FixSource as SourceSettings
+from services.localization.config import Localization, LocalizationConfig
 from services.localization.localization import LocalizationService
 from sim import requests as q
 from t2 import keys
 from t2 import messages as m
-from verification.search.bus import MS, ROBOT
+from verification.localization.source import SOURCE, FixModel, FixSource, place_request
+from verification.search.bus import MS
 from verification.search.draw import TURN_BRAKING, draw
 from verification.search.judge import normalised
 from verification.search.stack import PLANE, Stack
@@ -22,22 +22,9 @@ from verification.search.stack import PLANE, Stack
 STEP_NS = 10 * MS
 READY_MS, TICK_MS = 2000, 100
 DRIVE_S = 120.0
-PLACED_SIGMA, OUTLIER_M = 0.05, 5.0
-SOURCE = "tags"
+PLACED_SIGMA = 0.05
 PLACEMENTS = 50  # attempts
 MUTE = 0.25  # share of the vehicles
-
-
-class FixModel(Struct, frozen=True, kw_only=True):
-    """How a simulated source measures the truth."""
-
-    period: int  # ticks between two fixes
-    sigma: float  # m
-    heading_sigma: float | None  # rad; None: it measures no heading
-    delay: int  # ticks
-    outliers: float  # share
-    gap: float  # share of the time without fixes
-    mute: bool  # whether the board loses its counters for some seconds, again and again
 
 
 class Result(Struct, frozen=True, kw_only=True):
@@ -45,6 +32,7 @@ class Result(Struct, frozen=True, kw_only=True):
 
     seed: int
     source: FixModel
+    mute: bool  # whether the board loses its counters for some seconds, again and again
     nees: tuple[float, ...]  # squared errors in standard deviations
     error: float  # m, at worst while it was placed
     sigma: float  # m, at worst while it was placed
@@ -61,8 +49,7 @@ def source_of(chance: random.Random) -> FixModel:
         heading_sigma=chance.choice((0.02, 0.05, None)),
         delay=chance.choice((0, 1, 3, 10)),
         outliers=chance.choice((0.0, 0.05, 0.2)),
-        gap=chance.choice((0.0, 0.3)),
-        mute=chance.random() < MUTE,
+        gap=chance.choice((0, 100)),
     )
 
 
@@ -71,31 +58,29 @@ class Run:
 
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)
-        self._source = source_of(self._random)
+        self._model = source_of(self._random)
+        self._mute = self._random.random() < MUTE
         drawn = draw(seed)
         turning = float(drawn.get(TURN_BRAKING, 1.0))
         self._stack = Stack(drawn.model(), PLANE, seed=seed, step_ns=STEP_NS, turn_braking=turning)
         self._seed = seed
         self._pose: m.MapPose | None = None
         self._truth = self._stack.vehicle.simulation.pose  # when it was published
-        self._odometry: m.Odometry | None = None
-        self._waiting: deque[tuple[int, m.Fix]] = deque()
         process: Any = self._stack.process("localization")
         self._process = process
         process.config = LocalizationConfig(
-            localization=Localization(sources={SOURCE: FixSource(sigma=0.01, heading_sigma=0.01)})
+            localization=Localization(
+                sources={SOURCE: SourceSettings(sigma=0.01, heading_sigma=0.01)}
+            )
         )
         with self._stack.time():
             LocalizationService(process)
         self._stack.processes["localization"] = process
         self._stack.hand.subscribe(keys.MAP_POSE, self._on_pose)
-        self._stack.hand.subscribe(keys.ODOMETRY, self._on_odometry)
+        self._source = FixSource(self._model, self._stack, self._random)
 
     def _on_pose(self, arrival: Any) -> None:
         self._pose, self._truth = arrival.message, self._stack.vehicle.simulation.pose
-
-    def _on_odometry(self, arrival: Any) -> None:
-        self._odometry = arrival.message
 
     def go(self, seconds: float) -> Result:
         """Place the vehicle, drive, and compare once a second."""
@@ -106,10 +91,10 @@ class Run:
         for tick in range(ticks):
             if tick % 20 == 0:
                 self._request()
-            if self._source.mute and tick % 100 in (0, 30):  # for 3 s of 10
+            if self._mute and tick % 100 in (0, 30):  # for 3 s of 10
                 reports: tuple[q.ReportName, ...] = ("mileage",) if tick % 100 == 0 else ()
                 self._stack.vehicle.inject(q.Mute(reports=reports))
-            self._measure(tick)
+            self._source.measure(tick)
             self._stack.run(TICK_MS)
             if tick % 10 == 9 and (found := self._compare()):
                 nees.append(found[0])
@@ -119,8 +104,8 @@ class Run:
         assert self._pose is not None
         (state,) = self._pose.sources
         return Result(
-            seed=self._seed, source=self._source, nees=tuple(nees), error=error, sigma=sigma,
-            placed=placed / (ticks // 10), used=state.used, refused=state.refused,
+            seed=self._seed, source=self._model, mute=self._mute, nees=tuple(nees), error=error,
+            sigma=sigma, placed=placed / (ticks // 10), used=state.used, refused=state.refused,
         )  # fmt: skip
 
     def _place(self) -> bool:
@@ -128,16 +113,7 @@ class Run:
 
         With noisy velocities it seems to move now and then.
         """
-        truth, noise = self._stack.vehicle.simulation.pose, self._random.gauss
-        assert self._stack.seen is not None
-        request = m.PlaceRequest(
-            x=truth.x + noise(0.0, PLACED_SIGMA),
-            y=truth.y + noise(0.0, PLACED_SIGMA),
-            heading=math.remainder(truth.heading + noise(0.0, PLACED_SIGMA), math.tau),
-            sigma=PLACED_SIGMA,
-            heading_sigma=PLACED_SIGMA,
-            echo=self._stack.seen.heartbeat,
-        )
+        request = place_request(self._stack, self._random, PLACED_SIGMA)
         with self._stack.time():
             caller = self._process.call(keys.PLACE, request)
         self._stack.run(TICK_MS)
@@ -150,30 +126,6 @@ class Run:
         linear = 0.0 if turns else chance.choice((0.0, 0.2, 0.5, 0.8, -0.3))
         angular = chance.uniform(-0.6, 0.6)
         self._stack.sources["teleop"].message = m.Drive(linear=linear, angular=angular, echo=0)
-
-    def _measure(self, tick: int) -> None:
-        """Measure the truth at the newest odometry, and deliver what is due."""
-        of = self._source
-        in_gap = (tick // 100) % 3 == 0 and of.gap > 0  # 10 s of 30 s
-        if tick % of.period == 0 and not in_gap and self._odometry is not None:
-            self._waiting.append((tick + of.delay, self._fix()))
-        while self._waiting and self._waiting[0][0] <= tick:
-            fix = replace(self._waiting.popleft()[1], boot=1, seq=tick)
-            self._stack.hand.post(keys.FIX.on(ROBOT, source=SOURCE), fix)
-
-    def _fix(self) -> m.Fix:
-        of, noise, truth = self._source, self._random.gauss, self._stack.vehicle.simulation.pose
-        assert self._odometry is not None
-        away = OUTLIER_M if self._random.random() < of.outliers else 0.0
-        turned = of.heading_sigma
-        return m.Fix(
-            x=truth.x + noise(0.0, of.sigma) + noise(0.0, away),
-            y=truth.y + noise(0.0, of.sigma) + noise(0.0, away),
-            heading=None if turned is None else truth.heading + noise(0.0, turned),
-            covariance=(of.sigma**2, 0, 0, 0, of.sigma**2, 0, 0, 0, (turned or 1.0) ** 2),
-            odom_boot=self._odometry.boot,
-            odom_seq=self._odometry.seq,
-        )
 
     def _compare(self) -> tuple[float, bool, float, float] | None:
         """Return NEES, whether the pose is placed, its error and its standard deviation."""

@@ -7,7 +7,7 @@ from verification.localization.run import measure
 
 def test_a_pose_is_as_good_as_it_says() -> None:
     found = measure(6, seconds=50.0)
-    assert found.source.mute
+    assert found.mute
     assert found.placed == 1.0
     assert found.used > 10
     assert found.error < 0.5
