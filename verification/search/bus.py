@@ -181,7 +181,7 @@ class Watch(Protocol):
 class Publisher:
     """Stamps messages as the real one does."""
 
-    passed_on = True  # there is a reader
+    passed_on = True  # every key reaches every subscription here
 
     def __init__(self, process: "Process", key: str, private: bool) -> None:
         self._key = key

@@ -172,8 +172,9 @@ class Oracle:
             book.operators.on_cleared()
 
     def on_start(self, process: Process) -> None:
-        """Open the book of a started process."""
-        self.comeback_ns = self.now_ns
+        """Open the book of a started process; odometry moves nothing."""
+        if process.name != "odom":
+            self.comeback_ns = self.now_ns
         if process.name == "safety":
             self.safety_books[process.boot] = SafetyBook(
                 process.boot,

@@ -156,7 +156,7 @@ class Trial:
 
 # --- faults -----------------------------------------------------------------------------------
 
-Step = Callable[[Trial], None]
+Step = Callable[[Any], None]  # of a trial
 
 
 def _inject(request: q.Asked) -> Step:

@@ -24,8 +24,12 @@ from verification.search.condition_books import (
 )
 from verification.search.operator_book import OperatorBook, direction_of
 
-LEASES_S = {"teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "ros2": 0.3, "nav": 0.2}
-PRIORITIES = {"teleop": 30, "checkout": 25, "web": 20, "demo": 15, "ros2": 11, "nav": 10}
+LEASES_S = {
+    "teleop": 0.3, "checkout": 0.3, "web": 0.3, "demo": 0.3, "ros2": 0.3, "nav": 0.2, "patrol": 0.3
+}  # fmt: skip
+PRIORITIES = {
+    "teleop": 30, "checkout": 25, "web": 20, "demo": 15, "ros2": 11, "nav": 10, "patrol": 5
+}  # fmt: skip
 AGES_S = {"velocity": 0.2, "bumper": 0.07, "link": 0.6, "switches": 3.0, "left": 2.0, "right": 2.0}
 GOOD_SAMPLES, SETTLE_S = 3, 0.5
 LAPSE_S = 1.0  # after its lease a source is as new
