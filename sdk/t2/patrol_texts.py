@@ -46,6 +46,10 @@ PHRASES: dict[str, Words] = {
         "A cause is latched: {causes:word}. Look at the vehicle, then reset.",
         "已锁定：{causes:word}。请查看车辆，然后复位。",
     ),
+    "patrol.forbidden": (
+        "Safety forbids every motion: {causes:word}. See `t2 doctor`.",
+        "安全服务禁止一切行驶：{causes:word}。请查看 `t2 doctor`。",
+    ),
     "patrol.safety_silent": ("Safety is silent.", "收不到安全服务的消息。"),
     "patrol.safety_restarted": ("Safety has restarted.", "安全服务已重启。"),
     "patrol.map_silent": (

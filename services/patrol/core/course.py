@@ -46,6 +46,7 @@ PROGRESS = 0.1  # m along the route
 REJOIN, NEAR = 5.0, 3.0  # m along the route: where a resumed round looks for it, and a driving one
 ARRIVED = 0.05  # m before a stop
 TURN_SPEED = 0.5  # rad/s
+STANDING = {"no_request", "neutral", "blocked", "limit_stop"}  # stops with which a round may begin
 CONVERGE = 1.0  # m until a vehicle beside the route is back on it
 
 
@@ -455,6 +456,9 @@ class Course:
             return Phrase("patrol.latched", {"causes": latched})
         if (source := safety.value.source) not in {None, SOURCE}:
             return Phrase("patrol.other_drives", {"source": source})
+        stops = (each.name for each in safety.value.causes if each.action != "slow")
+        if causes := tuple(name for name in stops if name not in STANDING):
+            return Phrase("patrol.forbidden", {"causes": causes})
         return None
 
     def _pose_refusal(self, now_ns: int) -> Phrase | None:

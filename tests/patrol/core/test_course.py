@@ -144,6 +144,14 @@ def test_an_emergency_stop_stops_a_round_and_a_reset_does_not_resume_it(
     vehicle.until("done")
 
 
+def test_a_round_begins_only_where_safety_would_let_it_move() -> None:
+    vehicle = Vehicle()
+    vehicle.causes = ("switches",)
+    assert vehicle.start() == "patrol.forbidden"
+    vehicle.causes = ("limit_stop",)
+    assert vehicle.start() is None
+
+
 def test_a_latch_that_is_reset_between_two_ticks_stops_too() -> None:
     vehicle = vehicle_in("driving")
     vehicle.latched = ("estop",)

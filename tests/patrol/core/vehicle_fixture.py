@@ -16,7 +16,9 @@ TICK_NS = round(TICK_S * NS_PER_S)
 LINE = ((0.0, 0.0, "home"), (4.0, 0.0, "gate"))
 LOOP = ((0.0, 0.0, "home"), (4.0, 0.0, "gate"), (4.0, 3.0), (0.0, 3.0), (0.0, 0.0))
 HOME = Pose(0.0, 0.0, 0.0)
-CAUSES: dict[m.CauseName, m.Action] = {"blocked": "stop", "limit_stop": "stop", "estop": "brake"}
+CAUSES: dict[m.CauseName, m.Action] = {
+    "blocked": "stop", "limit_stop": "stop", "switches": "stop", "estop": "brake",
+}  # fmt: skip
 
 
 def route(points: Sequence[Any] = LINE, *, stay: float = 0.0, **fields: Any) -> m.Route:
