@@ -229,7 +229,7 @@ class Course:
         if self.state in {"staying", "done"}:
             return self._stays_at if self.state == "staying" else ""
         ahead = (stop.station for stop in self.way.stops[self._stop :] if stop.station)
-        return next(ahead, self.way.home if self.way.homeward or self.way.is_closed else "")
+        return next(ahead, self.way.home)
 
     # --- ticks ------------------------------------------------------------------------------
 

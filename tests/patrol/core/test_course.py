@@ -72,6 +72,16 @@ def test_an_open_route_is_driven_back_home() -> None:
     assert math.dist((vehicle.at.x, vehicle.at.y), (0.0, 0.0)) < 0.1
 
 
+def test_after_the_last_station_of_an_open_route_the_next_one_is_home() -> None:
+    vehicle = Vehicle()
+    assert vehicle.start(route(((0.0, 0.0, "home"), (2.0, 0.0, "gate"), (4.0, 0.0)))) is None
+    vehicle.until("driving")
+    assert vehicle.message.station == "gate"
+    while vehicle.at.x < 3.0:
+        vehicle.run(0.1)
+    assert (vehicle.state, vehicle.message.station) == ("driving", "home")
+
+
 def test_nothing_moves_before_the_announcement_is_over() -> None:
     vehicle = vehicle_in("announcing")
     vehicle.run(0.8)
