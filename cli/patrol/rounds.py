@@ -94,8 +94,10 @@ def status(state: m.PatrolState, language: Language) -> dict[str, str]:
     """Return what a state contains, by name."""
     found = {"state": state.state, "text": render(state.phrases, language, state.text)}
     if state.round:
-        station = "" if state.state == "done" else state.station
-        found |= {"round": state.round, "progress": progress(state), "next station": station}
+        found["round"] = state.round
+    if state.round and state.state != "done":
+        station = "" if state.state == "staying" else state.station  # its text names that one
+        found |= {"progress": progress(state), "next station": station}
     if state.deviation is not None and state.sigma is not None and state.corridor is not None:
         used = state.deviation + 2 * state.sigma
         found["deviation"] = (

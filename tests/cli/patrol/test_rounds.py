@@ -61,6 +61,16 @@ def test_status(buses: BusFixture, tool: Tool) -> None:
     assert msgspec.convert(found, m.PatrolState).progress == STATE.progress
 
 
+@pytest.mark.parametrize("state", ["staying", "done"])
+def test_no_station_is_next_during_a_stay_nor_after_a_round(
+    state: m.RoundState, buses: BusFixture, tool: Tool
+) -> None:
+    FakePatrol(buses).state = replace(STATE, state=state)
+    out = tool("rounds", "status", text=True).out
+    assert "\nnext station:" not in out
+    assert ("\nprogress:" in out) == (state == "staying")
+
+
 def test_status_of_a_route_that_is_taught(buses: BusFixture, tool: Tool) -> None:
     stopped = (Phrase("teach.lost"),)
     taught = m.Teaching(route="a", length=2.0, points=3, stations=("home",), phrases=stopped)
