@@ -197,3 +197,12 @@ def test_a_route_is_taught_and_the_reason_for_its_end_is_shown(
     begun, marked = patrol.teachings
     assert (begun.action, begun.route, begun.station) == ("begin", "院子", "home")
     assert (marked.action, marked.station, marked.stay) == ("station", "gate 1", 2.5)
+
+
+def test_the_route_that_was_taught_is_the_one_to_start(page: Page, peer: Peer) -> None:
+    page.wait_for_selector("#route-list [aria-pressed=true]:has-text('yard')")
+    taught = Teaching(route="hall", length=3.0, points=9, stations=("home",))
+    peer.patrol = factories.patrol_state("idle", actions=(), teaching=taught)
+    page.wait_for_selector("#teaching:visible")
+    peer.patrol = factories.patrol_state("idle")
+    page.wait_for_selector("#route-list [aria-pressed=true]:has-text('hall')")

@@ -31,6 +31,7 @@ export function show(given) {
   $("patrol").classList.remove("old");
   $("patrol").hidden = !patrol;
   if (!patrol) return;
+  if (patrol.teaching) selected = patrol.teaching.route; // it is the one to start next
   ask("list", "");
   ask("route", shownRoute());
   showState();
