@@ -96,7 +96,8 @@ function driver(view) {
   const { id, may, other, overruled } = fast.driver;
   if (!may) return t("view_only");
   if (isDriver && overruled) return t("taken_over", other);
-  if (isDriver) return other ? t("drives", other) : t("you_drive");
+  if (other) return t("drives", other);
+  if (isDriver) return t("you_drive");
   if (id) return t("drives", driverName(fast));
   const source = fast.safety?.source;
   return source ? t("drives", source) : t("nobody_drives");
