@@ -24,11 +24,11 @@ PHRASES: dict[str, Words] = {
         "已受阻 {seconds:.0f} s：请清空通道，或返回起点。",
     ),
     "patrol.paused": (
-        "Paused: resume the round to go on.", "已暂停：恢复巡逻后继续。",
+        "Paused: resume the round to go on.", "已暂停：请选择“继续”。",
     ),
     "patrol.overruled": (
         "Paused: {source} has taken control. Resume the round to go on.",
-        "已暂停：{source} 取得控制权。恢复巡逻后继续。",
+        "已暂停：{source} 取得控制权。如需继续巡逻，请选择“继续”。",
     ),
     "patrol.home": ("The round is complete, and the vehicle is at home.", "巡逻完成，车辆已回到起点。"),
     "patrol.returned": (
@@ -39,7 +39,7 @@ PHRASES: dict[str, Words] = {
         "The round was aborted: drive the vehicle home.", "巡逻已中止：请将车辆驾驶回起点。",
     ),
     "patrol.resume": (
-        "Fix the cause, then resume the round.", "请排除原因，然后恢复巡逻。",
+        "When the cause is fixed, resume the round.", "原因排除后，请选择“继续”。",
     ),
     # why a round stops, or cannot go on
     "patrol.latched": (
