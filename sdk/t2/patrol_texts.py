@@ -117,8 +117,9 @@ PHRASES: dict[str, Words] = {
         "路线 {route} 属于机器人 {other}，本机为 {robot}。若两者使用同一地图，请修改其文件中的 robot。",
     ),
     "patrol.not_home": (
-        "The vehicle is {distance:.1f} m from home, the first station of {route}: drive it there.",
-        "车辆距路线 {route} 的起点（第一站）{distance:.1f} m：请将其驾驶到起点。",
+        "The vehicle is {distance:.2f} m from home, the first station of {route}, and {corridor:.2f} m "
+        "are allowed: drive it there.",
+        "车辆距路线 {route} 的起点（第一站）{distance:.2f} m，允许 {corridor:.2f} m：请将其驾驶到起点。",
     ),
     "patrol.other_drives": (
         "{source} is in control: let go of the controls.", "{source} 拥有控制权：请松开操纵装置。",
@@ -149,6 +150,12 @@ PHRASES: dict[str, Words] = {
     "teach.ended": (
         "The route {route} is saved: {length:.1f} m, {count} stations.",
         "路线 {route} 已保存：{length:.1f} m，{count} 个站点。",
+    ),
+    "teach.loop": ("It is a loop: a round ends where it begins.", "该路线为环线：巡逻在起点结束。"),
+    "teach.open": (
+        "It ends {distance:.1f} m from home, so a round drives back along it; a loop ends within "
+        "{closing:.1f} m.",
+        "终点距起点 {distance:.1f} m，巡逻将沿原路返回；终点距起点 {closing:.1f} m 以内时为环线。",
     ),
     "teach.cancelled": ("Teaching of {route} is cancelled.", "已取消示教 {route}。"),
     "teach.saved": ("The route {route} is saved.", "路线 {route} 已保存。"),

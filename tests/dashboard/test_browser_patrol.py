@@ -46,7 +46,7 @@ HOME = """(drawn) => {
   const [red, green, blue] = it.getContext('2d').getImageData(x, y, 1, 1).data;
   return (green > 2 * red && green > 2 * blue) === drawn;
 }"""
-NOT_HOME = Phrase("patrol.not_home", {"distance": 7.0, "route": "hall"})
+NOT_HOME = Phrase("patrol.not_home", {"distance": 7.0, "route": "hall", "corridor": 0.5})
 
 
 class PatrolServer:
@@ -133,7 +133,7 @@ def test_a_double_click_is_one_call_with_the_heartbeat_and_a_refusal_is_shown(
     assert page.is_disabled("#route-list button:has-text('old')")
     page.wait_for_selector("[data-round=start]:enabled")
     page.dblclick("[data-round=start]")
-    wait_for_text(page, "#toasts", "The vehicle is 7.0 m from home")
+    wait_for_text(page, "#toasts", "The vehicle is 7.00 m from home")
     wait_for_text(page, "#events", "requests of patrol: start.")
     page.wait_for_selector("[data-round=start]:enabled")  # the end of the lock
     assert [(it.action, it.route) for it in patrol.rounds] == [("start", "hall")]

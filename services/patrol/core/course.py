@@ -166,8 +166,7 @@ class Course:
             distance = math.dist((x, y), (pose.x, pose.y))
             if distance + 2 * covariance.sigma > self.route.corridor:
                 if distance > self.route.corridor:
-                    fields: dict[str, m.Field] = {"distance": distance, "route": self.route.name}
-                    return Phrase("patrol.not_home", fields)
+                    return self._not_home(distance)
                 return self._uncertain(distance, covariance.sigma)
         fit = self.way.fit(pose, covariance, self.along, REJOIN)
         return self._beside(fit)
@@ -518,6 +517,13 @@ class Course:
             fields: dict[str, m.Field] = {"deviation": deviation, "corridor": fit.corridor}
             return Phrase("patrol.outside", fields)
         return self._uncertain(deviation, fit.sigma)
+
+    def _not_home(self, distance: float) -> Phrase:
+        route = self.route
+        fields: dict[str, m.Field] = {
+            "distance": distance, "route": route.name, "corridor": route.corridor
+        }  # fmt: skip
+        return Phrase("patrol.not_home", fields)
 
     def _uncertain(self, deviation: float, sigma: float) -> Phrase:
         corridor = self.route.corridor

@@ -1,11 +1,14 @@
 """Patrol of one vehicle: the round, the route that is being taught, and who may ask for what."""
 
+import math
+
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
 from services.patrol.core.course import Course, Inputs, Note, OpenRound, is_known
 from services.patrol.core.routes import length, stations
-from services.patrol.core.teaching import OpenTeaching, Refused, Teaching
+from services.patrol.core.teaching import CORRIDOR, OpenTeaching, Refused, Teaching
+from services.patrol.core.way import CLOSED
 from t2 import messages as m
 from t2.messages import Phrase, Phrases
 from t2.words import render
@@ -181,7 +184,12 @@ class Patrol:
         fields: dict[str, m.Field] = {
             "route": route.name, "length": length(route), "count": len(stations(route))
         }  # fmt: skip
-        return self._noted("teaching", Phrase("teach.ended", fields))
+        first, last = route.points[0], route.points[-1]
+        distance = math.dist((first.x, first.y), (last.x, last.y))
+        is_loop = distance <= CLOSED
+        way: dict[str, m.Field] = {} if is_loop else {"distance": distance, "closing": CORRIDOR}
+        phrase = Phrase("teach.loop" if is_loop else "teach.open", way)
+        return self._noted("teaching", Phrase("teach.ended", fields), phrase)
 
     def cancel(self) -> Phrases:
         """End teaching without a route; raise ``Refused``."""
@@ -194,9 +202,9 @@ class Patrol:
             return Phrase("teach.driven", {"route": name})
         return None
 
-    def _noted(self, name: m.EventName, phrase: Phrase) -> Phrases:
-        self.notes.append(Note(name, "info", (phrase,)))
-        return (phrase,)
+    def _noted(self, name: m.EventName, *phrases: Phrase) -> Phrases:
+        self.notes.append(Note(name, "info", phrases))
+        return phrases
 
     @property
     def _taught(self) -> Teaching:

@@ -25,15 +25,16 @@ def test_a_route_is_taught_marked_and_ended() -> None:
     vehicle.step()
     made = taught(vehicle)
     assert [each.name for each in vehicle.patrol.station("gate", 2.0)] == ["teach.station"]
-    assert vehicle.message.teaching == m.Teaching(
-        route="yard", length=pytest.approx(1.0, abs=0.05), points=2, stations=("home", "gate")
-    )
+    teaching = vehicle.message.teaching
+    assert teaching
+    assert (teaching.route, teaching.points, teaching.stations) == ("yard", 2, ("home", "gate"))
+    assert teaching.length == pytest.approx(1.0, abs=0.05)
     assert vehicle.message.actions == ()
     open_teaching = vehicle.patrol.open_teaching
     assert open_teaching
     assert [each.station for each in open_teaching.points] == ["home", "gate"]
-    assert [each.name for each in vehicle.patrol.end(made)] == ["teach.ended"]
-    assert (vehicle.message.teaching, vehicle.patrol.open_teaching) == (None, None)
+    assert [each.name for each in vehicle.patrol.end(made)] == ["teach.ended", "teach.open"]
+    assert vehicle.patrol.open_teaching is None
     assert stations(made) == ("home",)
     assert length(made) == pytest.approx(1.0, abs=0.05)
 
