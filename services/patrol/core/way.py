@@ -16,6 +16,7 @@ from t2 import messages as m
 from t2.motion import FACING
 
 CLOSED = 0.1  # m between the ends of a route: a round ends where it began
+PASSED = 1.0  # m behind the vehicle: it does not drive back to this station
 
 
 class Stop(Struct, frozen=True):
@@ -54,10 +55,11 @@ class Way:
         return Fit(nearest, across(covariance, nearest.direction), self._corridor)
 
     def next_stop(self, stop: int, along: float) -> int:
-        """Return which stop is ahead: the first station not visited, or the first corner ahead."""
+        """Return which stop is ahead: a station not visited and not passed, or a corner."""
         for number in range(stop, len(self.stops)):
             each = self.stops[number]
-            if each.station or self.track.at[each.index] > along:
+            behind = PASSED if each.station else 0.0
+            if self.track.at[each.index] > along - behind:
                 return number
         return len(self.stops) - 1
 

@@ -254,6 +254,20 @@ def test_a_vehicle_that_was_moved_along_the_route_goes_on_from_there(along: floa
     assert [each.station for each in record.visits] == ["gate"]
 
 
+@pytest.mark.parametrize(("past", "visits"), [(0.5, ["gate"]), (2.5, []), (4.5, [])])
+def test_a_vehicle_that_was_moved_past_a_station_goes_on(past: float, visits: list[str]) -> None:
+    corner = (8.5, 5.0)
+    vehicle = Vehicle().driving(route(((0.0, 0.0, "home"), (4.0, 0.0, "gate"), (8.5, 0.0), corner)))
+    vehicle.run(5.0)
+    assert vehicle.act("pause") is None
+    vehicle.at = Pose(4.0 + past, 0.0, 0.0)
+    assert vehicle.act("resume") is None
+    vehicle.until("returning")
+    record = vehicle.patrol.course and vehicle.patrol.course.diary.record
+    assert record
+    assert [each.station for each in record.visits] == visits
+
+
 @pytest.mark.parametrize("cause", ["blocked", "limit_stop"])
 def test_it_waits_and_goes_on_by_itself(cause: m.CauseName) -> None:
     vehicle = vehicle_in("driving")

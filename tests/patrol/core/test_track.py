@@ -68,10 +68,10 @@ def test_it_stops_at_stations_corners_and_the_end() -> None:
     assert home.progress(0.0) == way.progress(14.0) == pytest.approx(14.0)
 
 
-def test_a_corner_that_was_passed_is_left_out_and_a_station_is_not() -> None:
+def test_a_corner_that_was_passed_is_left_out_and_a_station_only_far_behind() -> None:
     way = Way(route(LOOP))
     assert [way.next_stop(1, along) for along in (0.0, 5.0, 7.5, 99.0)] == [1, 1, 2, 3]
-    assert way.next_stop(0, 99.0) == 0
+    assert [way.next_stop(0, along) for along in (4.9, 5.1, 99.0)] == [0, 1, 3]
     assert way.points_to(0, 99.0, 1.0) == [(4.0, 0.0)]
     assert way.points_to(2, 1.0, 1.0) == [(2.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0)]
 
