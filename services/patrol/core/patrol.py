@@ -84,6 +84,9 @@ class Patrol:
         course = self.course
         if course is None or action not in course.actions:
             return self._not_now(action)
+        # A restored round may be in a folder that was copied from another robot.
+        if action in {"resume", "return"} and (foreign := self._foreign(course.route)):
+            return foreign
         reason = self._act(course, action, now_ns, wall_ns)
         self._take_notes(course)
         return reason
@@ -123,6 +126,9 @@ class Patrol:
             return Phrase("patrol.busy", {"route": self.course.route.name})
         if self._teaching is not None:
             return Phrase("patrol.teaching", {"route": self._teaching.name})
+        return self._foreign(route)
+
+    def _foreign(self, route: m.Route) -> Phrase | None:
         if route.robot != self._robot:
             fields: dict[str, m.Field] = {
                 "route": route.name, "other": route.robot, "robot": self._robot

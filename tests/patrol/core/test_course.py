@@ -7,8 +7,9 @@ import pytest
 
 from common.pose import Pose
 from services.patrol.core.course import RULES, STATES
+from services.patrol.core.patrol import Patrol
 from t2 import messages as m
-from tests.patrol.core.vehicle_fixture import LOOP, PATIENCE_S, Vehicle, route
+from tests.patrol.core.vehicle_fixture import ANNOUNCE_S, LOOP, PATIENCE_S, Vehicle, route
 
 ACTIVE: tuple[m.RoundState, ...] = ("announcing", "driving", "staying", "waiting", "returning")
 
@@ -117,6 +118,16 @@ def test_a_round_begins_only_at_home(at: Pose, sigma: float, reason: str | None)
 
 def test_a_route_of_another_robot_is_refused() -> None:
     assert Vehicle().start(route(robot="002")) == "patrol.other_robot"
+
+
+def test_a_restored_round_of_another_robot_is_not_resumed() -> None:
+    vehicle = Vehicle().driving()
+    course = vehicle.patrol.course
+    assert course
+    vehicle.patrol = Patrol("002", ANNOUNCE_S, PATIENCE_S)
+    vehicle.patrol.restore(course.open, course.route, vehicle.wall_ns)
+    assert [vehicle.act(each) for each in ("resume", "return")] == ["patrol.other_robot"] * 2
+    assert vehicle.act("abort") is None
 
 
 def test_one_round_at_a_time() -> None:
