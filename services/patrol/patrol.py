@@ -1,5 +1,6 @@
 """Patrol on the bus: safety's state and poses in the map in, requests of its source out."""
 
+import contextlib
 import os
 import time
 from datetime import UTC, datetime, tzinfo
@@ -336,8 +337,11 @@ class PatrolService:
 
 def zone(name: str) -> tzinfo:
     """Return the time zone of the schedule; empty: that of the computer."""
-    if name := name or os.environ.get("TZ", "").lstrip(":"):
+    if name:
         return ZoneInfo(name)
+    if name := os.environ.get("TZ", "").lstrip(":"):
+        with contextlib.suppress(OSError, ValueError, KeyError):  # a path, or a rule as CET-1CEST
+            return ZoneInfo(name)
     try:
         with LOCALTIME.open("rb") as file:
             return ZoneInfo.from_file(file)

@@ -1,9 +1,13 @@
 """Settings of patrol: what is refused, and with which text."""
 
+from datetime import datetime
+
 import pytest
 
 from services.patrol.config import Patrol, ScheduledRound
 from services.patrol.patrol import zone
+
+NOON = datetime(2026, 6, 1, 12)
 
 
 @pytest.mark.parametrize("cron", ["0 22 * * *", "*/15 8-18 * * 1-5", "30 2 1 * *"])
@@ -28,4 +32,8 @@ def test_the_time_zone_is_that_of_the_computer(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("TZ", ":Europe/Berlin")
     assert str(zone("")) == "Europe/Berlin"
     monkeypatch.delenv("TZ")
-    assert zone("") is not None
+    computer = zone("").utcoffset(NOON)
+    assert computer is not None
+    for other in (":/etc/localtime", "CET-1CEST", "../x"):
+        monkeypatch.setenv("TZ", other)
+        assert zone("").utcoffset(NOON) == computer
