@@ -15,7 +15,7 @@ ledger that was cut is skipped.
 import contextlib
 import os
 from collections.abc import Iterator
-from itertools import chain, count
+from itertools import chain, count, islice
 from pathlib import Path
 
 import msgspec
@@ -34,6 +34,7 @@ LINES = 5000  # of the ledger; the older half is removed at twice as many
 TRACKS = 500  # the newest ones are kept
 ROUTES, STATIONS = 500, 128  # that are listed, of a route
 NAME = 200  # characters of a file that is no route
+TAIL = 2**20  # bytes of the ledger that are listed
 WAITING = 100  # lines at most that wait for a disk
 
 
@@ -59,8 +60,10 @@ class Store:
 
     def routes(self) -> list[m.RouteSummary]:
         """Return all routes of the folder, those with a problem, too."""
-        names = sorted(file.stem for file in self._routes.glob("*.json"))
-        return [self._summary(name) for name in names[:ROUTES]]
+        files = sorted(self._routes.glob("*.json"))
+        names = (each.stem for each in files if each.suffix and _is_text(each.stem))
+        listed = (name for name in names if self._route_file(name).is_file())
+        return [self._summary(name) for name in islice(listed, ROUTES)]
 
     def has(self, name: str) -> bool:
         """Return whether there is a file of this route."""
@@ -69,10 +72,10 @@ class Store:
     def route(self, name: str) -> m.Route | Phrase:
         """Return a route, or why it cannot be driven."""
         file = self._route_file(name)
+        if not file.is_file():  # a pipe would be waited for
+            return Phrase("route.none", {"route": name})
         try:
             route = msgspec.json.decode(read_text(file), type=m.Route)
-        except FileNotFoundError:
-            return Phrase("route.none", {"route": name})
         except (OSError, ValueError) as error:  # of msgspec, too
             reason = error.strerror if isinstance(error, OSError) else str(error)
             return Phrase("route.unreadable", {"file": file.name, "reason": reason or "?"})
@@ -166,9 +169,15 @@ class Store:
     def rounds(self, most: int) -> list[m.Round]:
         """Return the newest rounds, the newest first; those that wait for the disk, too."""
         with contextlib.suppress(FileNotFoundError):
-            lines = self._ledger.read_bytes().splitlines()[-most:]
-            return [*_decoded(lines), *self.waiting][::-1][:most]
+            return [*_decoded(self._tail()[-most:]), *self.waiting][::-1][:most]
         return self.waiting[::-1][:most]
+
+    def _tail(self) -> list[bytes]:
+        """Return the last lines of the ledger: the loop that drives must not wait for all."""
+        with self._ledger.open("rb") as file:
+            begin = max(0, file.seek(0, os.SEEK_END) - TAIL)
+            file.seek(begin)
+            return file.read().splitlines()[bool(begin) :]  # the first one is cut
 
     def round(self, round_id: str) -> m.Round | None:
         """Return a round of the ledger; None for an unknown id."""
@@ -215,6 +224,11 @@ def _summary(name: str, found: m.Route | Phrase) -> m.RouteSummary:
     if isinstance(found, Phrase):
         return m.RouteSummary(name=name[:NAME], problem=render([found]), phrases=(found,))
     return m.RouteSummary(name=name, length=length(found), stations=stations(found)[:STATIONS])
+
+
+def _is_text(name: str) -> bool:
+    """Return whether the name of a file is UTF-8, and so can be sent."""
+    return not any("\ud800" <= sign <= "\udfff" for sign in name)
 
 
 def route_text(route: m.Route) -> bytes:

@@ -1,6 +1,7 @@
 """The folder of patrol: what a person edits, and what a power loss or a full disk leaves."""
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,18 @@ def test_a_file_that_was_cut_is_a_problem_of_one_route(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+def test_what_is_no_file_of_a_route_is_not_listed(tmp_path: Path) -> None:
+    store, folder = Store(tmp_path), tmp_path / "routes"
+    store.save_route(route())
+    (folder / ".#yard.json").symlink_to("operator@host.1")  # as an editor does
+    (folder / ".json").touch()
+    (folder / "folder.json").mkdir()
+    os.mkfifo(folder / "pipe.json")
+    Path(os.fsdecode(os.fsencode(folder) + b"/stra\xdfe.json")).touch()
+    assert [each.name for each in store.routes()] == ["yard"]
+    assert reason(store.route("pipe")) == "route.none"
+
+
 def test_an_edited_file_is_read_again(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.save_route(route())
@@ -109,6 +122,19 @@ def test_the_ledger_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert 10 <= len(store.rounds(LINES)) <= 20
     assert store.rounds(1)[0].id == "2026-00030"
     assert len([*tmp_path.glob("rounds/*.json")]) == 3
+
+
+def test_a_long_ledger_is_listed_from_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = Store(tmp_path)
+    for number in range(1, 6):
+        store.end(record(number), route(), [])
+    size = (tmp_path / "rounds.jsonl").stat().st_size
+    monkeypatch.setattr("services.patrol.store.TAIL", size // 2)
+    assert [each.id for each in store.rounds(1000)] == ["2026-00005", "2026-00004"]
+    found = store.round("2026-00001")
+    assert found is not None
 
 
 def test_a_round_waits_for_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
