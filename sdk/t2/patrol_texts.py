@@ -88,6 +88,11 @@ PHRASES: dict[str, Words] = {
         "threshold or a cable under it.",
         "通道畅通，但车辆 {seconds:.0f} s 未移动：请检查车下是否有门槛或线缆。",
     ),
+    "patrol.frozen": (
+        "The position does not change although the vehicle drives, for {distance:.1f} m: it hangs, or "
+        "the position is frozen.",
+        "车辆行驶 {distance:.1f} m，位置没有变化：车辆被卡住，或位置数据停滞。",
+    ),
     "patrol.blocked_stop": (
         "Blocked for {seconds:.0f} s, and the route says to stop then.",
         "已受阻 {seconds:.0f} s，按路线设置停止。",

@@ -51,8 +51,8 @@ class PatrolService:
         self._sent: tuple[object, ...] = ()  # what changed of the state last: published at once
         self._published_ns = 0
         self._written: tuple[str, float] = ("", 0.0)  # state and place of the noted round
-        self._taught = 0  # points of the noted route
-        self._is_lit = False
+        self._taught = ("", 0)  # name and points of the noted route
+        self._is_lit: bool | None = None  # not known: an earlier start may have lit it
         bus = node.bus
         self._source = DriveSource(bus, SOURCE)
         self._to_state = bus.publisher(keys.PATROL)
@@ -83,7 +83,7 @@ class PatrolService:
         """Note the black box of a latch during a round."""
         event, course = arrival.message, self._patrol.course
         if event.name == "black_box" and course is not None and self._patrol.is_open:
-            course.diary.file(str(event.about.get("file", "")))
+            course.diary.file(Path(str(event.about.get("file", ""))).name)
 
     def _tick(self, now_ns: int) -> None:
         request = self._patrol.tick(now_ns, time.time_ns())
@@ -155,9 +155,9 @@ class PatrolService:
         if request.action == "begin":
             if self._store.has(name):
                 raise Refused(Phrase("teach.exists", {"route": name}))
-            return patrol.begin(name, request.station, request.stay)
+            return patrol.begin(name, request.station, request.stay, clock.now_ns())
         if request.action == "station":
-            return patrol.station(request.station, request.stay)
+            return patrol.station(request.station, request.stay, clock.now_ns())
         if request.action == "cancel":
             return patrol.cancel()
         if request.action == "end":
@@ -261,7 +261,7 @@ class PatrolService:
 
     def _begin(self, due: Due, now_ns: int) -> Phrase | None:
         if due.late_s > self._node.config.patrol.grace:
-            return Phrase("patrol.late", {"seconds": due.late_s})
+            return Phrase("patrol.late", {"seconds": min(due.late_s, m.MAX_NUMBER)})
         return self._start(due.route, due.schedule, now_ns)
 
     # --- the folder -------------------------------------------------------------------------
@@ -274,7 +274,7 @@ class PatrolService:
             taught = self._store.read_teaching()
             if taught is not None and not self._store.has(taught.route):
                 self._patrol.restore_teaching(taught)
-                self._taught = len(taught.points)
+                self._taught = taught.route, len(taught.points)
         except OSError as error:
             self._unwritten(error)
 
@@ -297,9 +297,9 @@ class PatrolService:
 
     def _write_teaching(self, _: int) -> None:
         taught = self._patrol.open_teaching
-        points = 0 if taught is None else len(taught.points)
-        if points != self._taught:
-            self._taught = points
+        noted = ("", 0) if taught is None else (taught.route, len(taught.points))
+        if noted != self._taught:
+            self._taught = noted
             try:
                 self._store.write_teaching(taught)
             except OSError as error:
@@ -328,6 +328,7 @@ class PatrolService:
         """Note where an open round is, so that the next start resumes it."""
         course = self._patrol.course
         self._write_teaching(0)
+        self._write_waiting(0)
         if course is not None and self._patrol.is_open:
             try:
                 self._store.write_open(course.open, sync=True)

@@ -30,7 +30,7 @@ from t2.messages import Phrase
 from t2.text_file import read_text
 from t2.words import render
 
-LINES = 5000  # of the ledger; the older half is removed at twice as many
+LEDGER = 4 * 2**20  # bytes; then the older half is removed
 TRACKS = 500  # the newest ones are kept
 ROUTES, STATIONS = 500, 128  # that are listed, of a route
 NAME = 200  # characters of a file that is no route
@@ -145,12 +145,10 @@ class Store:
     def end(self, record: m.Round, route: m.Route, track: list[m.TrackPoint]) -> None:
         """Note a round that is over; what cannot be written waits for ``write_waiting``."""
         self.waiting = [*self.waiting, record][-WAITING:]
-        try:
-            self.write_waiting()
-            self._write_track(record, route, track)
-        finally:
-            self._open.unlink(missing_ok=True)
-        for old in sorted(self._rounds.glob("*.json"))[:-TRACKS]:
+        self.write_waiting()
+        self._write_track(record, route, track)
+        files = sorted(self._rounds.glob("*.json"), key=lambda file: file.stat().st_mtime_ns)
+        for old in files[:-TRACKS]:
             old.unlink()
 
     def new_id(self, stamp: str, route: str) -> str:
@@ -163,8 +161,14 @@ class Store:
         """Append the waiting rounds to the ledger."""
         while self.waiting:
             self._append(self.waiting[0])
-            del self.waiting[0]
+            self._close(self.waiting.pop(0).id)
         self._bound()
+
+    def _close(self, round_id: str) -> None:
+        """Remove the note of the open round; a later round may have begun."""
+        with contextlib.suppress(FileNotFoundError, ValueError):
+            if msgspec.json.decode(self._open.read_bytes(), type=OpenRound).round.id == round_id:
+                self._open.unlink()
 
     def rounds(self, most: int) -> list[m.Round]:
         """Return the newest rounds, the newest first; those that wait for the disk, too."""
@@ -213,11 +217,9 @@ class Store:
 
     def _bound(self) -> None:
         with contextlib.suppress(FileNotFoundError):
-            if self._ledger.stat().st_size < LINES * 200:  # bytes of the shortest line
-                return
-            lines = self._ledger.read_bytes().splitlines(keepends=True)
-            if len(lines) > 2 * LINES:
-                _replace(self._ledger, b"".join(lines[-LINES:]))
+            if self._ledger.stat().st_size > LEDGER:
+                newer = self._ledger.read_bytes()[-LEDGER // 2 :]
+                _replace(self._ledger, newer.partition(b"\n")[2])  # the first line is cut
 
 
 def _summary(name: str, found: m.Route | Phrase) -> m.RouteSummary:
@@ -246,7 +248,7 @@ def quoted(value: object) -> str:
 
 def _decoded(lines: list[bytes]) -> Iterator[m.Round]:
     for line in lines:
-        with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
+        with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
             yield msgspec.json.decode(line, type=m.Round)
 
 

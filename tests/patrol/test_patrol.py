@@ -24,6 +24,8 @@ ECHO = 7  # of the factory's state of safety
 class Service:
     """Patrol on a fake bus, with a vehicle that does what it requests."""
 
+    node: FakeNode[PatrolConfig]
+
     def __init__(self, folder: Path, wall: datetime, **settings: Any) -> None:
         self.wall = wall
         self.vehicle = Vehicle()
@@ -31,6 +33,8 @@ class Service:
 
     def start_service(self, folder: Path, **settings: Any) -> None:
         """Start the service, or start it again."""
+        if hasattr(self, "node"):
+            self.node.loop.close()
         usual: dict[str, Any] = {"folder": str(folder), "announce": 1.0, "patience": 20.0}
         self.node = FakeNode("patrol", PatrolConfig(patrol=Patrol(**usual | settings)))
         self.service = PatrolService(self.node)
@@ -253,7 +257,7 @@ def test_the_lamp_is_lit_while_a_round_is_under_way(service: Service, tmp_path: 
     service.round("start", route="yard")
     service.until("done")
     asked = [request for path, request in service.node.fake.asked if path == keys.SET_LED.path]
-    assert [(each.channel, each.mode) for each in asked] == [(3, 2), (3, 0)]
+    assert [(each.channel, each.mode) for each in asked] == [(3, 0), (3, 2), (3, 0)]
 
 
 def test_black_boxes_of_a_round_are_in_its_record(service: Service) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from services.patrol.core.course import OpenRound
 from services.patrol.core.teaching import OpenTeaching
-from services.patrol.store import LINES, Store
+from services.patrol.store import Store
 from t2 import messages as m
 from t2.messages import Phrase
 from tests.patrol.core.vehicle_fixture import LOOP, route
@@ -114,12 +114,13 @@ def test_the_ledger_survives_a_line_that_was_cut(tmp_path: Path) -> None:
 
 
 def test_the_ledger_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.patrol.store.LINES", 10)
+    monkeypatch.setattr("services.patrol.store.LEDGER", 4000)
     monkeypatch.setattr("services.patrol.store.TRACKS", 3)
     store = Store(tmp_path)
     for number in range(1, 31):
         store.end(record(number), route(), [])
-    assert 10 <= len(store.rounds(LINES)) <= 20
+    assert (tmp_path / "rounds.jsonl").stat().st_size <= 4000
+    assert 5 <= len(store.rounds(1000)) < 30
     assert store.rounds(1)[0].id == "2026-00030"
     assert len([*tmp_path.glob("rounds/*.json")]) == 3
 
@@ -143,10 +144,11 @@ def test_a_round_waits_for_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(Store, "_append", full)
     with pytest.raises(OSError, match="No space"):
         store.end(record(), route(), [])
-    assert store.read_open() is None  # it is over
+    assert Store(tmp_path).read_open()  # a restart finds it
     assert [each.id for each in store.rounds(10)] == ["2026-00001"]
     monkeypatch.undo()
     store.write_waiting()
+    assert Store(tmp_path).read_open() is None
     assert [each.id for each in Store(tmp_path).rounds(10)] == ["2026-00001"]
 
 

@@ -47,6 +47,9 @@ REJOIN, NEAR = 5.0, 3.0  # m along the route: where a resumed round looks for it
 ARRIVED = 0.05  # m before a stop
 TURN_SPEED = 0.5  # rad/s
 STANDING = {"no_request", "neutral", "blocked", "limit_stop"}  # stops with which a round may begin
+CAUSES = 8  # phrases of safety that a state repeats
+FROZEN_M, FROZEN_RAD = 1.0, 1.5  # that the vehicle was to move, without a change of the pose
+CHANGED_M, CHANGED_RAD = 0.1, 0.1  # of the pose
 CONVERGE = 1.0  # m until a vehicle beside the route is back on it
 
 
@@ -122,6 +125,8 @@ class Course:
         self._hindered_ns: int | None = None  # since when the way is not free
         self._free_ns = 0  # when it was not
         self._progress = 0.0, 0  # m, and when
+        self._still: Pose | None = None  # the pose since when nothing has changed
+        self._due = 0.0, 0.0  # m, rad: what the vehicle was to move since then
         self._told_blocked = False
         self._cause: Phrases = ()  # of the last stop by safety
         self._place = self.way.track.points[0]  # the newest known one, m
@@ -247,6 +252,9 @@ class Course:
         if not STATES[self.state].moves:
             return self._requests.tick(None)
         wanted = self._velocity(now_ns)
+        if self._is_frozen(wanted):
+            self._stopped(Phrase("patrol.frozen", {"distance": FROZEN_M}), wall_ns)
+            return self._requests.tick(None)
         if wanted == (0.0, 0.0) or self._hears():
             self._heard_ns = now_ns
         return self._requests.tick(request(*wanted))
@@ -343,7 +351,7 @@ class Course:
         if is_hindered:
             self._free_ns = now_ns
             self._hindered_ns = self._hindered_ns or now_ns
-            self._cause = state.phrases
+            self._cause = state.phrases[:CAUSES]
         if self._hindered_ns is not None and now_ns - self._free_ns > FREE_S * NS_PER_S:
             self._hindered_ns = None
             if self.state == "waiting":
@@ -364,7 +372,7 @@ class Course:
                 self._stopped(Phrase("patrol.stuck", fields), wall_ns)
             return
         self._told_blocked = True
-        if self.route.blocked == "stop" and not self.way.homeward:
+        if self.route.blocked == "stop":
             self._stopped(Phrase("patrol.blocked_stop", fields), wall_ns)
             return
         self._enter("waiting", Phrase("patrol.blocked", fields), *self._cause)
@@ -382,6 +390,20 @@ class Course:
             return 0.0, 0.0
         located, _ = located_of(pose.value)
         return self._path.velocity(located, self._path.left(located))
+
+    def _is_frozen(self, wanted: tuple[float, float]) -> bool:
+        """Return whether the pose does not change although the vehicle was to move."""
+        pose, _ = located_of(self._pose)
+        before, limits = self._still, self._state.limits
+        obeys = self._hindered_ns is None and self._state.source == SOURCE
+        if before is None or not obeys or _has_changed(before, pose):
+            self._still, self._due = pose, (0.0, 0.0)
+            return False
+        way, turn = self._due
+        way += min(abs(wanted[0]), limits.forward) * TICK_S
+        turn += min(abs(wanted[1]), limits.angular) * TICK_S
+        self._due = way, turn
+        return way > FROZEN_M or turn > FROZEN_RAD
 
     def _hears(self) -> bool:
         state = self._state
@@ -404,7 +426,7 @@ class Course:
         """Drive on the way."""
         self.until_ns, self._path = None, None
         self._progress, self._heard_ns = (self.along, now_ns), now_ns
-        self._hindered_ns, self._told_blocked = None, False
+        self._hindered_ns, self._told_blocked, self._still = None, False, None
         self._enter(*self._moving())
 
     def _homeward(self) -> None:
@@ -529,6 +551,11 @@ class Course:
         corridor = self.route.corridor
         fields: dict[str, m.Field] = {"deviation": deviation, "sigma": sigma, "corridor": corridor}
         return Phrase("patrol.uncertain", fields)
+
+
+def _has_changed(before: Pose, now: Pose) -> bool:
+    turn = abs(math.remainder(now.heading - before.heading, math.tau))
+    return math.dist((before.x, before.y), (now.x, now.y)) > CHANGED_M or turn > CHANGED_RAD
 
 
 def is_known(pose: m.MapPose) -> bool:

@@ -12,7 +12,7 @@ from t2.words import render
 SPACING = 0.2  # m between two poses of the track, at first
 JUMP = 0.5  # m between two poses: a correction, and not driven
 MOST = 200  # visits and halts each: the rest of a round that never ends is not listed
-FILES = 20  # black boxes
+FILES, NAME = 20, 200  # black boxes, and characters of the name of one
 
 
 class Diary:
@@ -54,7 +54,7 @@ class Diary:
     def file(self, name: str) -> None:
         """Note a black box of this time."""
         if len(self.record.recordings) < FILES:
-            self.record = replace(self.record, recordings=(*self.record.recordings, name))
+            self.record = replace(self.record, recordings=(*self.record.recordings, name[:NAME]))
 
     def halt(
         self, state: m.RoundState, phrases: Phrases, at: tuple[float, float], wall_ns: int

@@ -4,8 +4,8 @@ import math
 
 from msgspec.structs import replace
 
-from common.freshness import NS_PER_S, Latest
-from services.patrol.core.course import Course, Inputs, Note, OpenRound, is_known
+from common.freshness import NS_PER_S, Latest, fresh
+from services.patrol.core.course import FRESH_S, Course, Inputs, Note, OpenRound, is_known
 from services.patrol.core.routes import length, stations
 from services.patrol.core.teaching import CORRIDOR, OpenTeaching, Refused, Teaching
 from services.patrol.core.way import CLOSED
@@ -13,6 +13,7 @@ from t2 import messages as m
 from t2.messages import Phrase, Phrases
 from t2.words import render
 
+STATIONS = 128  # that the state lists
 SPEED = 0.5  # m/s, of a new route; its file has it
 
 
@@ -152,16 +153,13 @@ class Patrol:
 
     # --- routes -----------------------------------------------------------------------------
 
-    def begin(self, name: str, home: str, stay: float) -> Phrases:
+    def begin(self, name: str, home: str, stay: float, now_ns: int) -> Phrases:
         """Begin to teach a route where the vehicle is; raise ``Refused``."""
         if self.is_open and self.course is not None:
             raise Refused(Phrase("patrol.busy", {"route": self.course.route.name}))
         if self._teaching is not None:
             raise Refused(Phrase("patrol.teaching", {"route": self._teaching.name}))
-        pose = self._inputs.pose
-        if pose is None or not is_known(pose.value):
-            raise Refused(Phrase("teach.lost"))
-        self._teaching = Teaching(name, self._robot, home, stay, pose.value)
+        self._teaching = Teaching(name, self._robot, home, stay, self._fresh_pose(now_ns))
         return self._noted("teaching", Phrase("teach.begun", {"route": name}))
 
     def restore_teaching(self, of: OpenTeaching) -> None:
@@ -174,11 +172,18 @@ class Patrol:
         """What was taught so far; None while no route is taught."""
         return None if self._teaching is None else self._teaching.open
 
-    def station(self, name: str, stay: float) -> Phrases:
+    def station(self, name: str, stay: float, now_ns: int) -> Phrases:
         """Mark a station; raise ``Refused``."""
-        self._taught.station(name, stay)
+        teaching, _ = self._taught, self._fresh_pose(now_ns)
+        teaching.station(name, stay)
         found, _ = self._taught.summary
         return (Phrase("teach.station", {"station": name, "length": found}),)
+
+    def _fresh_pose(self, now_ns: int) -> m.MapPose:
+        pose = self._inputs.pose
+        if not fresh(pose, now_ns, FRESH_S) or pose is None or not is_known(pose.value):
+            raise Refused(Phrase("teach.lost"))
+        return pose.value
 
     def taught(self) -> m.Route:
         """Return the route as it has been taught so far; raise ``Refused``."""
@@ -259,7 +264,7 @@ def _teaching_message(teaching: Teaching) -> m.Teaching:
         route=teaching.name,
         length=found,
         points=points,
-        stations=teaching.stations,
+        stations=teaching.stations[:STATIONS],
         text=render(teaching.phrases),
         phrases=teaching.phrases,
     )

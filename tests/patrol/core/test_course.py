@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from common.pose import Pose
-from services.patrol.core.course import RULES, STATES
+from services.patrol.core.course import RULES, STATES, TICK_S
 from services.patrol.core.patrol import Patrol
 from t2 import messages as m
 from tests.patrol.core.vehicle_fixture import ANNOUNCE_S, LOOP, PATIENCE_S, Vehicle, route
@@ -315,11 +315,27 @@ def test_after_its_patience_a_round_does_what_the_route_says(
         assert vehicle.reasons == ("patrol.returned" if blocked == "return" else "patrol.home",)
 
 
-def test_a_vehicle_that_does_not_move_though_the_way_is_free_stops() -> None:
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_pose_that_does_not_change_stops_within_a_metre(turns: bool) -> None:
+    vehicle = Vehicle(Pose(0.0, 0.0, 3.0)) if turns else Vehicle()
+    assert vehicle.start() is None
+    vehicle.run(2.5 if turns else 4.0)
+    place, before = vehicle.at, len(vehicle.requests)
+    for _ in range(400):
+        vehicle.at = place
+        vehicle.step()
+    driven = sum(each.linear for each in vehicle.requests[before:]) * TICK_S
+    turned = sum(abs(each.angular) for each in vehicle.requests[before:]) * TICK_S
+    assert vehicle.reasons == ("patrol.frozen", "patrol.resume")
+    assert driven < 1.2
+    assert turned < 1.7
+
+
+def test_a_vehicle_that_does_not_get_on_though_the_way_is_free_stops() -> None:
     vehicle = vehicle_in("driving")
     place = vehicle.at
-    for _ in range(round((PATIENCE_S + 1) / 0.05)):
-        vehicle.at = place
+    for step in range(round((PATIENCE_S + 1) / 0.05)):
+        vehicle.at = Pose(place.x, place.y + 0.15 * (step % 2), place.heading)  # it swings
         vehicle.step()
     assert vehicle.reasons == ("patrol.stuck", "patrol.resume")
 

@@ -13,7 +13,7 @@ from tests.patrol.core.vehicle_fixture import LINE, Vehicle, route
 
 def taught(vehicle: Vehicle, distance: float = 1.0) -> m.Route:
     """Teach a straight route."""
-    vehicle.patrol.begin("yard", "home", 0.0)
+    vehicle.patrol.begin("yard", "home", 0.0, vehicle.now_ns)
     for _ in range(round(distance / 0.02)):
         vehicle.at = vehicle.at.moved(0.02, 0.0)
         vehicle.step()
@@ -24,7 +24,9 @@ def test_a_route_is_taught_marked_and_ended() -> None:
     vehicle = Vehicle()
     vehicle.step()
     made = taught(vehicle)
-    assert [each.name for each in vehicle.patrol.station("gate", 2.0)] == ["teach.station"]
+    assert [each.name for each in vehicle.patrol.station("gate", 2.0, vehicle.now_ns)] == [
+        "teach.station"
+    ]
     teaching = vehicle.message.teaching
     assert teaching
     assert (teaching.route, teaching.points, teaching.stations) == ("yard", 2, ("home", "gate"))
@@ -55,22 +57,32 @@ def test_why_nothing_more_is_recorded_is_an_event() -> None:
 def test_what_is_not_possible_is_refused() -> None:
     vehicle = Vehicle()
     with pytest.raises(Refused, match="lost"):
-        vehicle.patrol.begin("yard", "home", 0.0)  # before the first pose
+        vehicle.patrol.begin("yard", "home", 0.0, vehicle.now_ns)  # before the first pose
     vehicle.step()
     with pytest.raises(Refused, match="none"):
         vehicle.patrol.cancel()
-    vehicle.patrol.begin("yard", "home", 0.0)
+    vehicle.patrol.begin("yard", "home", 0.0, vehicle.now_ns)
     with pytest.raises(Refused, match="teaching"):
-        vehicle.patrol.begin("other", "home", 0.0)
+        vehicle.patrol.begin("other", "home", 0.0, vehicle.now_ns)
     assert vehicle.start() == "patrol.teaching"
     assert [each.name for each in vehicle.patrol.cancel()] == ["teach.cancelled"]
     assert vehicle.start() is None
     with pytest.raises(Refused, match="busy"):
-        vehicle.patrol.begin("other", "home", 0.0)
+        vehicle.patrol.begin("other", "home", 0.0, vehicle.now_ns)
     assert vehicle.patrol.change_refusal("yard") == Phrase("teach.driven", {"route": "yard"})
     assert vehicle.patrol.change_refusal("other") is None
     vehicle.act("abort")
     assert vehicle.patrol.change_refusal("yard") is None
+
+
+def test_a_station_is_not_marked_by_an_old_pose() -> None:
+    vehicle = Vehicle()
+    vehicle.step()
+    taught(vehicle)
+    vehicle.silent.add("localization")
+    vehicle.run(1.0)
+    with pytest.raises(Refused, match="lost"):
+        vehicle.patrol.station("gate", 0.0, vehicle.now_ns)
 
 
 def test_a_round_that_cannot_be_written_is_forgotten() -> None:
