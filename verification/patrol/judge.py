@@ -49,6 +49,12 @@ class Judge:
         truth = self._robot.vehicle.simulation.pose
         return math.dist(self.home, (truth.x, truth.y))
 
+    @property
+    def from_route(self) -> float:
+        """The true distance from the route, m."""
+        truth = self._robot.vehicle.simulation.pose
+        return min(point_gap(truth.x, truth.y, line) for line in self._lines)
+
     def resumed(self) -> None:
         """Note that an operator has started or resumed the round."""
         self._barred = None
@@ -56,11 +62,10 @@ class Judge:
     def look(self) -> None:
         """Compare the truth with the corridor."""
         simulation, now_ns = self._robot.vehicle.simulation, self._robot.net.now_ns
-        truth = simulation.pose
-        deviation = min(point_gap(truth.x, truth.y, line) for line in self._lines)
         if now_ns - self._moves_ns > ASKED_NS:
             self._left_at = None
             return
+        deviation = self.from_route
         if deviation > self.deviation:
             self.deviation, self.claims = deviation, self._claims()
         if deviation <= self._corridor:
