@@ -373,6 +373,52 @@ def test_a_stay_ends_by_a_call() -> None:
     assert vehicle.state == "driving"
 
 
+def test_it_stays_at_the_end_of_an_open_route() -> None:
+    vehicle = Vehicle()
+    assert vehicle.start(route(stay=2.0)) is None
+    vehicle.until("staying")
+    assert (vehicle.message.station, vehicle.message.homeward) == ("gate", True)
+    vehicle.until("returning")
+
+
+def test_a_short_stop_is_no_waiting() -> None:
+    vehicle = vehicle_in("driving")
+    vehicle.causes = ("limit_stop",)
+    vehicle.run(0.3)
+    vehicle.causes = ()
+    vehicle.run(2.0)
+    assert (vehicle.state, vehicle.events) == ("driving", ["round_start"])
+
+
+def test_a_stop_at_the_end_of_the_patience_is_waited_for() -> None:
+    vehicle = vehicle_in("driving")
+    place = vehicle.at
+    for step in range(round((PATIENCE_S + 3.0) / TICK_S)):
+        vehicle.at = Pose(place.x, place.y + 0.15 * (step % 2), place.heading)  # it swings
+        vehicle.causes = ("blocked",) if step * TICK_S > PATIENCE_S - 0.5 else ()
+        vehicle.step()
+    assert vehicle.reasons == ("patrol.blocked", "blocked")
+
+
+def test_a_station_that_is_reached_while_waiting_is_visited() -> None:
+    vehicle = Vehicle().driving(route(LOOP), until_x=3.0)
+    vehicle.causes = ("limit_stop",)
+    vehicle.until("waiting")
+    vehicle.push(x=4.0 - vehicle.at.x)
+    vehicle.run(0.5)
+    assert (vehicle.state, vehicle.message.station) == ("waiting", "home")
+    vehicle.causes = ()
+    vehicle.until("done")
+
+
+def test_nothing_begins_without_safety_and_a_pose() -> None:
+    vehicle = Vehicle()
+    start = vehicle.patrol.start
+    assert start(route(), "one", "", vehicle.now_ns, 0) == m.Phrase("patrol.safety_silent")
+    vehicle.silent.add("localization")
+    assert vehicle.start() == "patrol.map_silent"
+
+
 def test_two_stations_at_one_place_are_both_visited() -> None:
     points = [(0.0, 0.0, "home"), (2.0, 0.0, "door"), (2.0, 0.0, "window"), (0.0, 0.0)]
     vehicle = Vehicle()

@@ -14,6 +14,7 @@ from t2 import messages as m
 from tests.factories import map_pose
 
 STEP = 0.02  # m of one pose
+WEST = tuple((-0.2 * step, math.pi) for step in range(1, 5))  # x, heading
 
 
 def pose_at(at: Pose, sigma: float = 0.05, **fields: Any) -> m.MapPose:
@@ -158,6 +159,17 @@ def test_an_unknown_position_ends_the_recording(pose: m.MapPose, reason: str) ->
 def test_teaching_needs_a_known_position() -> None:
     with pytest.raises(Refused, match="lost"):
         Teaching("yard", "001", "home", 0.0, map_pose("lost"))
+
+
+def test_a_short_route_is_no_loop() -> None:
+    assert Lesson().forward(0.6).corners == near([(0.0, 0.0), (0.6, 0.0)])
+
+
+def test_coming_back_to_the_same_point_is_a_corner() -> None:
+    teaching = Lesson().teaching
+    for x, heading in ((0.12, 0.0), (0.12, math.pi), (0.0, math.pi), *WEST):
+        teaching.on_pose(pose_at(Pose(x, 0.0, heading)))
+    assert [each.x for each in teaching.route(0.5).points] == pytest.approx([0.0, 0.12, -0.8])
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.3])
