@@ -25,9 +25,10 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from common.freshness import NS_PER_S, Latest
-from common.pose import Covariance, Pose
+from common.freshness import NS_PER_S
+from common.pose import Pose
 from services.patrol.core.diary import Diary
+from services.patrol.core.inputs import Inputs, has_changed, is_known, located_of, lost
 from services.patrol.core.track import Fit
 from services.patrol.core.way import Stop, Way
 from t2 import messages as m
@@ -49,7 +50,6 @@ TURN_SPEED = 0.5  # rad/s
 STANDING = {"no_request", "neutral", "blocked", "limit_stop"}  # stops with which a round may begin
 CAUSES = 8  # phrases of safety that a state repeats
 FROZEN_M, FROZEN_RAD = 1.0, 1.5  # that the vehicle was to move, without a change of the pose
-CHANGED_M, CHANGED_RAD = 0.1, 0.1  # of the pose
 CONVERGE = 1.0  # m until a vehicle beside the route is back on it
 
 
@@ -90,13 +90,6 @@ class OpenRound(Struct, frozen=True, kw_only=True):
     stop: int
     homeward: bool
     turned: bool
-
-
-class Inputs(Struct):
-    """The newest messages."""
-
-    safety: Latest[m.SafetyState] | None = None
-    pose: Latest[m.MapPose] | None = None
 
 
 class Course:
@@ -396,7 +389,7 @@ class Course:
         pose, _ = located_of(self._pose)
         before, limits = self._still, self._state.limits
         obeys = self._hindered_ns is None and self._state.source == SOURCE
-        if before is None or not obeys or _has_changed(before, pose):
+        if before is None or not obeys or has_changed(before, pose):
             self._still, self._due = pose, (0.0, 0.0)
             return False
         way, turn = self._due
@@ -551,31 +544,6 @@ class Course:
         corridor = self.route.corridor
         fields: dict[str, m.Field] = {"deviation": deviation, "sigma": sigma, "corridor": corridor}
         return Phrase("patrol.uncertain", fields)
-
-
-def _has_changed(before: Pose, now: Pose) -> bool:
-    turn = abs(math.remainder(now.heading - before.heading, math.tau))
-    return math.dist((before.x, before.y), (now.x, now.y)) > CHANGED_M or turn > CHANGED_RAD
-
-
-def is_known(pose: m.MapPose) -> bool:
-    """Return whether a pose in the map is complete, and certain enough for localization."""
-    parts = pose.x, pose.y, pose.heading, pose.pose_covariance
-    return pose.state == "placed" and None not in parts
-
-
-def lost(pose: m.MapPose) -> Phrase:
-    """Return why a pose is not known."""
-    return pose.phrases[0] if pose.phrases else Phrase("teach.lost")
-
-
-def located_of(pose: m.MapPose) -> tuple[Pose, Covariance]:
-    """Return the pose in the map; only while it is known."""
-    assert pose.x is not None
-    assert pose.y is not None
-    assert pose.heading is not None
-    assert pose.pose_covariance is not None
-    return Pose(pose.x, pose.y, pose.heading), Covariance.of(pose.pose_covariance)
 
 
 class Rule(NamedTuple):

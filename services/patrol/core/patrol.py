@@ -5,7 +5,8 @@ import math
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest, fresh
-from services.patrol.core.course import FRESH_S, Course, Inputs, Note, OpenRound, is_known
+from services.patrol.core.course import FRESH_S, Course, Note, OpenRound
+from services.patrol.core.inputs import Inputs, is_known
 from services.patrol.core.routes import length, stations
 from services.patrol.core.teaching import CORRIDOR, OpenTeaching, Refused, Teaching
 from services.patrol.core.way import CLOSED
