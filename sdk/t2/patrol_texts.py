@@ -202,7 +202,7 @@ PHRASES: dict[str, Words] = {
     "teach.full": ("The route has {points} points, which is the limit.", "路线已有 {points} 个点，达到上限。"),
     # problems of a route's file
     "route.none": ("There is no route {route}.", "没有路线 {route}。"),
-    "route.unreadable": ("{file}: {reason}.", "{file}：{reason}。"),
+    "route.unreadable": ("{file}: {reason}.", "文件 {file} 有误：{reason}。"),
     "route.name": (
         "{file} has the name {route}: rename one of both.", "{file} 中的名称为 {route}：请统一二者。",
     ),

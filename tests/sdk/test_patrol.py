@@ -68,7 +68,7 @@ def test_teaching_that_is_cancelled_leaves_no_route(robot: t2.Robot) -> None:
         (lambda it: it.delete("nix"), "There is no route nix"),
         (lambda it: it.round("nix"), "There is no round nix"),
         (lambda it: it.teach("院子", "home"), "exists"),
-        (lambda it: it.depart(), "depart is not possible now"),
+        (lambda it: it.depart(), "depart: not possible now"),
         (lambda it: it.end(), "No route is being taught"),
     ],
 )
