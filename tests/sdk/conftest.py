@@ -23,6 +23,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
 def robot(stack: RunningStack) -> Iterator[t2.Robot]:
     """Yield a robot that may drive."""
     with ready(stack) as it:
+        it.patrol.latest(timeout=20.0)
         yield it
 
 

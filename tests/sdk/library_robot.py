@@ -29,7 +29,6 @@ def ready(stack: RunningStack) -> Iterator[t2.Robot]:
     """Connect, and wait until the robot may drive."""
     with t2.connect("001", endpoint=stack.endpoint) as it:
         it.odometry.latest(timeout=20.0)
-        it.patrol.latest(timeout=20.0)
         wait_until(lambda: not blocked(it), "a vehicle that may drive")
         yield it
 
