@@ -451,7 +451,7 @@ class Round(Struct, frozen=True, kw_only=True):
     recordings: Annotated[tuple[Name, ...], Few] = ()  # black boxes of this time
 
 
-class TrackPoint(Struct, frozen=True, array_like=True):
+class TrackPoint(Struct, frozen=True, kw_only=True):
     """A pose of a driven round."""
 
     x: Number  # m, in ``map``
