@@ -87,7 +87,10 @@ def stands(stack: RunningStack) -> None:
     assert not becomes_true(lambda: stack.control.truth().distance > place + 0.05, 1.5)
 
 
-@pytest.mark.parametrize("lead", [driving, staying, waiting])
+@pytest.mark.parametrize(
+    "lead",
+    [driving, *(pytest.param(lead, marks=pytest.mark.campaign) for lead in (staying, waiting))],
+)
 def test_a_killed_patrol_stops_and_resumes_by_a_call(
     stack: RunningStack, robot: t2.Robot, lead: Callable[[t2.Robot, RunningStack], None]
 ) -> None:
@@ -104,7 +107,9 @@ def test_a_killed_patrol_stops_and_resumes_by_a_call(
     until(robot, "driving", "staying")
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.campaign)]
+)
 def test_a_dead_localization_stops_a_round(
     stack: RunningStack, robot: t2.Robot, number: signal.Signals
 ) -> None:

@@ -19,6 +19,7 @@ def short(scene: Scene) -> Scene:
     )
 
 
+@pytest.mark.campaign
 def test_the_command_draws_a_run_and_prints_what_it_did(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
