@@ -1,8 +1,8 @@
 """Teaching a route: the driven path of the vehicle in the map, and its stations.
 
 Poses are recorded every ``SPACING`` m, and those within ``TOLERANCE`` m of a straight line are left
-out. Whoever drives, the path counts. What a round cannot repeat ends the recording: the part before
-it is kept.
+out. The source in control does not matter. What a round cannot repeat ends the recording: the part
+before it is kept.
 """
 
 import math
