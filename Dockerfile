@@ -1,5 +1,5 @@
 # Three images, each based on the previous one: `robot` for the industrial PC, `dashboard` adds the web
-# page, `laptop` adds the operator's tools.
+# page and the camera, `laptop` adds the operator's tools.
 #
 # BASE is any Debian with Python 3.11 or newer and venv. The images contain only its Python and its C
 # libraries: no shell, no pip, no package manager. Wheels come from build/wheelhouse (`make wheelhouse

@@ -23,6 +23,7 @@ help:
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 12
 
 $(STAMP): requirements.lock pyproject.toml sdk/pyproject.toml
+	@echo "Installing the packages of services, tools and tests into .venv: once, and after a change of the lock."
 	$(PYTHON) -c '$(CHECK_PYTHON)'
 	$(PYTHON) -m venv --clear .venv
 	awk '/^[^ #]/{on = /^uv==/} on' requirements.lock > .venv/uv.lock
@@ -34,6 +35,7 @@ $(STAMP): requirements.lock pyproject.toml sdk/pyproject.toml
 
 # The demo needs a fourth of what the tests need; with all of it there, it takes that.
 $(DEMO): requirements-demo.lock
+	@echo "Installing the packages of the demo into .venv: once, and after a change of the lock."
 	$(PYTHON) -c '$(CHECK_PYTHON)'
 	$(PYTHON) -m venv --clear .venv
 	$(PIP_INSTALL) --require-hashes -r requirements-demo.lock
@@ -91,7 +93,7 @@ rust-example: $(STAMP)
 vehicles: $(STAMP) ## drive N=1000 random vehicles in simulated time; renews docs/vehicles.md
 	$(BIN)/python -m verification.search --runs $(or $(N),1000) --out docs/vehicles.md
 
-ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz (with cargo) and older versions of Zenoh
+ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz (with cargo), rclpy and older versions of Zenoh
 	$(BIN)/python -m verification.ros2
 
 check: $(STAMP) ## what CI runs: lint, types, test, search, mutants of changed cores
@@ -128,7 +130,7 @@ format: $(STAMP)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-LAPTOP = teleop dashboard record report foxglove keys ros2
+LAPTOP = teleop dashboard camera record report foxglove keys ros2
 LOCK = $(BIN)/uv pip compile --quiet --system-certs --universal --python-version 3.11 --generate-hashes --no-emit-package t2-sdk \
   --custom-compile-command 'make lock' pyproject.toml
 
@@ -136,7 +138,7 @@ lock: $(STAMP) ## renew the locks, with hashes and without addresses: all sets, 
 	$(LOCK) --upgrade --all-extras -o requirements.lock
 	$(LOCK) --constraint requirements.lock --extra record --extra ros2 -o requirements-robot.lock
 	$(LOCK) --constraint requirements.lock --extra demo -o requirements-demo.lock
-	$(LOCK) --constraint requirements.lock --extra record --extra ros2 --extra dashboard -o requirements-dashboard.lock
+	$(LOCK) --constraint requirements.lock --extra record --extra ros2 --extra dashboard --extra camera -o requirements-dashboard.lock
 	$(LOCK) --constraint requirements.lock $(LAPTOP:%=--extra %) -o requirements-laptop.lock
 	$(subst pyproject.toml,,$(LOCK)) --constraint requirements.lock --group bench -o requirements-bench.lock
 	echo pip | $(subst pyproject.toml,,$(LOCK)) --upgrade - -o deploy/pip.lock

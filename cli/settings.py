@@ -8,6 +8,7 @@ from common import settings
 from common.cli_args import add_sources, sources
 from common.config import flatten, load
 from common.errors import ConfigError
+from services.camera.config import Camera
 from services.dashboard.config import Dashboard
 from services.localization.config import Localization
 from services.metrics.config import Metrics
@@ -30,6 +31,7 @@ class Everything(settings.Shared, frozen=True, kw_only=True):
     odom: Odom = Odom()
     localization: Localization = Localization()
     patrol: Patrol = Patrol()
+    camera: Camera = Camera()
     teleop: Teleop = Teleop()
     dashboard: Dashboard = Dashboard()
     recorder: Recorder = Recorder()

@@ -10,6 +10,7 @@ relative to the settings file that contains it. ``~`` in a path is the home fold
 
 import difflib
 import os
+import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
@@ -33,16 +34,20 @@ DEFAULT = "default"  # the origin of a setting that no source names
 # File names that are relative to the settings file: a folder with certificates can be moved.
 FILE_SETTINGS = ("bus.ca", "bus.certificate", "bus.private_key", "bus.members")
 
-PATHS = (*FILE_SETTINGS, "dashboard.token_file", "dashboard.certificate", "dashboard.private_key",
-         "recorder.folder", "patrol.folder", "sim.world")  # fmt: skip
+PATHS = (
+    *FILE_SETTINGS, "dashboard.token_file", "dashboard.certificate", "dashboard.private_key",
+    "dashboard.floor_plan", "recorder.folder", "camera.credentials_file", "patrol.folder",
+    "sim.world",
+)  # fmt: skip
 ENDPOINTS = ("bus.listen", "bus.connect", "bus.uplink", "bus.drive")
 SOCKET = "unixsock-stream/"  # before the path in an endpoint
+PASSWORD = re.compile(r"//[^/\s]*@")  # in a URL: origins are printed and published
 QUOTES = tuple("\"'\u2018\u2019\u201c\u201d\u201e\u00ab")
 
 # Sections allowed in a file; a service reads its own and the shared ones.
 SECTIONS = (
     "robot", "host", "bus", "board", "wire", "log", "vehicle", "safety", "odom", "localization",
-    "patrol", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
+    "patrol", "camera", "teleop", "dashboard", "recorder", "metrics", "ros2", "sim",
 )  # fmt: skip
 
 
@@ -185,7 +190,7 @@ def from_sets(root: type[Struct], sets: Sequence[str]) -> Given:
         path, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not path:
             raise ConfigError(f"--set {text}: should look like board.port=4002")
-        given |= _from_text(root, path, value, f"--set {text}")
+        given |= _from_text(root, path, value, f"--set {PASSWORD.sub('//...@', text)}")
     return given
 
 

@@ -34,6 +34,7 @@ class Sim(Section, frozen=True, kw_only=True):
     world: str = "office"  # a name in sim/worlds, or the path of a TOML file
     seed: Annotated[int, Meta(ge=0)] = 1  # of all noise and faults
     control_port: Annotated[int, Meta(ge=0, le=65535)] = 0  # UDP on 127.0.0.1; 0: none
+    camera_port: Annotated[int, Meta(ge=0, le=65535)] = 0  # TCP on 127.0.0.1, of sim.camera
     # a source of localization.sources: the true pose is measured, and sent as it; empty: none
     fix_source: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
     fix_rate: Annotated[float, allowed("Hz", ge=0.1, le=20.0)] = 2.0

@@ -228,6 +228,7 @@ class Simulation:
             contact=self._contact,
             pressed=self._switch.closed,
             command=self._command,
+            person=(self._person.x, self._person.y) if self._person else None,
         )
 
     def _update_bumper(self, now_ns: int) -> None:

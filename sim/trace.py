@@ -44,6 +44,7 @@ class Truth(Record, frozen=True, kw_only=True, tag="truth"):
     contact: bool  # something presses the bumper strip
     pressed: bool  # the bumper as the board senses it: contact, or by hand
     command: Command  # the current command of the board
+    person: tuple[float, float] | None = None  # x and y of the person who walks there
 
 
 class Power(Record, frozen=True, kw_only=True, tag="power"):

@@ -60,6 +60,7 @@ CLASSES: Mapping[str, str] = {
     "teaching and changing a route": keys.TEACH.on(MINE),
     "reading the routes": keys.ROUTES.on(MINE),
     "reading the rounds of another robot": keys.ROUNDS.on(OTHER),
+    "reading the shift log": keys.LOG.on(MINE),
     "reset of another robot": keys.RESET.on(OTHER),
     "state and settings that a service returns to a query": keys.info_key(MINE, "safety", "config"),
     "presence of the services on board": keys.live_key(MINE, "safety", "1"),

@@ -18,6 +18,7 @@ from msgspec import Struct
 from cli.commission.motion import too_fast
 from cli.commission.report import Report
 from cli.commission.steps import PHRASE, confirm, show
+from cli.commission.texts import ENGLISH, Say
 from cli.commission.watchdog import Point, Try, judge_watchdog, silent_try, slowed_s
 from cli.inspect.session import services
 from cli.settings import Everything
@@ -60,13 +61,6 @@ RECENT = 10  # velocities whose mean counts
 FAILOVER_S = 0.1  # from one port to the other
 TURN = 0.5  # of the commanded speed: less does not count as turning
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-TITLE = "The board's own watchdog"
-WARNING = (
-    "This speaks to the board itself, without safety and guard: the wheels turn forward at "
-    f"{SPEED:g} m/s, and are left turning for some seconds without a command. Vehicle on blocks, a "
-    "hand on its own stop switch: nothing else stops it if this computer fails meanwhile.\n"
-    "Keep everything away from bumper and sonars: the board's own brakes would stop the wheels."
-)
 STOP_STACK = "stop it with Ctrl-C in `t2 up`, or `sudo systemctl stop t2.target`"
 
 
@@ -83,15 +77,17 @@ def measure_watchdog(report: Report, config: Everything, times: Times) -> None:
 
     Raise ``T2Error`` when nothing can be measured; the wheels are braked then, too.
     """
-    show(WARNING)
-    if not confirm("The wheels will turn. All of them must be off the ground.", PHRASE):
-        raise T2Error("not confirmed: no motion was requested")
+    say = Say(report.language)
+    show(say("watchdog.warning", speed=SPEED))
+    if not confirm(say("off_ground"), PHRASE, say):
+        raise T2Error(say("drive.not_confirmed"))
     longest_s = sum(times.fed) + sum(times.silent) + 3 * (len(times.fed) + len(times.silent))
-    show(f"The wheels turn, stop and turn again, for up to {longest_s:.0f} s. Ctrl-C brakes.")
-    with board_link(config) as link:
+    show(say("watchdog.turning", seconds=longest_s))
+    with board_link(config, say) as link:
         fed = [link.attempt(times.turning, wait_s, fed=True) for wait_s in times.fed]
         silent = [link.attempt(times.turning, wait_s, fed=False) for wait_s in times.silent]
-    report.steps.append((TITLE, found := judge_watchdog(fed, silent)))
+    found = judge_watchdog(fed, silent, say)
+    report.steps.append((say("watchdog.title"), found))
     for name, value in found.data:
         show(f"  {name}: {value}")
 
@@ -117,13 +113,13 @@ def check_alone(config: Everything) -> None:
 
 
 @contextmanager
-def board_link(config: Everything) -> Iterator["BoardLink"]:
+def board_link(config: Everything, say: Say = ENGLISH) -> Iterator["BoardLink"]:
     """Open the link for the context; BRAKE is sent on each way out.
 
     A signal raises nothing where it arrives, because that may be on the way out: it ends the link
     within a tick.
     """
-    with closing(BoardLink(config)) as link:
+    with closing(BoardLink(config, say)) as link:
         ends = dict.fromkeys(ENDING, lambda *_: link.end())
         with _handling({**ends, signal.SIGTSTP: signal.SIG_IGN}):  # Ctrl-Z: the wheels would turn
             try:
@@ -146,9 +142,9 @@ def _handling(handlers: Mapping[signal.Signals, Any]) -> Iterator[None]:
 class BoardLink:
     """The board, without the stack between: frames out, velocities and counters in."""
 
-    def __init__(self, config: Everything) -> None:
+    def __init__(self, config: Everything, say: Say = ENGLISH) -> None:
         """Bind the bridge's ports; raise ``LinkError`` if another program has them."""
-        self.config = config
+        self.config, self._say = config, say
         self._sockets = Sockets(config.board)
         self._translator = Translator(config.wire, config.vehicle)
         self._polling = Polling(QUERIES, ANSWER_S, TICK_S)
@@ -190,11 +186,8 @@ class BoardLink:
         self._check_answers()
         last_ns, speed, start_m = self._commanded_ns, self._mean(), self._distance
         if speed < TURN * SPEED:
-            raise T2Error(
-                f"the wheels do not turn: {speed:.3f} m/s after {turning_s:g} s of RUN at "
-                f"{SPEED:g} m/s. Is the vehicle's stop switch released, the bumper free, and "
-                "nothing near the sonars? See the step `forward` of `t2 checkout`"
-            )
+            about = {"measured": speed, "seconds": turning_s, "speed": SPEED}
+            raise T2Error(self._say("board.not_turning", **about))
         left_s = wait_s - (clock.now_ns() - last_ns) / NS_PER_S
         port = self._ports.to_ask(clock.now_ns())
         self.run(
@@ -268,27 +261,28 @@ class BoardLink:
                     return
                 self._velocities.append((now_ns, abs(velocity.linear)))
                 if too_fast(Twist(SPEED), velocity):
-                    raise T2Error(f"the board measures {velocity.linear:.2f} m/s: braked")
+                    raise T2Error(self._say("board.fast", measured=velocity.linear))
             case DistanceReport():
                 self._distance, self._counted_ns = frame.distance_mm / MM, now_ns
             case BumperReport(on=True):
-                raise T2Error("the bumper was pressed: braked. Release it, and begin again")
+                raise T2Error(self._say("board.bumper"))
             case DriverReport(side=side, fault_bits=bits) if bits:
-                raise T2Error(f"the {side.name.lower()} motor driver reports fault bits {bits:#x}")
+                driver = {"side": side.name.lower(), "bits": f"{bits:#x}"}
+                raise T2Error(self._say("board.driver", **driver))
 
     def _begin(self) -> None:
         """Wait until velocities and counters arrive, and the wheels stand."""
         self._velocities.clear()
         if not self.run(REST_S, until=self._stands):
             self._check_answers()
-            raise T2Error("the wheels do not stand at the beginning: stop them by their switch")
+            raise T2Error(self._say("board.not_standing"))
 
     def _end(self) -> None:
         """Stop the wheels by STOP, and BRAKE in any case."""
         self.run(REST_S, STOP, until=self._stands)
         self.brake()
         if not self.run(REST_S, BRAKE, until=self._stands):
-            raise T2Error("THE WHEELS DO NOT STOP on STOP and BRAKE: use the vehicle's stop switch")
+            raise T2Error(self._say("board.not_stopping"))
 
     def _ask_counters(self, port: int) -> float:
         """Ask for the counted distance (m), once unless the answer is lost."""
@@ -298,7 +292,7 @@ class BoardLink:
             if self.run(ANSWER_S, queries=False, until=lambda: self._counted_ns > asked_ns):
                 break
         else:
-            raise T2Error("the board does not answer a query of its counters after the silence")
+            raise T2Error(self._say("board.silent_counters"))
         return self._distance
 
     def _check_answers(self) -> None:
@@ -306,9 +300,9 @@ class BoardLink:
         board = f"{self.config.board.address}:{self.config.board.port}"
         since_ns = clock.now_ns() - round(LOST_S * NS_PER_S)
         if not self._velocities or self._velocities[-1][0] < since_ns:
-            raise LinkError(f"no velocity from the board at {board}: is it on? Try `t2 doctor`")
+            raise LinkError(self._say("board.no_velocity", board=board))
         if self._counted_ns < since_ns:
-            raise LinkError(f"the board at {board} does not answer queries of its counters")
+            raise LinkError(self._say("board.no_counters", board=board))
 
     def _stands(self) -> bool:
         since_ns = clock.now_ns() - round(LOST_S * NS_PER_S)

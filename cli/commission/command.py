@@ -6,15 +6,18 @@ import shlex
 import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from cli.commission.board_link import Times, check_alone, measure_watchdog
 from cli.commission.drive_command import guided_drive
 from cli.commission.manoeuvres import GROUPS
-from cli.commission.report import Report, Row, Verdict, render
+from cli.commission.report import Report, Row, Verdict, parse, render
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import STEPS, Step, choice, prompt, show
+from cli.commission.texts import ENGLISH, Say
+from cli.inspect.output import padded
 from cli.inspect.session import one_robot, positive, robot_sources
 from cli.settings import Everything
 from common.cli_args import VERSION, add_sources, file_path, reader_language
@@ -22,8 +25,10 @@ from common.config import Loaded, Setting, load
 from common.errors import ConfigError
 from t2 import keys
 from t2.errors import T2Error
+from t2.text_file import read_text
 
 NAMES = [step.name for step in STEPS]
+UNSET = ("sonar",)  # steps whose result depends on no setting
 SECTIONS = {"bridge": ("wire", "board", "vehicle", "bridge"), "safety": ("safety",)}
 HEALTH_S = 3.0
 Work = Callable[[Report, CheckoutSession], None]  # fills in the report
@@ -48,6 +53,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="drive: leave out what needs more than M metres ahead or behind",
     )  # fmt: skip
     parser.add_argument(
+        "--resume", type=file_path, metavar="REPORT",
+        help="take over the steps that passed in an earlier report, and run the others",
+    )  # fmt: skip
+    parser.add_argument(
         "--report", type=file_path, metavar="FILE", help="out/checkout-ROBOT-DATE.md by default"
     )
     parser.add_argument("--robot", type=one_robot, help="which robot, such as 001")
@@ -58,12 +67,13 @@ def run(options: argparse.Namespace) -> int:
     """Run the checks and write the report; return 0 if all passed and the operator signed."""
     loaded = load(Everything, robot_sources(options))
     check(options)
+    before = earlier(options.resume, loaded.config.robot.id) if options.resume else None
     file = report_file(options.report, loaded.config.robot.id)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)  # as Ctrl-C
     work = partial(guided_drive, only=options.only, space_m=options.space or math.inf)
     if options.part is None:
-        work = partial(run_steps, only=options.only)
+        work = partial(run_steps, only=options.only, before=before)
     try:
         alone = options.part == "watchdog"
         report = watchdog(loaded, Times()) if alone else checkout(loaded, work)
@@ -71,8 +81,9 @@ def run(options: argparse.Namespace) -> int:
         file.unlink(missing_ok=True)  # it is empty
         raise
     write(file, render(report))
-    outcome = "Passed" if report.passed else "NOT PASSED"
-    print(f"\n{outcome}. The report: {shlex.quote(str(file))}", flush=True)
+    say = Say(report.language)
+    outcome = say("all_passed" if report.passed else "not_passed")
+    print(f"\n{say('outcome', outcome=outcome, file=shlex.quote(str(file)))}", flush=True)
     return 0 if report.passed else 1
 
 
@@ -80,6 +91,8 @@ def check(options: argparse.Namespace) -> None:
     """Refuse options of another part with ``ConfigError``."""
     if options.part != "drive" and options.space:
         raise ConfigError("--space: is an option of `t2 checkout drive`")
+    if options.part and options.resume:
+        raise ConfigError(f"--resume: is no option of `t2 checkout {options.part}`")
     if options.part == "watchdog" and options.only:
         raise ConfigError("--only: is no option of `t2 checkout watchdog`")
     names: Sequence[str] = GROUPS if options.part == "drive" else NAMES
@@ -96,7 +109,10 @@ def checkout(loaded: Loaded[Everything], work: Work) -> Report:
             ("T2 of this tool", VERSION),
             *versions(session),
         ]
-        report = Report(robot=session.robot, date=now(), facts=facts, settings=settings(session))
+        report = Report(
+            robot=session.robot, date=now(), facts=facts, settings=settings(session),
+            language=session.language,
+        )  # fmt: skip
         guide(report, partial(work, report, session))
     return report
 
@@ -111,6 +127,7 @@ def watchdog(loaded: Loaded[Everything], times: Times) -> Report:
         date=now(),
         facts=[("board", board), ("T2 of this tool", VERSION)],
         settings=of_sections(loaded.settings, ("board", "wire")),
+        language=reader_language(),
     )
     guide(report, partial(measure_watchdog, report, config, times))
     return report
@@ -118,50 +135,115 @@ def watchdog(loaded: Loaded[Everything], times: Times) -> Report:
 
 def guide(report: Report, work: Callable[[], None]) -> None:
     """Do the work with the operator; the report includes what was done before an abort."""
-    show(f"Checkout of robot {report.robot}, board {dict(report.facts)['board']}.")
-    name = firmware = ""
+    say = Say(report.language)
+    show(say("title", robot=report.robot, board=dict(report.facts)["board"]))
+    report.operator = "unknown"
     try:
-        name = prompt("Your name:")
-        firmware = prompt("The firmware version, from the board's label:")
+        while not (name := prompt(say("your_name"))):
+            pass
+        report.operator = name
+        firmware = prompt(say("firmware"))
+        report.facts.append(("firmware", firmware or "unknown"))
         work()
         show("")
         others = [each for each in report.manoeuvres if each[1].outcome != "passed"]
         if report.manoeuvres:
-            show(f"{len(report.manoeuvres) - len(others)} of {len(report.manoeuvres)} passed.")
+            count = len(report.manoeuvres)
+            show(say("done", done=count - len(others), all=count))
         for title, found in (*report.steps, *others):
-            show(f"{found.outcome:8} {title}: {found.text}")
-        typed = prompt(f"To sign this off, type your name ({name}):")
-        report.signed = name if typed.casefold() == name.casefold() else ""
+            show(f"{padded(say(f'verdict.{found.outcome}'), 8)} {title}: {found.finding}")
+        if report.missing:
+            show(say("missing", titles=tuple(report.missing)))
+        report.signed = signature(name, say)
     except KeyboardInterrupt:
-        report.aborted = report.aborted or "interrupted by the operator"
+        report.aborted = report.aborted or say("interrupted")
     except T2Error as error:
         report.aborted = str(error)
-        show(f"\nEnded early: {error}")
-    report.operator = name or "unknown"
-    report.facts.append(("firmware", firmware or "unknown"))
+        show(f"\n{say('ended', reason=str(error))}")
     report.ended = now()
 
 
-def run_steps(report: Report, session: CheckoutSession, only: Sequence[str]) -> None:
-    """Run the steps with the wheels off the ground, or only these."""
+def signature(name: str, say: Say = ENGLISH) -> str:
+    """Return the operator's name, once it is typed; empty if the report is left unsigned."""
+    question = say("sign", name=name)
+    while typed := prompt(question):
+        if typed.casefold() == name.casefold():
+            return name
+        question = say("sign_again", name=name)
+    return ""
+
+
+def run_steps(
+    report: Report, session: CheckoutSession, only: Sequence[str], before: Report | None = None
+) -> None:
+    """Run the steps with the wheels off the ground, or only these; not those passed ``before``."""
     report.left_out = [name for name in NAMES if only and name not in only]
     steps = [step for step in STEPS if step.name not in report.left_out]
+    say = Say(report.language)
+    report.planned = [say.of(step.title) for step in steps]
+    known = taken_over(before, report, steps) if before else {}
     for number, step in enumerate(steps, 1):
-        show(f"\n[{number}/{len(steps)}] {step.title}\n{step.what}")
-        report.steps.append((step.title, verdict(step, session)))
+        title = say.of(step.title)
+        show(f"\n[{number}/{len(steps)}] {title}")
+        if title in known:
+            show(say("found", outcome=say("verdict.passed"), text=known[title].finding))
+        else:
+            show(say.of(step.what))
+        found = known.get(title) or verdict(step, session, say)
+        report.steps.append((title, found))
 
 
-def verdict(step: Step, session: CheckoutSession) -> Verdict:
+def earlier(file: Path, robot: str) -> Report:
+    """Return the report in a file, which is of this robot."""
+    try:
+        found = parse(read_text(file))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise ConfigError(f"--resume {file}: cannot be read: {reason}") from None
+    if found is None or not found.steps:
+        raise ConfigError(f"--resume {file}: is no report of the steps, of this version of T2")
+    if found.robot != robot:
+        raise ConfigError(f"--resume {file}: is of robot {found.robot}, not of {robot}")
+    if found.language != reader_language():
+        raise ConfigError(f"--resume {file}: has another language; use T2_LANG={found.language}")
+    return found
+
+
+def taken_over(before: Report, now: Report, steps: Sequence[Step]) -> dict[str, Verdict]:
+    """Return those of these steps that passed before, by title, with their date and operator.
+
+    After a change of board, firmware or versions none counts, after one of settings those that
+    depend on none.
+    """
+    facts = [
+        f"{name} is now {value}" for name, value in now.facts if (name, value) not in before.facts
+    ]
+    settings = {row[:2] for row in before.settings} ^ {row[:2] for row in now.settings}
+    changed = [*facts, *sorted({path for path, _ in settings})]
+    if changed:
+        now.facts.append(("changed since the report before", ", ".join(changed)))
+        show(Say(now.language)("changed", what=tuple(changed)))
+    titles = [Say(now.language).of(it.title) for it in steps if not changed or it.name in UNSET]
+    counting = [] if facts else titles
+    origin = f"{before.date}, {before.operator}"
+    return {
+        title: replace(found, origin=found.origin or origin)
+        for title, found in before.steps
+        if found.outcome == "passed" and title in counting
+    }
+
+
+def verdict(step: Step, session: CheckoutSession, say: Say = ENGLISH) -> Verdict:
     """Run a step until the operator accepts its verdict, or skip it with a reason."""
-    if reason := choice("Press Enter to begin, or type a reason to skip:"):
+    if reason := choice(say("begin")):
         return Verdict("skipped", reason)
     while True:
         found = step.run(session)
-        show(f"{found.outcome}: {found.text}")
-        if found.outcome == "passed" or choice(
-            "Press Enter to try again, or type any word to continue:"
-        ):
+        show(say("found", outcome=say(f"verdict.{found.outcome}"), text=found.text))
+        if found.outcome == "passed":
             return found
+        if remark := choice(say("again")):
+            return replace(found, text=say("remark", text=found.text, remark=remark))
 
 
 def now() -> str:

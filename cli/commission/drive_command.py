@@ -47,14 +47,6 @@ COUNTERS_S = 2.0
 TURNED_DEG = 10.0  # from the first heading: the way back is another one
 MOTION = 3  # figures of a motion: commanded, measured, counted
 PATIENCE_S = 3.0  # for a stop, on top of what the settings reckon with
-RESET_HINT = "The next motion asks you for its reset; `t2 drive` can reset it, too."
-WARNING = (
-    "The vehicle drives on the ground. Hold the vehicle's own stop switch, and keep everybody away "
-    "from it.\nMark its place on the ground. Each motion is announced with the free space that it "
-    "needs.\nSTOP: the checkout stops publishing, and its lease ends. BRAKE: it publishes an "
-    "emergency stop, and resets it.\nSlow down: it requests zero. Ctrl-C is an emergency stop, and "
-    "ends the drive."
-)
 
 
 @dataclass(slots=True)
@@ -73,13 +65,14 @@ class GuidedDrive:
 
     def begin(self) -> None:
         """Check what the drive needs; raise ``T2Error`` unless it may begin."""
-        show(WARNING)
+        say = self.session.say
+        show(say("drive.warning"))
         self._check_switches()
         self._check_recorder()
         if problem := unlatch(self.session):
             raise T2Error(problem)
-        if not confirm("All wheels stand on the ground, and the space is free.", GROUND_PHRASE):
-            raise T2Error("not confirmed: no motion was requested")
+        if not confirm(say("drive.ground"), GROUND_PHRASE, say):
+            raise T2Error(say("drive.not_confirmed"))
 
     def run(self, manoeuvres: Sequence[Manoeuvre], *, returns: bool) -> None:
         """Carry out the manoeuvres, and drive back to the beginning.
@@ -94,18 +87,18 @@ class GuidedDrive:
 
     def _interrupted(self) -> None:
         """Publish an emergency stop, and report whether safety has latched it."""
+        say = self.session.say
         is_latched = self.session.emergency_stop()
-        latched = ", ".join(self.session.latched()) or "nothing"
-        text = f"interrupted by the operator, by an emergency stop; safety has latched: {latched}"
-        hint = "Reset it with `t2 drive`."
+        text = say("drive.interrupted", causes=self.session.latched() or say("nothing"))
+        hint = say("drive.reset_hint")
         if not is_latched:
-            text += "; the emergency stop is NOT CONFIRMED"
-            hint = "Stop the vehicle with its own switch."
+            text += f"{say('drive.and')}{say('drive.not_latched')}"
+            hint = say("drive.own_switch")
         self.report.aborted = text
+        ended = say("drive.ended", text=text)
         if self.under_way:
-            verdict = Verdict("failed", f"Ended: {text}.")
-            self.report.manoeuvres.append((self.under_way, verdict))
-        show(f"\nEnded: {text}. {hint}")
+            self.report.manoeuvres.append((self.under_way, Verdict("failed", ended)))
+        show(f"\n{say.sentences([ended, hint])}")
 
     def _run(self, manoeuvres: Sequence[Manoeuvre], *, returns: bool) -> None:
         start = self._counters()
@@ -116,8 +109,8 @@ class GuidedDrive:
             self._step(back, f"[{total}/{total}]")
         self._check_recorder()
         if missing := missing_stops(done, manoeuvres):
-            show(f"\nStops that are still missing for a fit: {'; '.join(missing)}.")
-        show("The drive is over. End `t2 record` with Ctrl-C.")
+            show(f"\n{self.session.say('drive.missing', stops='; '.join(missing))}")
+        show(self.session.say("drive.over"))
 
     def _step(self, it: Manoeuvre, number: str) -> bool:
         """Carry out a manoeuvre, or skip it; return whether it went as expected.
@@ -125,10 +118,12 @@ class GuidedDrive:
         Raise ``T2Error`` if the drive must end.
         """
         if it.is_faster(self.fastest):
-            result = Result(Verdict("skipped", f"Left out: {self.limited}"))
-            show(f"{number} {it.title}: left out, {self.limited}")
+            omitted = self.session.say("drive.omitted", why=self.limited)
+            result = Result(Verdict("skipped", omitted))
+            left_out = self.session.say("drive.left_out", title=it.title, why=self.limited)
+            show(f"{number} {left_out}")
         else:
-            show(f"\n{number} {it.title}\n{announcement(it)}")
+            show(f"\n{number} {it.title}\n{announcement(it, self.session.say)}")
             self.under_way = it.title
             result = self._with_operator(it)
             self.under_way = ""
@@ -141,14 +136,17 @@ class GuidedDrive:
 
     def _with_operator(self, it: Manoeuvre) -> Result:
         """Return the result that the operator accepts."""
-        if reason := choice("Press Enter to begin, or type a reason to skip:"):
+        say = self.session.say
+        if reason := choice(say("begin")):
             return Result(Verdict("skipped", reason))
         while True:
             result = self._attempt(it)
-            show(f"{result.verdict.outcome}: {result.verdict.text}{_figures(result.verdict)}")
+            outcome = say(f"verdict.{result.verdict.outcome}")
+            text = say("found", outcome=outcome, text=result.verdict.text)
+            show(f"{text}{_figures(result.verdict)}")
             if result.verdict.outcome == "passed" or result.then != "again":
                 return result
-            if choice("Press Enter to try again, or type any word to continue:"):
+            if choice(say("any_word")):
                 return result
 
     def _attempt(self, it: Manoeuvre) -> Result:
@@ -165,13 +163,13 @@ class GuidedDrive:
             it, source.lease if source else 0.0, self.settings.reaction + stop_s + PATIENCE_S
         )
         if drive is None:
-            why = reported(self.session)
-            return Result(Verdict("failed", f"Safety does not grant motion. It reports: {why}"))
+            why = self.session.say("drive.not_granted", text=reported(self.session))
+            return Result(Verdict("failed", why))
         result, latched = judge_drive(drive, self.settings), self._latch_after(drive)
         if not latched:
             return result
         before = f"{result.verdict.text} " if result.verdict.outcome == "failed" else ""
-        text = f"{before}The emergency stop stays latched. {latched} {RESET_HINT}"
+        text = before + self.session.say("drive.stays", why=latched)
         return Result(Verdict("failed", text, result.verdict.data), result.then)
 
     def _latch_after(self, drive: Drive) -> str:
@@ -180,33 +178,32 @@ class GuidedDrive:
             return ""
         if drive.problem is None and drive.stood and drive.manoeuvre.ending == "brake":
             return self.session.reset_own_stop()
-        return "It was not planned: find out why."
+        return self.session.say("drive.unplanned")
 
     def _limit(self, it: Manoeuvre) -> None:
         """Leave out everything that is faster than this motion on its axes."""
         linear, angular = abs(it.twist.linear) or math.inf, abs(it.twist.angular) or math.inf
         self.fastest = Twist(min(self.fastest.linear, linear), min(self.fastest.angular, angular))
-        self.limited = f"faster than {it.title}, which failed."
+        self.limited = self.session.say("drive.faster", title=it.title)
 
     def _way_back(self, start: Mileage) -> Manoeuvre | None:
-        end = self._counters()
+        end, say = self._counters(), self.session.say
         if (start.boot, start.epoch) != (end.boot, end.epoch):
-            show("\nThe counters have started again, so the way back is unknown.")
+            show(f"\n{say('drive.counters')}")
             return None
         travelled = end.distance - start.distance
         turned = abs(math.remainder(end.heading - start.heading, math.tau))
         back = homing(travelled, self.settings)
-        where = f"By its counters it stands {abs(travelled):.2f} m from where it began"
         reason = ""
         if back is None:
-            show(f"\n{where}.")
+            show(f"\n{say('drive.where', distance=abs(travelled))}")
         elif turned > math.radians(TURNED_DEG):
-            reason = f"turned by {math.degrees(turned):.0f} degrees"
+            reason = say("drive.turned", degrees=math.degrees(turned))
         elif back.ahead > self.space_m:
-            reason = f"its way back needs {back.ahead:.1f} m"
+            reason = say("drive.return_needs", distance=back.ahead)
         if not reason:
             return back
-        show(f"\n{where}, {reason}: the return is left out. Drive it back with `t2 drive`.")
+        show(f"\n{say('drive.no_return', distance=abs(travelled), reason=reason)}")
         self.report.left_out = [*self.report.left_out, f"the return ({reason})"]
         return None
 
@@ -217,11 +214,11 @@ class GuidedDrive:
         while True:
             self.session.mark()
             self.session.until(lambda: log, SWITCHES_S)
-            problem = switches_problem(log[-1].value if log else None)
+            problem = switches_problem(log[-1].value if log else None, self.session.say)
             if not problem:
                 return
             show(problem)
-            if prompt("Press Enter to check again, or type any word to end:"):
+            if prompt(self.session.say("check_again")):
                 raise T2Error(problem)
 
     def _check_recorder(self) -> None:
@@ -232,15 +229,13 @@ class GuidedDrive:
             health = [one.value for one in self.session.of(keys.HEALTH)]
             velocities = self.session.of(keys.VELOCITY)
             host = velocities[-1].value.host if velocities else 0
-            problem = recorder_problem(health, host)
+            problem = recorder_problem(health, host, self.session.say)
             if not problem:
                 self.recorders = frozenset(writing_recorders(health))
                 return
-            show(f"NOT RECORDED: {problem}")
-            typed = prompt(
-                f'Press Enter to check again, type "{UNRECORDED}" to go on all the same, or any '
-                "other text to end:"
-            )
+            say = self.session.say
+            show(say("drive.unrecorded", problem=problem))
+            typed = prompt(say("drive.unrecorded_ask", phrase=UNRECORDED))
             if typed.casefold() == UNRECORDED:
                 self.report.facts.append(("recording", f"none: {problem}"))
                 self.unrecorded, self.recorders = True, frozenset()

@@ -12,20 +12,30 @@ from cli.commission.manoeuvres import Manoeuvre, reach, speed
 from cli.commission.motion import NOTHING
 from cli.commission.report import Row, Verdict
 from cli.commission.supervision import FULL, UNLIKE, Problem, Then, Travel, unlike
+from cli.commission.texts import ENGLISH, Say
 from cli.fit.fit import SENSING_S, needed, reckoned
 from cli.fit.stops import DRIVING, TURNING, Kind, Stop, counted, find_stops
 from cli.fit.streams import COARSEST_S, Streams
 from common.freshness import NS_PER_S, Latest
 from common.motion import STANDING_MPS, STANDING_RADPS, Twist
 from services.safety.config import DECISION_PERIOD_S, SafetyConfig
-from t2.messages import Bumper, Command, Health, Mileage, Motion, SafetyState, Switches, Velocity
-from t2.words import Language, render
+from t2.messages import (
+    Bumper,
+    Command,
+    Field,
+    Health,
+    Mileage,
+    Motion,
+    SafetyState,
+    Switches,
+    Velocity,
+)
+from t2.words import render
 
 MEASURED_S = 0.5  # before the end of the requests
 RESOLUTION = 0.003  # m or rad: of the counters, which have steps of 1 mm and 0.1 degrees
 ROUNDING = 1e-6
 RECORDER = "recorder"
-START_RECORDER = "start `t2 record` on the robot, in another terminal"
 
 T = TypeVar("T")
 
@@ -44,7 +54,7 @@ class Drive:
     states: Sequence[Latest[SafetyState]]
     is_steady: bool = True  # whether it reached a steady speed
     problem: Problem | None = None  # found while it moved
-    language: Language = "en"  # of safety's texts
+    say: Say = ENGLISH
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +91,7 @@ def judge_standstill(drive: Drive) -> Result:
     problem = _at_standstill(drive, Twist(mean(linear), mean(angular)))
     if problem:
         return Result(Verdict("failed", problem, data), "end")
-    return Result(Verdict("passed", "It stands.", data))
+    return Result(Verdict("passed", drive.say("judge.stands"), data))
 
 
 def writing_recorders(health: Iterable[Health]) -> dict[int, int]:
@@ -95,32 +105,26 @@ def writing_recorders(health: Iterable[Health]) -> dict[int, int]:
     return {boot: hosts[boot] for boot, recorded in counts.items() if recorded[-1] > recorded[0]}
 
 
-def recorder_problem(health: Sequence[Health], host: int) -> str:
+def recorder_problem(health: Sequence[Health], host: int, say: Say = ENGLISH) -> str:
     """Return why no recording is complete, or an empty string.
 
     ``health`` are messages of some seconds, ``host`` is the robot's computer; 0 if unknown.
     """
     if not any(each.service == RECORDER for each in health):
-        return f"No recorder is running: {START_RECORDER}."
+        return say("recorder.none", start=say("recorder.start"))
     writing = writing_recorders(health)
     if not writing:
-        return (
-            "The recorder keeps incidents only (recorder.everything = false), or its disk is full: "
-            f"{START_RECORDER}."
-        )
+        return say("recorder.incidents", start=say("recorder.start"))
     if host and host not in writing.values():
-        return f"The recorder is on another computer, which gets fewer messages: {START_RECORDER}."
+        return say("recorder.elsewhere", start=say("recorder.start"))
     return ""
 
 
-def switches_problem(switches: Switches | None) -> str:
+def switches_problem(switches: Switches | None, say: Say = ENGLISH) -> str:
     """Return why the board's own brakes are not confirmed, or an empty string."""
     if switches is not None and switches.ultrasonic_brake and switches.bumper_brake:
         return ""
-    return (
-        "The board has not confirmed that both its emergency brakes are on: "
-        "run `t2 checkout --only link`."
-    )
+    return say("drive.switches")
 
 
 # --- one manoeuvre ------------------------------------------------------------------------------
@@ -129,19 +133,20 @@ def switches_problem(switches: Switches | None) -> str:
 def _problems(
     drive: Drive, stops: Sequence[Stop], reason: str, settings: SafetyConfig
 ) -> Iterator[Problem]:
+    say = drive.say
     if not drive.stood:
-        yield Problem("It does not stand: it was stopped by an emergency stop. Look at it.", "end")
+        yield Problem(say("judge.not_stood"), "end")
     if not drive.velocities or not drive.mileages:
-        yield Problem("No velocities or no counters: run `t2 checkout --only link`.", "end")
-    checks = (_not_granted(drive), _no_motion(drive), unlike(_travel(drive)), _too_slow(drive))
-    yield from filter(None, checks)
+        yield Problem(say("judge.no_data"), "end")
+    differ = unlike(_travel(drive), say=say)
+    yield from filter(None, (_not_granted(drive), _no_motion(drive), differ, _too_slow(drive)))
     if drive.manoeuvre.ending == "slow":
         return
     if reason:
-        yield Problem(f"The stop cannot be measured: {reason}.", "again")
+        yield Problem(say("judge.unmeasured", reason=reason), "again")
     elif drive.manoeuvre.ending != stops[0].kind:
-        yield Problem(f"It ended by {stops[0].kind.upper()} instead.", "again")
-    yield from filter(None, (_too_long(stop, settings) for stop in stops))
+        yield Problem(say("judge.other_end", kind=stops[0].kind.upper()), "again")
+    yield from filter(None, (_too_long(stop, settings, say) for stop in stops))
 
 
 def _not_granted(drive: Drive) -> Problem | None:
@@ -152,9 +157,11 @@ def _not_granted(drive: Drive) -> Problem | None:
     began_ns = min((m.received_ns for m in _runs(drive)), default=drive.ended_ns)
     states = (s.value for s in drive.states if began_ns <= s.received_ns <= drive.ended_ns)
     held = [state for state in states if state.verdict != "run"]
-    texts = list(dict.fromkeys(render(it.phrases, drive.language, it.text) for it in held))
-    why = f" It reports: {' '.join(texts[-3:])}" if texts else " It had too little space or time."
-    return Problem(f"Safety granted at most {speed(top)} of {speed(wanted)}.{why}", "again")
+    say = drive.say
+    texts = list(dict.fromkeys(render(it.phrases, say.language, it.text) for it in held))
+    reports = say("judge.reports", text=say.sentences(texts[-3:]))
+    granted = say("judge.granted", top=speed(top), wanted=speed(wanted))
+    return Problem(say.sentences([granted, reports if texts else say("judge.little")]), "again")
 
 
 def _no_motion(drive: Drive) -> Problem | None:
@@ -166,12 +173,8 @@ def _no_motion(drive: Drive) -> Problem | None:
          expected.angular),
     ):  # fmt: skip
         if asked and max(abs(counted_), abs(integrated)) < NOTHING * limit:
-            return Problem(
-                f"No motion: {abs(counted_):.2f} {unit} are counted on a request of {asked:.2f} "
-                f"{unit}/s. If the vehicle has moved, end the drive with Ctrl-C and repeat "
-                "`t2 checkout`. If not, its wheels may need a higher speed: continue.",
-                "again",
-            )
+            about: dict[str, Field] = {"counted": abs(counted_), "unit": unit, "wanted": asked}
+            return Problem(drive.say("judge.no_motion", **about), "again")
     return None
 
 
@@ -181,28 +184,21 @@ def _too_slow(drive: Drive) -> Problem | None:
     if drive.manoeuvre.group == "return":
         return None  # a short way has no steady part
     if measured is None:
-        return Problem("The velocities end too early: run `t2 checkout --only link`.", "end")
-    for unit, asked, found, setting in (
-        ("m/s", wanted.linear, measured.linear, ""),
-        ("rad/s", wanted.angular, measured.angular, "wire.command_angular_unit and "),
+        return Problem(drive.say("judge.no_end"), "end")
+    for axis, asked, found in (
+        ("linear", wanted.linear, measured.linear),
+        ("angular", wanted.angular, measured.angular),
     ):
         if asked and abs(found) < (1 - UNLIKE) * abs(asked):
-            return Problem(
-                f"Too slow: the board measures {found:+.2f} {unit}, granted are {asked:+.2f} "
-                f"{unit}: check {setting}whether the wheels slip or the vehicle is too heavy.",
-                "again",
-            )
+            return Problem(drive.say(f"judge.slow_{axis}", found=found, wanted=asked), "again")
     if drive.is_steady or math.isinf(drive.manoeuvre.steady_s):
         return None
     it = drive.manoeuvre
-    return Problem(
-        f"The speed was not steady within {reach(it.limit)} and {it.seconds:.0f} s: the vehicle "
-        "accelerates too slowly, or its velocity is too noisy.",
-        "again",
-    )
+    about: dict[str, Field] = {"reach": reach(it.limit, drive.say), "seconds": it.seconds}
+    return Problem(drive.say("judge.unsteady", **about), "again")
 
 
-def _too_long(stop: Stop, settings: SafetyConfig) -> Problem | None:
+def _too_long(stop: Stop, settings: SafetyConfig, say: Say) -> Problem | None:
     """Return the problem of a stop that took longer than the settings reckon with."""
     unit, body = stop.axis.unit, settings.vehicle
     name, assumed = (
@@ -211,34 +207,22 @@ def _too_long(stop: Stop, settings: SafetyConfig) -> Problem | None:
         else ("angular_deceleration", body.angular_deceleration)
     )
     way, allowed = needed(stop), reckoned(stop, settings)
-    figures = (
-        f"from {stop.speed:.2f} {unit}/s it needs {way:.3f} {unit}, the settings reckon with "
-        f"{allowed:.3f} {unit}"
-    )
+    figures = say("judge.way", speed=stop.speed, unit=unit, way=way, allowed=allowed)
     if way <= allowed + RESOLUTION:
         if not stop.braked:
             return None
-        return Problem(
-            f"Safety commanded BRAKE after the STOP, because it rolled on: {figures}. Drive on "
-            "level ground.",
-            "slower",
-        )
+        return Problem(say("judge.braked", figures=figures), "slower")
     react = settings.reaction - DECISION_PERIOD_S
     lowest = _deceleration(stop, react)
     changes = []
     if stop.reaction + SENSING_S > react:
-        changes.append(
-            f"safety.react to at least {_up(stop.reaction + SENSING_S):.2f} s (it is "
-            f"{settings.safety.react:g})"
-        )
+        least_s = _up(stop.reaction + SENSING_S)
+        changes.append(say("judge.react", least=least_s, now=settings.safety.react))
     if lowest < assumed:
-        changes.append(
-            f"vehicle.{name} to at most {_down(lowest):.2f} {unit}/s2 (it is {assumed:g})"
-        )
-    change = " and ".join(changes) or f"safety.react or vehicle.{name}"
-    return Problem(
-        f"The stop was too long: {figures}. Do not drive faster: set {change}.", "slower"
-    )
+        about: dict[str, Field] = {"most": _down(lowest), "unit": unit, "now": assumed}
+        changes.append(say("judge.deceleration", name=name, **about))
+    change = say("judge.and").join(changes) or say("judge.either", name=name)
+    return Problem(say("judge.long", figures=figures, change=change), "slower")
 
 
 def _deceleration(stop: Stop, react: float) -> float:
@@ -308,9 +292,8 @@ def _by_counters(drive: Drive) -> list[Stop]:
 def _travelled(drive: Drive) -> str:
     """Return the counted travel until standstill."""
     asked, way = drive.manoeuvre.twist, _travel(drive).counted
-    parts = [f"travelled {way.linear:+.2f} m"] if asked.linear else []
-    parts += [f"turned {math.degrees(way.angular):+.0f} degrees"] if asked.angular else []
-    return f"It has {' and '.join(parts)}, as expected."
+    name = ("both" if asked.angular else "travelled") if asked.linear else "turned"
+    return drive.say(f"judge.{name}", linear=way.linear, degrees=math.degrees(way.angular))
 
 
 # --- figures ------------------------------------------------------------------------------------
@@ -389,18 +372,13 @@ def _at_standstill(drive: Drive, bias: Twist) -> str:
         (b.value.mono_ns - a.value.mono_ns) / NS_PER_S for a, b in pairwise(drive.velocities)
     )
     if period_s > COARSEST_S:
-        return (
-            f"A velocity arrives each {period_s:.2f} s only, too rarely to watch a stop: run "
-            "`t2 checkout drive` on the robot, over ssh."
-        )
+        return drive.say("judge.rare", period=period_s)
     if not bias.is_standing:
-        return (
-            f"At standstill the board measures {bias.linear:+.3f} m/s and {bias.angular:+.3f} "
-            f"rad/s; below {STANDING_MPS:g} m/s and {STANDING_RADPS:g} rad/s counts as standstill. "
-            "Does it roll? Otherwise have the board's velocity corrected."
-        )
+        limits: dict[str, Field] = {"still": STANDING_MPS, "still_angular": STANDING_RADPS}
+        about: dict[str, Field] = {"linear": bias.linear, "angular": bias.angular}
+        return drive.say("judge.bias", **about, **limits)
     if _runs(drive):
-        return "Another program drives: end it first."
+        return drive.say("judge.driven")
     return ""
 
 

@@ -5,6 +5,7 @@ from itertools import dropwhile
 from typing import NamedTuple
 
 from cli.commission.report import Verdict, judged, seconds
+from cli.commission.texts import ENGLISH, Say
 from common.freshness import NS_PER_S, Latest
 from t2.messages import Command, Motion, SafetyState
 
@@ -12,12 +13,18 @@ LIMIT_S = 0.5  # from the cause to the latch and to BRAKE, including a slow bus
 
 
 class Reset(NamedTuple):
-    """A requested reset with its answer, and what stays latched after it."""
+    """A requested reset with its answer, and what is latched after it."""
 
     requested_ns: int
     granted: bool
     text: str
     latched: tuple[str, ...]
+
+    def problem(self, say: Say = ENGLISH) -> str:
+        """Return why the robot is not reset; empty if it is."""
+        if not self.granted:
+            return say("latch.reset", text=self.text)
+        return say("latch.after", causes=self.latched) if self.latched else ""
 
 
 class LatchTest(NamedTuple):
@@ -30,33 +37,31 @@ class LatchTest(NamedTuple):
     reset: Reset
 
 
-def judge_latch(test: LatchTest, problem: str = "") -> Verdict:
+def judge_latch(test: LatchTest, problem: str = "", say: Say = ENGLISH) -> Verdict:
     """Return the verdict on one latch; ``problem`` is one that was found before."""
     latches = [s.received_ns for s in test.states if test.cause in s.value.latched]
     # The bridge may have braked earlier.
     brakes = [m.received_ns for m in test.motions if m.value.command is Command.BRAKE]
     problems, data = [problem], []
-    for action, times_ns in ((f"latch {test.cause}", latches), ("command BRAKE", brakes)):
+    latch = say("latch.latch", cause=test.cause)
+    for action, times_ns in ((latch, latches), (say("latch.brake"), brakes)):
         # A state may overtake the sample that caused it on the bus: that counts as zero.
         took_s = max(0, times_ns[0] - test.at_ns) / NS_PER_S if times_ns else None
         data.append((f"{action} after", seconds(took_s, 3)))
         if took_s is None:
-            problems.append(f"Safety did not {action}.")
+            problems.append(say("latch.not", action=action))
         elif took_s > LIMIT_S:
-            problems.append(f"Safety took {took_s:.2f} s to {action}, the limit is {LIMIT_S:g} s.")
+            problems.append(say("latch.late", took=took_s, action=action, limit=LIMIT_S))
     data += [("BRAKE commands received", str(len(brakes))), ("reset", test.reset.text)]
-    return judged([*problems, *_until_reset(test)], "Latched, braked, reset.", data)
+    return judged([*problems, *_until_reset(test, say)], say("latch.good"), data, say)
 
 
-def _until_reset(test: LatchTest) -> Iterator[str]:
+def _until_reset(test: LatchTest, say: Say) -> Iterator[str]:
     """Yield the problems from the first BRAKE to the reset."""
     before_reset = (
         m.value.command for m in test.motions if m.received_ns <= test.reset.requested_ns
     )
     braked = dropwhile(lambda command: command is not Command.BRAKE, before_reset)
     if others := sorted({command.upper() for command in braked if command is not Command.BRAKE}):
-        yield f"Before the reset, safety sent {', '.join(others)} instead of BRAKE."
-    if not test.reset.granted:
-        yield f"The reset failed: {test.reset.text}"
-    elif test.reset.latched:
-        yield f"Still latched after the reset: {', '.join(test.reset.latched)}."
+        yield say("latch.others", commands=tuple(others))
+    yield test.reset.problem(say)

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import mean, median
 
 from cli.commission.report import Verdict, judged
+from cli.commission.texts import ENGLISH, Say
 from common.freshness import NS_PER_S
 from t2 import keys
 from t2.messages import Link, Relay, Switches
@@ -23,7 +24,7 @@ EXPECTED_HZ = {
 }
 
 
-def judge_link(links: Sequence[Link], switches: Switches | None) -> Verdict:
+def judge_link(links: Sequence[Link], switches: Switches | None, say: Say = ENGLISH) -> Verdict:
     """Return the verdict on consecutive link messages, at least one."""
     rates = {name: median(link.rates.get(name, 0.0) for link in links) for name in EXPECTED_HZ}
     seconds = (links[-1].mono_ns - links[0].mono_ns) / NS_PER_S
@@ -38,8 +39,11 @@ def judge_link(links: Sequence[Link], switches: Switches | None) -> Verdict:
         ("relay", _relay(links[-1].relay)),
         ("rejected", _listed(rejected(links))),
     ]
-    problems = [*_link_problems(links, switches, rates), *_rejections(rejected(links), frames)]
-    return judged(problems, f"The board's link is up: {frames} frames, no bad CRC.", data)
+    problems = [
+        *_link_problems(links, switches, rates, say),
+        *_rejections(rejected(links), frames, say),
+    ]
+    return judged(problems, say("link.good", frames=frames), data, say)
 
 
 def rejected(links: Sequence[Link]) -> dict[str, int]:
@@ -50,40 +54,34 @@ def rejected(links: Sequence[Link]) -> dict[str, int]:
 
 
 def _link_problems(
-    links: Sequence[Link], switches: Switches | None, rates: Mapping[str, float]
+    links: Sequence[Link], switches: Switches | None, rates: Mapping[str, float], say: Say
 ) -> Iterator[str]:
     if any(link.state != "up" for link in links):
-        yield (
-            f"The link is {links[-1].state} or was not up all the time: `t2 wire decode` shows "
-            "the board's frames."
-        )
+        yield say("link.down", state=links[-1].state)
         return
     if any(link.relay and (link.relay.state != "up" or link.relay.braking) for link in links):
-        yield f"The relay did not pass commands all the time; now: {_relay(links[-1].relay)}."
+        yield say("link.relay", relay=_relay(links[-1].relay))
     if links[0].epoch != links[-1].epoch:
-        yield "The board restarted during this step: check its power."
+        yield say("link.restarted")
     for name, rate in rates.items():
         if rate < ENOUGH * EXPECTED_HZ[name]:
-            yield f"{name} has {rate:.0f} Hz, expected are {EXPECTED_HZ[name]:.0f} Hz."
+            yield say("link.rate", name=name, rate=rate, expected=EXPECTED_HZ[name])
     if switches is None or not (switches.ultrasonic_brake and switches.bumper_brake):
-        yield "The board has not confirmed that both its emergency brakes are on."
+        yield say("link.brakes")
 
 
-def _rejections(counts: Mapping[str, int], frames: int) -> Iterator[str]:
+def _rejections(counts: Mapping[str, int], frames: int, say: Say) -> Iterator[str]:
     """Yield the problems of rejected frames; ``frames`` were accepted."""
     if frames < ENOUGH_FRAMES:
-        yield f"Too few frames for a verdict: {frames}. Was the bridge running all the time?"
+        yield say("link.few", frames=frames)
     bad = counts.get(BAD_CRC, 0)
     if bad and bad >= MOST_BAD * (bad + frames):
-        yield (
-            f"{bad} bad CRCs against {frames} good frames: this firmware has another CRC than "
-            "CRC-16/ARC over the payload (common/wire/framing.py)."
-        )
+        yield say("link.crc", bad=bad, frames=frames)
     elif bad:
-        yield f"{bad} bad CRCs against {frames} good frames: check the cable and its connectors."
+        yield say("link.cable", bad=bad, frames=frames)
     for reason, count in counts.items():
         if reason != BAD_CRC and count > STRAY * frames:
-            yield f"{count} frames rejected as {reason}: `t2 wire decode` shows them."
+            yield say("link.rejected", count=count, reason=reason)
 
 
 def _switches(switches: Switches | None) -> str:

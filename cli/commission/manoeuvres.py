@@ -21,6 +21,7 @@ from typing import Literal
 
 from msgspec import Struct
 
+from cli.commission.texts import ENGLISH, Say
 from common.motion import STILL, Twist
 from common.standstill import stopping_s
 from services.safety.config import SafetyConfig
@@ -74,25 +75,26 @@ class Manoeuvre(Struct, frozen=True):
         return abs(self.twist.linear) > than.linear or abs(self.twist.angular) > than.angular
 
 
-def announcement(it: Manoeuvre) -> str:
+def announcement(it: Manoeuvre, say: Say = ENGLISH) -> str:
     """Return what will happen, how far at most, and the free space that it needs."""
     if it.twist.is_zero:
-        return f"No action needed: the vehicle stands for {it.seconds:g} s. Do not touch it."
-    return (
-        f"It needs {space(it)}. "
-        f"It drives for at most {reach(it.limit)} and {math.ceil(it.seconds)} s, then stops."
-    )
+        return say("space.stands", seconds=it.seconds)
+    return say(
+        "space.needs",
+        space=space(it, say), reach=reach(it.limit, say), seconds=math.ceil(it.seconds),
+    )  # fmt: skip
 
 
-def space(it: Manoeuvre) -> str:
+def space(it: Manoeuvre, say: Say = ENGLISH) -> str:
     """Return the free space that a motion needs."""
     if it.is_turn:
-        return f"{_metres(it.around)} around the vehicle's middle"
+        return say("space.around", around=_metres(it.around))
     where = "ahead" if it.twist.linear > 0 else "behind"
     if it.is_straight:
-        return f"{_metres(it.ahead)} {where}"
+        return say(f"space.{where}", ahead=_metres(it.ahead))
     side = "left" if it.twist.angular * it.twist.linear > 0 else "right"
-    return f"{_metres(it.ahead)} {where} and {_metres(it.aside)} to the {side}"
+    metres = {"ahead": _metres(it.ahead), "aside": _metres(it.aside)}
+    return say(f"space.curve_{where}", side=side, **metres)
 
 
 def _metres(distance: float) -> str:
@@ -100,11 +102,10 @@ def _metres(distance: float) -> str:
     return f"{math.ceil(distance * 10 - 1e-9) / 10:.1f} m"
 
 
-def reach(limit: Twist) -> str:
+def reach(limit: Twist, say: Say = ENGLISH) -> str:
     """Return the limits of a motion as text."""
-    parts = [f"{limit.linear:.1f} m"] if limit.linear else []
-    parts += [f"{math.degrees(limit.angular):.0f} degrees"] if limit.angular else []
-    return " or ".join(parts)
+    axis = ("both" if limit.angular else "linear") if limit.linear else "angular"
+    return say(f"reach.{axis}", linear=limit.linear, degrees=math.degrees(limit.angular))
 
 
 def speed(twist: Twist) -> str:

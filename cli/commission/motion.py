@@ -25,10 +25,11 @@ from itertools import pairwise
 from statistics import mean
 
 from cli.commission.report import Row, Verdict, judged, seconds
+from cli.commission.texts import ENGLISH, Say
 from common.freshness import NS_PER_S, Latest
 from common.motion import Twist
-from t2.messages import Command, Mileage, Motion, SafetyState, Velocity
-from t2.words import Language, render
+from t2.messages import Command, Field, Mileage, Motion, SafetyState, Velocity
+from t2.words import render
 
 SETTLE_NS = round(0.4 * NS_PER_S)  # to reach the speed; a margin for unknown vehicles
 WINDOW_NS = round(0.6 * NS_PER_S)  # to measure: 0.06 m of 1 mm steps, 0.12 rad of 0.0017 rad steps
@@ -53,7 +54,7 @@ class Run:
     velocities: Sequence[Latest[Velocity]]
     mileages: Sequence[Latest[Mileage]]
     states: Sequence[Latest[SafetyState]]
-    language: Language = "en"  # of safety's texts
+    say: Say = ENGLISH
 
     @property
     def turns(self) -> bool:
@@ -89,15 +90,15 @@ def too_fast(requested: Twist, velocity: Velocity) -> bool:
 
 def judge_motion(run: Run) -> Verdict:
     """Return the verdict on one motion."""
-    measured, stood_s = measure(run), stood_after_s(run)
+    measured, stood_s, say = measure(run), stood_after_s(run), run.say
     if measured is None:
         return judged([_not_granted(run)], "", [("standstill after", seconds(stood_s))])
     problems = list(_problems(run, measured))
     if stood_s is None or stood_s > STOP_S:
-        problems.append(f"It did not stand within {STOP_S:g} s after the release.")
+        problems.append(say("motion.not_stood", limit=STOP_S))
     counted, commanded = f"{measured.counted:.3f}", f"{measured.commanded:.3f}"
-    text = f"The board counts {counted} {run.unit_of_rate} of {commanded} commanded."
-    return judged(problems, text, _data(run, measured, stood_s))
+    text = say("motion.good", counted=counted, unit=run.unit_of_rate, commanded=commanded)
+    return judged(problems, text, _data(run, measured, stood_s), say)
 
 
 def measure(run: Run) -> Measured | None:
@@ -144,21 +145,20 @@ def stood_after_s(run: Run) -> float | None:
 
 
 def _problems(run: Run, it: Measured) -> Iterator[str]:
-    ratio = it.counted / it.commanded
+    ratio, say = it.counted / it.commanded, run.say
     if abs(ratio) < NOTHING:
         yield _nothing_counted(run, it)
         return
     if ratio < 0:
-        way = "clockwise" if run.turns else "backward"
-        yield f"The sign is wrong: on a positive command it goes {way}."
+        yield say("motion.clockwise") if run.turns else say("motion.sign", way="backward")
     if abs(abs(ratio) - 1) > RATIO:
-        yield f"It goes {abs(ratio):.2f} times as fast as commanded."
+        yield say("motion.ratio", ratio=abs(ratio))
         yield _unit_hint(run, abs(ratio), "command", run.unit)
     measured = it.velocity / it.counted
     if measured < 0:
-        yield "The measured velocity has the wrong sign: it contradicts the counter."
+        yield say("motion.measured_sign")
     elif abs(measured - 1) > RATIO:
-        yield f"The measured velocity is {measured:.2f} times the velocity of the counter."
+        yield say("motion.measured", ratio=measured)
         # A larger unit of the firmware makes our reading smaller.
         yield _unit_hint(run, 1 / measured if measured else 0.0, "feedback", run.feedback)
 
@@ -166,9 +166,8 @@ def _problems(run: Run, it: Measured) -> Iterator[str]:
 def _nothing_counted(run: Run, it: Measured) -> str:
     counter = "heading" if run.turns else "distance"
     if abs(it.velocity / it.commanded) < NOTHING:
-        return f"No motion: neither the velocity nor the {counter} changes."
-    hint = " A heading from a gyroscope counts only on the ground." if run.turns else ""
-    return f"The velocity changes, but the {counter} does not.{hint}"
+        return run.say(f"motion.none_{counter}")
+    return run.say(f"motion.no_{counter}")
 
 
 def _unit_hint(run: Run, ratio: float, direction: str, setting: str) -> str:
@@ -176,18 +175,18 @@ def _unit_hint(run: Run, ratio: float, direction: str, setting: str) -> str:
     (other,) = UNITS.keys() - {setting}
     if not run.turns or abs(ratio * UNITS[setting] / UNITS[other] - 1) > UNIT_MATCH:
         return ""
-    return f'The firmware has another unit: set wire.{direction}_angular_unit = "{other}".'
+    return run.say("motion.unit", direction=direction, unit=other)
 
 
 def _not_granted(run: Run) -> str:
     held = [state.value for state in run.states if state.value.verdict != "run"]
-    texts = list(dict.fromkeys(render(it.phrases, run.language, it.text) for it in held))
-    reason = f" Safety reports: {' '.join(texts[-3:])}" if texts else ""
+    texts = list(dict.fromkeys(render(it.phrases, run.say.language, it.text) for it in held))
+    reason = run.say("motion.reports", text=run.say.sentences(texts[-3:])) if texts else ""
     speeds = [run.part(v.value.linear, v.value.angular) for v in run.velocities]
     peak = max(speeds, key=abs, default=0.0)
     requested = run.part(run.requested.linear, run.requested.angular)
-    moved = f" Measured at most {peak:.2f} {run.unit_of_rate} of {requested:.2f} requested."
-    return f"Safety did not grant the full speed for long enough to measure.{moved}{reason}"
+    about: dict[str, Field] = {"peak": peak, "unit": run.unit_of_rate, "requested": requested}
+    return run.say.sentences([run.say("motion.too_short", **about), reason])
 
 
 def _data(run: Run, it: Measured, stood_s: float | None) -> list[Row]:

@@ -13,6 +13,7 @@ from cli.commission.latches import Reset
 from cli.commission.manoeuvres import Ending, Manoeuvre
 from cli.commission.motion import too_fast
 from cli.commission.supervision import Problem, Supervision
+from cli.commission.texts import Say
 from cli.inspect.addressing import chunks, decode, topic_of
 from cli.inspect.client import SafetyClient
 from cli.inspect.session import decoded
@@ -41,11 +42,7 @@ WINDOW = 50  # velocities: more than arrive within it
 LATE_S = 0.5  # from the end of the lease to the STOP, including a slow bus
 LOST_S = 0.3  # without velocities or counters a motion is not supervised
 LATCH_S = 1.0  # from an emergency stop to its latch
-NO_STOP = (
-    "No STOP followed the end of its requests, RUN went on: an emergency stop has ended it. "
-    f"Does another program publish as `{SOURCE}`? Look at safety.sources.{SOURCE}.lease."
-)
-PRESSED = "Another emergency stop has arrived, as of an operator: find out why."
+AGAIN_S = 1.0  # after a reset: for a second stop, of a bumper that is let go or of an operator
 ESTOP = "estop"  # the cause, and the event of an operator's emergency stop
 TOPICS = (keys.LINK, keys.MOTION, keys.VELOCITY, keys.MILEAGE, keys.ULTRASONIC, keys.BUMPER,
           keys.SWITCHES, keys.DRIVER, keys.HEALTH, keys.EVENTS)  # fmt: skip
@@ -59,6 +56,7 @@ class CheckoutSession(SafetyClient):
     def __init__(self, opened: Inspector, robot: str, language: Language = "en") -> None:
         """Listen to the robot; ``language`` is that of safety's texts."""
         super().__init__(opened, robot, SOURCE, language)
+        self.say = Say(language)
         self._marked_ns = 0
         self._braked_ns = 0  # when this manoeuvre's emergency stop was published; 0 without one
         self._ordered = self._seen = 0  # emergency stops published here, and received from anybody
@@ -128,9 +126,10 @@ class CheckoutSession(SafetyClient):
         return self.state.latched if self.state else ()
 
     def reset(self, seen: SafetyState | None = None) -> Reset:
-        """Request a reset of the causes latched in ``seen``, and return what stays latched.
+        """Request a reset of the causes latched in ``seen``, and return what is latched after it.
 
-        Without ``seen`` these are the causes that are latched now.
+        Without ``seen`` these are the causes that are latched now. A second stop shortly after the
+        reset is waited for.
         """
         requested_ns = clock.now_ns()
         try:
@@ -141,6 +140,7 @@ class CheckoutSession(SafetyClient):
                 raise T2Error("safety's state does not show it")
         except T2Error as error:
             return Reset(requested_ns, False, str(error), self.latched())
+        self.until(self.latched, AGAIN_S)
         done = decoded(answers, ResetDone)
         text = " ".join(render(one.phrases, self.language, one.text) for one in done)
         return Reset(requested_ns, True, text, self.latched())
@@ -207,7 +207,7 @@ class CheckoutSession(SafetyClient):
         ]
         events = (event.value for event in self.of(keys.EVENTS))
         if any(event.name == ESTOP and "by" in event.about for event in events):
-            return PRESSED
+            return self.say("end.pressed")
         for attempt in range(RESETS):
             seen = self.fresh_state()
             if problem := self._not_own(seen, own[:1]):
@@ -216,10 +216,10 @@ class CheckoutSession(SafetyClient):
             if done.granted or attempt == RESETS - 1:
                 break
             self.listen(RESTING_S)  # safety refuses it while noise looks like motion
-        if done.granted and self._seen > self._ordered:  # pressed during the reset
+        if done.granted and self._seen > self._ordered:  # pressed during the reset, or after it
             self.emergency_stop()
-            return PRESSED
-        return "" if done.granted and not done.latched else f"The reset failed: {done.text}"
+            return self.say("end.pressed")
+        return done.problem(self.say)
 
     def _not_own(self, seen: SafetyState, own: list[int]) -> str:
         """Return why what is latched is not, or not only, its own emergency stop."""
@@ -227,11 +227,11 @@ class CheckoutSession(SafetyClient):
             return taken.text
         self.until(lambda: self._seen >= self._ordered, LATCH_S)
         if self._seen > self._ordered:
-            return PRESSED
+            return self.say("end.pressed")
         if self._seen < self._ordered:
-            return "Its own emergency stops are not received back: another one would not be either."
+            return self.say("end.not_received")
         if not own or [cause.id for cause in seen.causes if cause.name in seen.latched] != own:
-            return f"Safety has latched {', '.join(seen.latched) or 'nothing'}: find out why."
+            return self.say("end.latched", causes=seen.latched or self.say("nothing"))
         return ""
 
     def emergency_stop(self) -> bool:
@@ -253,7 +253,7 @@ class CheckoutSession(SafetyClient):
 
         Return what contradicts it, if anything does, and whether it reached a steady speed.
         """
-        supervision, began_ns = Supervision(it), clock.now_ns()
+        supervision, began_ns = Supervision(it, say=self.say), clock.now_ns()
         logs = self.of(keys.MOTION), self.of(keys.VELOCITY), self.of(keys.MILEAGE)
         found: list[Problem] = []
 
@@ -278,7 +278,7 @@ class CheckoutSession(SafetyClient):
         if taken := self._taken_over():
             return taken
         text = render(state.phrases, self.language, state.text)
-        return Problem(f"Safety stopped it: {text}", "again", "slow")
+        return Problem(self.say("end.stopped", text=text), "again", "slow")
 
     def _lost(self, began_ns: int) -> Problem | None:
         """Return the problem of velocities or counters that no longer arrive here."""
@@ -288,8 +288,7 @@ class CheckoutSession(SafetyClient):
         ):
             newest_ns = max(log[-1].received_ns, began_ns) if log else began_ns
             if clock.now_ns() - newest_ns > LOST_S * NS_PER_S:
-                text = f"Nothing is received of the {name} for {LOST_S:g} s while it moves: run"
-                return Problem(f"{text} `t2 checkout --only link`.", "again")
+                return Problem(self.say(f"end.lost_{name}", seconds=LOST_S), "again")
         return None
 
     def _taken_over(self) -> Problem | None:
@@ -297,7 +296,7 @@ class CheckoutSession(SafetyClient):
         source = self.state.source if self.state else None
         if source in (None, SOURCE):
             return None
-        return Problem(f"Another source drives, {source}: end it first.", "again", "slow")
+        return Problem(self.say("end.other", source=source), "again", "slow")
 
     def _end(self, ending: Ending, lease_s: float) -> Problem | None:
         """End the motion; without STOP after the lease by an emergency stop, and a problem."""
@@ -308,7 +307,7 @@ class CheckoutSession(SafetyClient):
             self.until(lambda: self._taken_over() or self._is_stopped(), lease_s + LATE_S)
             if not self._is_stopped() and not self._taken_over():
                 self._brake()
-                return Problem(NO_STOP, "end")
+                return Problem(self.say("end.no_stop", source=SOURCE), "end")
         elif ending == "brake":
             self._brake()
         else:
@@ -363,7 +362,7 @@ class CheckoutSession(SafetyClient):
             list(self.of(keys.SAFETY)),
             is_steady,
             problem,
-            self.language,
+            self.say,
         )
 
     def _is_granted(self) -> bool:

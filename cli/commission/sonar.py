@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from cli.commission.report import Verdict, judged
+from cli.commission.texts import ENGLISH, Say
 from common.freshness import NS_PER_S
 from t2.messages import SONAR_NAMES, Ultrasonic
 
@@ -65,36 +66,44 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def obstructions(rest: Rest) -> str:
+def obstructions(rest: Rest, say: Say = ENGLISH) -> str:
     """Return a text that names sonars without free space; empty if all have it."""
     tight = [
-        f"{words(name)} {distance:.2f} m"
+        say("sonar.reading", sonar=name, distance=distance)
         for name, distance in zip(SONAR_NAMES, rest, strict=True)
         if distance is not None and distance < ROOM_M
     ]
-    return f"Clear {ROOM_M:g} m all around: {', '.join(tight)}." if tight else ""
+    return say("sonar.clear", room=ROOM_M, tight=tuple(tight)) if tight else ""
 
 
-def judge_sonars(rest: Rest, found: Sequence[Sequence[str]]) -> Verdict:
-    """Return the verdict; ``found`` are the sonars that detected the hand before each sonar."""
+def judge_sonars(
+    rest: Rest, found: Sequence[Sequence[str]], left: str = "", say: Say = ENGLISH
+) -> Verdict:
+    """Return the verdict; ``found`` are the sonars that detected the hand before each sonar.
+
+    ``left`` is why the operator has left the step before the last sonar.
+    """
     problems, data = [], []
-    for name, resting, detected_by in zip(SONAR_NAMES, rest, found, strict=True):
-        problems.append(_problem(name, resting, detected_by))
+    for name, resting, detected_by in zip(SONAR_NAMES, rest, found, strict=False):
+        problems.append(_problem(name, resting, detected_by, say))
         at_rest = "no reading" if resting is None else f"{resting:.2f} m"
         shown = at_rest.replace("inf m", "no echo")
         names = ", ".join(map(words, detected_by)) or "none"
         data.append((f"hand in front of {words(name)}", f"detected by {names}; at rest {shown}"))
-    return judged(problems, "Each sonar is in its place.", data)
+    if left:
+        count = {"done": len(found), "all": len(SONAR_NAMES)}
+        problems.append(say("sonar.left", **count, reason=left))
+    return judged(problems, say("sonar.good"), data, say)
 
 
-def _problem(name: str, resting: float | None, detected_by: Sequence[str]) -> str:
+def _problem(name: str, resting: float | None, detected_by: Sequence[str], say: Say) -> str:
     if resting is None:
-        return f"{words(name)} is faulty: the board reports 0xFFFF."
+        return say("sonar.fault", sonar=name)
     if not detected_by:
-        return f"{words(name)}: no sonar detected the hand."
+        return say("sonar.missed", sonar=name)
     if list(detected_by) == [name]:
         return ""
-    return f"{words(name)}: the hand was detected by {' and '.join(map(words, detected_by))}."
+    return say("sonar.other", sonar=name, sonars=tuple(detected_by))
 
 
 def _distances(sample: Ultrasonic) -> list[float | None]:

@@ -20,14 +20,15 @@ from cli.commission.sonar import (
     judge_sonars,
     obstructions,
     resting_ranges,
-    words,
 )
+from cli.commission.texts import ENGLISH, Say
 from common import clock
 from common.motion import Twist
 from common.text import printable
 from t2 import keys
 from t2.errors import T2Error
 from t2.messages import SONAR_NAMES, Command
+from t2.patrol_texts import Words
 from t2.words import render
 
 LINK_S = 10.0  # some 1000 frames; the ultrasonic ones prove the CRC: zeros have CRC 0 with any CRC
@@ -55,7 +56,10 @@ def wrapped(text: str) -> str:
     if not sys.stdout.isatty():
         return text
     width = shutil.get_terminal_size().columns
-    return "\n".join(textwrap.fill(line, width) for line in text.split("\n"))
+    # The terminal itself wraps Chinese, which has no spaces.
+    return "\n".join(
+        textwrap.fill(line, width) if line.isascii() else line for line in text.split("\n")
+    )
 
 
 def prompt(question: str) -> str:
@@ -76,9 +80,9 @@ def prompt(question: str) -> str:
     return line.removeprefix("\ufeff").strip()  # a file of answers may begin with a mark
 
 
-def confirm(fact: str, phrase: str) -> bool:
+def confirm(fact: str, phrase: str, say: Say = ENGLISH) -> bool:
     """Return whether the operator types the phrase."""
-    return prompt(f'{fact}\nType "{phrase}" to confirm:').lower() == phrase
+    return prompt(say("confirm", fact=fact, phrase=phrase)).lower() == phrase
 
 
 def choice(question: str) -> str:
@@ -95,37 +99,44 @@ def link(session: CheckoutSession) -> Verdict:
     session.mark()
     session.listen(LINK_S)
     if not (links := session.of(keys.LINK)):
-        return failed("No link message from the bridge.")
+        return failed(session.say("link.none"))
     switches = session.of(keys.SWITCHES)
     newest = switches[-1].value if switches else None
-    return judge_link([one.value for one in links], newest)
+    return judge_link([one.value for one in links], newest, session.say)
 
 
 def sonars(session: CheckoutSession) -> Verdict:
     """Check the eight sonars, one hand position each."""
+    say = session.say
     session.mark()
     session.listen(REST_S)
     samples = [one.value for one in session.of(keys.ULTRASONIC)]
     if not samples:
-        return failed("No ranges are received: see the link.")
+        return failed(say("sonar.none"))
     rest = resting_ranges(samples)
-    if problem := obstructions(rest):
+    if problem := obstructions(rest, say):
         return failed(problem)
-    return judge_sonars(rest, [_find(session, rest, name) for name in SONAR_NAMES])
+    found: list[Sequence[str]] = []
+    for name, resting in zip(SONAR_NAMES, rest, strict=True):
+        found.append(_find(session, rest, name))
+        is_missed = resting is not None and not found[-1]
+        if is_missed and len(found) < len(rest) and (left := choice(say("sonar.next"))):
+            return judge_sonars(rest, found, left, say)
+    return judge_sonars(rest, found, say=say)
 
 
 def _find(session: CheckoutSession, rest: Rest, name: str) -> Sequence[str]:
     """Return the sonars that detect a hand in front of one of them."""
     if rest[SONAR_NAMES.index(name)] is None:
-        show(f"The {words(name)} sonar is faulty.")
+        show(session.say("sonar.is_faulty", sonar=name))
         return ()
-    show(f"NOW the {words(name)} sonar: hold a hand in front of it, within {HAND_S:g} s.")
+    show(session.say("sonar.now", sonar=name, seconds=HAND_S))
     seen = _wait(session, rest, True, HAND_S)
     if seen:
-        show(f"  detected by: {', '.join(map(words, seen))}. Take the hand away.")
+        show(session.say("sonar.seen", sonars=tuple(seen)))
         _wait(session, rest, False, AWAY_S)
     else:
-        show("  no sonar has detected it.")
+        show(session.say("sonar.unseen"))
     return seen
 
 
@@ -148,23 +159,24 @@ def bumper(session: CheckoutSession) -> Verdict:
     """Check that the strip reports being pressed and free, and the reset."""
     if problem := unlatch(session):
         return failed(problem)
+    say = session.say
     session.mark()
     samples = session.of(keys.BUMPER)
     session.until(lambda: samples, LATCH_S)
     if not samples:
-        return failed("No bumper messages are received: see the link.")
+        return failed(say("bumper.none"))
     if samples[-1].value.pressed:
-        return failed("The bumper is pressed before the test: stuck or inverted.")
-    show(f"NOW press the bumper, within {HAND_S:g} s.")
+        return failed(say("bumper.before"))
+    show(say("bumper.now", seconds=HAND_S))
     if not session.until(lambda: samples[-1].value.pressed, HAND_S):
-        return failed("No press was received: is the strip connected?")
+        return failed(say("bumper.no_press"))
     at_ns = next(one.received_ns for one in samples if one.value.pressed)
     session.until(lambda: "contact" in session.latched(), LATCH_S)
-    show("Pressed. NOW let go of it.")
+    show(say("bumper.let_go"))
     is_gone = session.until(lambda: not samples[-1].value.pressed, HAND_S)
     session.listen(CLEAR_S)
-    problem = "" if is_gone else "The bumper stays pressed after you let go of it."
-    return judge_latch(_latch_test(session, "contact", at_ns), problem)
+    problem = "" if is_gone else say("bumper.stays")
+    return judge_latch(_latch_test(session, "contact", at_ns), problem, say)
 
 
 def estop(session: CheckoutSession) -> Verdict:
@@ -177,7 +189,7 @@ def estop(session: CheckoutSession) -> Verdict:
     session.until(
         lambda: any(one.value.command is Command.BRAKE for one in session.of(keys.MOTION)), LATCH_S
     )
-    return judge_latch(_latch_test(session, "estop", at_ns))
+    return judge_latch(_latch_test(session, "estop", at_ns), say=session.say)
 
 
 def unlatch(session: CheckoutSession) -> str:
@@ -185,11 +197,10 @@ def unlatch(session: CheckoutSession) -> str:
     latched = session.fresh_state().latched
     if not latched:
         return ""
-    fact = f"Safety has latched before: {', '.join(latched)}. Reset it first."
-    if not confirm(fact, RESET_PHRASE):
-        return "The earlier latch of safety was not reset."
-    done = session.reset()
-    return "" if done.granted and not done.latched else f"The reset failed: {done.text}"
+    say = session.say
+    if not confirm(say("latch.before", causes=latched), RESET_PHRASE, say):
+        return say("latch.not_reset")
+    return session.reset().problem(say)
 
 
 def _latch_test(session: CheckoutSession, cause: str, at_ns: int) -> LatchTest:
@@ -202,16 +213,15 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
     """Drive a motion after the operator's confirmation."""
     if problem := unlatch(session):
         return failed(problem)
-    if not confirm("The wheels will turn. All of them must be off the ground.", PHRASE):
-        return failed("Not confirmed: no motion was requested.")
+    say = session.say
+    if not confirm(say("off_ground"), PHRASE, say):
+        return failed(say("not_confirmed"))
     settings = session.settings("bridge")
     session.mark()
-    show("The wheels turn. Ctrl-C stops them.")
+    show(say("turning"))
     ended_ns = session.drive(requested, DRIVE_S)
     if ended_ns is None:
-        return failed(
-            f"Safety does not grant motion to the checkout. It reports: {reported(session)}"
-        )
+        return failed(say("not_granted", text=reported(session)))
     run = Run(
         requested=requested,
         unit=str(settings["wire.command_angular_unit"].value),
@@ -221,7 +231,7 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
         velocities=session.of(keys.VELOCITY),
         mileages=session.of(keys.MILEAGE),
         states=session.of(keys.SAFETY),
-        language=session.language,
+        say=say,
     )
     return judge_motion(run)
 
@@ -229,45 +239,77 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
 def reported(session: CheckoutSession) -> str:
     """Return why safety and the bridge grant no motion."""
     state, links = session.state, session.of(keys.LINK)
-    text = render(state.phrases, session.language, state.text) if state else "no state"
+    text = render(state.phrases, session.language, state.text) if state else session.say("no_state")
     if not links or links[-1].value.armed:
         return text
     link = links[-1].value
-    return f"{text} The bridge: {render(link.waiting_phrases, session.language, link.waiting)}"
+    waiting = render(link.waiting_phrases, session.language, link.waiting)
+    return session.say("and_bridge", text=text, waiting=waiting)
 
 
 class Step(NamedTuple):
     """One step of a checkout; ``what`` is the instruction to the operator."""
 
     name: str
-    title: str
-    what: str
+    title: Words
+    what: Words
     run: Callable[[CheckoutSession], Verdict]
 
 
+WHEELS: Words = (
+    "Wheels off the ground, a hand on the vehicle's own switch.",
+    "车轮离地，手放在车身上的急停开关上。",
+)
 STEPS = (
-    Step("link", "Link", f"No action needed: it is observed for {LINK_S:g} s.", link),
+    Step(
+        "link",
+        ("Link", "链路"),
+        (
+            f"No action needed: it is observed for {LINK_S:g} s.",
+            f"无需操作：将观察 {LINK_S:g} 秒。",
+        ),
+        link,
+    ),
     Step(
         "sonar",
-        "Sonars",
-        "First stand aside, with 0.8 m free all around. Then hold a hand 0.2 to 0.4 m in front of "
-        "the named sonar, until the next one is named.",
+        ("Sonars", "超声波传感器"),
+        (
+            "First stand aside, with 0.8 m free all around. Then hold a hand 0.2 to 0.4 m in front "
+            "of the named sonar, until the next one is named.",
+            "请先站到一旁，四周留出 0.8 m 空间。然后将手放在所指传感器前方 0.2 至 0.4 m 处，"
+            "直到指定下一个传感器。",
+        ),
         sonars,
     ),
-    Step("bumper", "Bumper", "Press and release the bumper strip when prompted.", bumper),
-    Step("estop", "Emergency stop", "No action needed: it is published, and reset.", estop),
+    Step(
+        "bumper",
+        ("Bumper", "防撞条"),
+        ("Press and release the bumper strip when prompted.", "请按提示压下并松开防撞条。"),
+        bumper,
+    ),
+    Step(
+        "estop",
+        ("Emergency stop", "急停"),
+        ("No action needed: it is published, and reset.", "无需操作：将触发急停，然后复位。"),
+        estop,
+    ),
     Step(
         "forward",
-        "Forward",
-        f"Wheels off the ground, a hand on the vehicle's own switch. The wheels turn forward at "
-        f"{FORWARD.linear:g} m/s for {DRIVE_S:g} s.",
+        ("Forward", "前进"),
+        (
+            f"{WHEELS[0]} The wheels turn forward at {FORWARD.linear:g} m/s for {DRIVE_S:g} s.",
+            f"{WHEELS[1]}车轮将以 {FORWARD.linear:g} m/s 向前转动 {DRIVE_S:g} 秒。",
+        ),
         partial(move, FORWARD),
     ),
     Step(
         "turn",
-        "Turn",
-        f"Wheels off the ground, a hand on the vehicle's own switch. The wheels turn as for a "
-        f"left turn on the spot, at {TURN.angular:g} rad/s for {DRIVE_S:g} s.",
+        ("Turn", "转向"),
+        (
+            f"{WHEELS[0]} The wheels turn as for a left turn on the spot, at "
+            f"{TURN.angular:g} rad/s for {DRIVE_S:g} s.",
+            f"{WHEELS[1]}车轮将按原地左转的方式以 {TURN.angular:g} rad/s 转动 {DRIVE_S:g} 秒。",
+        ),
         partial(move, TURN),
     ),
 )

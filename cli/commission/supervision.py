@@ -22,6 +22,7 @@ from typing import Literal
 from msgspec import Struct
 
 from cli.commission.manoeuvres import Ending, Manoeuvre, speed
+from cli.commission.texts import ENGLISH, Say
 from common.freshness import NS_PER_S, Latest
 from common.motion import STANDING_MPS, STANDING_RADPS, STILL, Twist
 from t2.messages import Command, Mileage, Motion, Velocity
@@ -85,6 +86,7 @@ class Supervision:
 
     manoeuvre: Manoeuvre
     travel: Travel = field(default_factory=Travel)
+    say: Say = ENGLISH
     full_ns: int | None = None  # since when the full speed is granted, by the sender's clock
     _taken: list[int] = field(default_factory=lambda: [0, 0, 0])
 
@@ -155,20 +157,16 @@ class Supervision:
         wanted, travel = self.manoeuvre.twist, self.travel
         for source, way in (("counters", travel.counted), ("velocities", travel.integrated)):
             if way.linear * _sign(wanted.linear) < -AGAINST_M:
-                return Problem(
-                    f"Wrong sign: by the {source} it has travelled {way.linear:+.2f} m on a "
-                    f"request of {wanted.linear:+.2f} m/s. Repeat `t2 checkout --only forward`, "
-                    "wheels off the ground.",
-                    "end",
-                )
+                text = self._sign_text("linear", source, way.linear, wanted.linear)
+                return Problem(text, "end")
             if way.angular * _sign(wanted.angular) < -AGAINST_RAD:
-                return Problem(
-                    f"Wrong sign: by the {source} it has turned {way.angular:+.2f} rad on a "
-                    f"request of {wanted.angular:+.2f} rad/s (left is positive). Repeat "
-                    "`t2 checkout --only turn`, wheels off the ground.",
-                    "end",
-                )
+                text = self._sign_text("angular", source, way.angular, wanted.angular)
+                return Problem(text, "end")
         return None
+
+    def _sign_text(self, axis: str, source: str, way: float, wanted: float) -> str:
+        by = self.say(f"by.{source}")
+        return self.say(f"end.sign_{axis}", by=by, way=way, wanted=wanted)
 
     def _too_fast(self) -> Problem | None:
         """Return the excess of the smaller one of two velocities: one may be noise."""
@@ -184,44 +182,30 @@ class Supervision:
             return None
         linear = measured.linear if is_linear and wanted.linear else 0.0
         shown = Twist(linear, 0.0 if linear else measured.angular)
-        hint = (
-            "check the board's scale of the speed"
-            if linear
-            else "check wire.command_angular_unit and wire.feedback_angular_unit with "
-            "`t2 checkout --only turn`"
-        )
-        return Problem(
-            f"Too fast: the board measures {speed(shown)}, requested are {speed(wanted)}: {hint}.",
-            "end",
-        )
+        name = "end.fast_linear" if linear else "end.fast_angular"
+        return Problem(self.say(name, measured=speed(shown), wanted=speed(wanted)), "end")
 
     def _unlike(self) -> Problem | None:
         """Compare both travels while the vehicle moves, when the counters may be late."""
         now = self.travel.velocity
         lag = Twist(LATE_S * abs(now.linear), LATE_S * abs(now.angular)) if now else STILL
-        return unlike(self.travel, lag)
+        return unlike(self.travel, lag, self.say)
 
     def _drift(self) -> Problem | None:
         it, way = self.manoeuvre, self.travel.counted
         if it.is_straight and abs(way.angular) > DRIFT_RAD:
             side = "left" if way.angular > 0 else "right"
-            return Problem(
-                f"Drift: on a straight line it has turned {abs(math.degrees(way.angular)):.0f} "
-                f"degrees to the {side} within {abs(way.linear):.2f} m: check tyres, wheel "
-                "alignment and ground.",
-                "again",
-            )
+            degrees, distance = abs(math.degrees(way.angular)), abs(way.linear)
+            text = self.say("end.drift_straight", degrees=degrees, side=side, distance=distance)
+            return Problem(text, "again")
         if it.is_turn and abs(way.linear) > DRIFT_M:
             where = "forward" if way.linear > 0 else "backward"
-            return Problem(
-                f"Drift: in a turn on the spot it has travelled {abs(way.linear):.2f} m {where}: "
-                "check the steering of all wheels.",
-                "again",
-            )
+            text = self.say("end.drift_turn", distance=abs(way.linear), way=where)
+            return Problem(text, "again")
         return None
 
 
-def unlike(travel: Travel, late: Twist = STILL) -> Problem | None:
+def unlike(travel: Travel, late: Twist = STILL, say: Say = ENGLISH) -> Problem | None:
     """Return the difference of counters and velocities if it is over 25 %.
 
     ``late``: m and rad by which the counters may be behind.
@@ -234,17 +218,9 @@ def unlike(travel: Travel, late: Twist = STILL) -> Problem | None:
     for unit, counted, integrated, from_, noise in rows:
         larger = max(abs(counted), abs(integrated))
         if larger >= from_ and abs(counted - integrated) > UNLIKE * larger + noise:
-            hint = (
-                "check wire.feedback_angular_unit with `t2 checkout --only turn`"
-                if unit == "rad"
-                else "check the scale of counters and velocity with `t2 wire decode`"
-            )
-            return Problem(
-                f"Counters and velocities differ by {abs(counted - integrated) / larger:.0%}: "
-                f"counted {counted:+.2f} {unit}, by the velocities {integrated:+.2f} {unit}: "
-                f"{hint}.",
-                "end",
-            )
+            share = abs(counted - integrated) / larger
+            text = say(f"end.unlike_{unit}", share=share, counted=counted, integrated=integrated)
+            return Problem(text, "end")
     return None
 
 

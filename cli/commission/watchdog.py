@@ -19,6 +19,7 @@ from statistics import mean
 from msgspec import Struct
 
 from cli.commission.report import Row, Verdict, failed, judged
+from cli.commission.texts import ENGLISH, Say
 
 RECENT_S = 0.2  # of velocities whose mean counts
 SLOWER, SLOW = 0.9, 0.5  # of the speed before: still turning, and slowing down for certain
@@ -26,11 +27,6 @@ DROVE_ON = 0.8  # of the way at that speed
 SPREAD_S = 0.3  # a try that waits for so much longer than others needed must stop, too
 
 Point = tuple[float, float]  # s since the last command, m/s
-
-NO_WATCHDOG = (
-    "it has no watchdog. When the computer loses power, only the stop switch stops the vehicle, or "
-    "a relay (docs/relay.md)"
-)
 
 
 class Try(Struct, frozen=True, kw_only=True):
@@ -64,42 +60,41 @@ def silent_try(points: Sequence[Point], speed: float, waited: float, travelled: 
     return Try(fed=False, waited=waited, slowed=slowed, travelled=travelled)
 
 
-def judge_watchdog(fed: Sequence[Try], silent: Sequence[Try]) -> Verdict:
+def judge_watchdog(fed: Sequence[Try], silent: Sequence[Try], say: Say = ENGLISH) -> Verdict:
     """Return what the tries show; ``failed`` if they contradict each other."""
     data = list(map(_row, (*fed, *silent)))
-    problems = [*_contradictions(fed, "with queries"), *_contradictions(silent, "in silence")]
+    problems = [
+        *_contradictions(fed, "watchdog.fed", say),
+        *_contradictions(silent, "watchdog.silence", say),
+    ]
     stops, stops_silent = _stops(fed), _stops(silent)
     if stops and not stops_silent and _drove_on_s(silent) > max(stops) + SPREAD_S:
-        problems.append("The wheels stopped while queries went on, but drove on in silence.")
+        problems.append(say("watchdog.opposite"))
     if problems:
-        text = "The board has no watchdog that can be relied on."
-        return judged([*problems, text], "", data)
+        return judged([*problems, say("watchdog.unreliable")], "", data, say)
     on_s, silent_s = _drove_on_s(fed), _drove_on_s(silent)
-    if stops:
-        text = f"The board stops by itself {_after(stops)} after the last motion command"
-        text += f"; in silence {_after(stops_silent)}." if stops_silent else "."
+    if stops and stops_silent:
+        text = say(
+            "watchdog.stops_both", after=_after(stops, say), silence=_after(stops_silent, say)
+        )
+    elif stops:
+        text = say("watchdog.stops", after=_after(stops, say))
     elif stops_silent:
-        text = (
-            f"The board drives on for at least {on_s:g} s without a motion command while queries "
-            f"go on: they feed its watchdog. In silence it stops by itself {_after(stops_silent)} "
-            "after the last frame."
-        )
+        text = say("watchdog.silent", seconds=on_s, after=_after(stops_silent, say))
     else:
-        text = (
-            f"The board drives on for at least {on_s:g} s without a motion command, and for "
-            f"{silent_s:g} s without any frame: {NO_WATCHDOG}."
-        )
-    return judged([], text, data) if fed and silent else failed("No try was complete.")
+        text = say("watchdog.none", seconds=on_s, silence=silent_s)
+    return judged([], text, data, say) if fed and silent else failed(say("watchdog.no_try"))
 
 
-def _contradictions(tries: Sequence[Try], how: str) -> Iterator[str]:
+def _contradictions(tries: Sequence[Try], how: str, say: Say) -> Iterator[str]:
     """Yield what shows that the board does not stop each time."""
     stops = _stops(tries)
     if stops and (drove_on_s := _drove_on_s(tries)) > max(stops) + SPREAD_S:
-        yield (
-            f"It stopped {_after(stops)} after the last command in {len(stops)} of {len(tries)} "
-            f"tries {how}, and drove on for {drove_on_s:g} s in another one."
-        )
+        yield say(
+            "watchdog.contradiction",
+            after=_after(stops, say), count=len(stops), all=len(tries), how=say(how),
+            seconds=drove_on_s,
+        )  # fmt: skip
 
 
 def _stops(tries: Sequence[Try]) -> list[float]:
@@ -111,9 +106,9 @@ def _drove_on_s(tries: Sequence[Try]) -> float:
     return max((each.waited for each in tries if each.slowed is None), default=0.0)
 
 
-def _after(stops: Sequence[float]) -> str:
-    several = "tries" if len(stops) > 1 else "try"
-    return f"{mean(stops):.2f} s ({min(stops):.2f} to {max(stops):.2f} in {len(stops)} {several})"
+def _after(stops: Sequence[float], say: Say) -> str:
+    name = "watchdog.after" if len(stops) > 1 else "watchdog.after_one"
+    return say(name, mean=mean(stops), least=min(stops), most=max(stops), count=len(stops))
 
 
 def _row(it: Try) -> Row:

@@ -1,15 +1,13 @@
 """The page of a fit: the table, and a figure of what each estimate was made from."""
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from cli.fit.check import Course
 from cli.fit.fit import Fit, of_command
 from cli.fit.stops import DRIVING, TURNING
 from cli.fit.streams import Streams
-from common.cli_args import needs_extra
+from cli.page import fill_page
 
-TEMPLATE = Path(__file__).with_name("fit.html")
 TITLES = {"stop": "STOP", "brake": "BRAKE"}
 
 Figure = tuple[str, str]  # a title, and SVG
@@ -26,10 +24,9 @@ def page(
     checked: tuple[Streams, Course] | None,
 ) -> str:
     """Return the page; ``checked`` is the recording that the model has followed."""
-    with needs_extra("report", "a page"):
-        from jinja2 import Environment, StrictUndefined
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+    return fill_page(
+        "fit/fit.html",
+        {},
         title=title,
         not_safe=not_safe,
         head=head,

@@ -15,6 +15,7 @@ from services.localization.core.fixes import AGREEING
 from t2 import keys
 from t2.catalogue import CAUSES, NOTHING
 from t2.messages import (
+    Camera,
     Cause,
     Field,
     FixState,
@@ -34,6 +35,7 @@ FROM_STREAM = {
     keys.BUMPER.path: (*ANY_STREAM, "bumper"),
     keys.ULTRASONIC.path: (*ANY_STREAM, "sonar"),
 }
+ONCE = (*keys.ON_BOARD, "localization", "patrol")  # for a robot; any number of others may run
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
@@ -64,6 +66,7 @@ class Observation:
     links: list[Link] = field(default_factory=list)
     pose: MapPose | None = None  # the newest
     patrol: PatrolState | None = None  # the newest
+    cameras: dict[str, Camera] = field(default_factory=dict)  # the newest state of each
     obeys_patrol: bool | None = None  # whether safety has the source; None if unknown
     state: SafetyState | None = None  # the newest
 
@@ -97,6 +100,7 @@ def diagnose(seen: Observation, robot: str) -> Iterator[Finding]:
     yield from board(seen)
     yield from localization(seen)
     yield from patrol(seen)
+    yield from cameras(seen)
     if seen.is_absent("bridge") or any(link.state != "up" for link in seen.links[-1:]):
         yield from safety(seen, FROM_LINK)
     else:
@@ -119,7 +123,7 @@ def services(seen: Observation) -> Iterator[Finding]:
     for name in (*present, *sorted(seen.instances.keys() - keys.ON_BOARD)):
         count, health = seen.instances[name], seen.healths.get(name)
         about: dict[str, Field] = {"name": name}
-        if count > 1 and name in keys.ON_BOARD:
+        if count > 1 and name in ONCE:
             about["count"] = count
             yield found("services", "wrong", "services.duplicate", "duplicate", **about)
         elif not health and seen.rates:  # without any message see the rights
@@ -319,6 +323,17 @@ def patrol(seen: Observation) -> Iterator[Finding]:
         yield Finding("patrol", "wrong", "patrol.stopped", text)
     elif state.state == "waiting" and state.left == 0.0:  # the patience is over
         yield Finding("patrol", "note", "patrol.blocked", text)
+
+
+def cameras(seen: Observation) -> Iterator[Finding]:
+    """Report each camera, and why it has no picture."""
+    for _, it in sorted(seen.cameras.items()):
+        text, name = said(it.phrases, it.text), f"camera.{it.state}"
+        if it.state == "up":
+            yield Finding("camera", "ok", name, text)
+        else:
+            remedy = (Phrase(f"{REMEDY}camera_{it.state}"),)
+            yield Finding("camera", "wrong", name, text, remedy)
 
 
 def safety(seen: Observation, following: Container[str] = ()) -> Iterator[Finding]:

@@ -35,7 +35,16 @@ from t2 import keys
 from t2.codec import Sample
 from t2.errors import LinkError, MessageError
 from t2.keys import Topic
-from t2.messages import Field, Health, Link, MapPose, PatrolState, Phrase, SafetyState
+from t2.messages import (
+    Camera,
+    Field,
+    Health,
+    Link,
+    MapPose,
+    PatrolState,
+    Phrase,
+    SafetyState,
+)
 from t2.text_file import pem_problem
 from t2.words import Language, in_language
 
@@ -247,6 +256,8 @@ def add_sample(sample: Sample, seen: Observation) -> None:
             seen.healths[message.service] = message
         case Link():
             seen.links.append(message)
+        case Camera():
+            seen.cameras[message.camera] = message
         case MapPose() | PatrolState() | SafetyState():
             setattr(seen, NEWEST[type(message)], message)
 

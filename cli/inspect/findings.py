@@ -55,24 +55,24 @@ FINDINGS: dict[str, Words] = {
         "no service of robot {robot} is here; the router knows {others}",
         "此处没有机器人 {robot} 的服务；路由器已知的有 {others}",
     ),
-    "services.absent_one": ("{names} is not running", "{names} 未运行"),
-    "services.absent": ("{names} are not running", "{names} 未运行"),
+    "services.absent_one": ("{names:service} is not running", "{names:service}未运行"),
+    "services.absent": ("{names:service} are not running", "{names:service}未运行"),
     "services.unlisted_one": (
-        "{names} is perhaps running: the router did not list the services in time",
-        "{names} 可能在运行：路由器未及时列出服务",
+        "{names:service} is perhaps running: the router did not list the services in time",
+        "{names:service}可能在运行：路由器未及时列出服务",
     ),
     "services.unlisted": (
-        "{names} are perhaps running: the router did not list the services in time",
-        "{names} 可能在运行：路由器未及时列出服务",
+        "{names:service} are perhaps running: the router did not list the services in time",
+        "{names:service}可能在运行：路由器未及时列出服务",
     ),
-    "services.duplicate": ("{name} is running {count} times", "{name} 运行了 {count} 个实例"),
+    "services.duplicate": ("{name:service} is running {count} times", "{name:service}运行了 {count} 个实例"),
     "services.hangs": (
-        "{name} is running and publishes no health: it hangs", "{name} 在运行，但不发布健康状态：已停止响应",
+        "{name:service} is running and publishes no health: it hangs", "{name:service}在运行，但不发布健康状态：已停止响应",
     ),
-    "services.stalls": ("{name} stalls for up to {lateness:.2f} s", "{name} 停顿最长 {lateness:.2f} s"),
-    "services.up": ("{name} is up for {uptime:.0f} s", "{name} 已运行 {uptime:.0f} s"),
+    "services.stalls": ("{name:service} stalls for up to {lateness:.2f} s", "{name:service}停顿最长 {lateness:.2f} s"),
+    "services.up": ("{name:service} is up for {uptime:.0f} s", "{name:service}已运行 {uptime:.0f} s"),
     "versions.other": (
-        "{name} is T2 {version}, this laptop {t2}", "{name} 的版本为 T2 {version}，本机为 {t2}",
+        "{name:service} is T2 {version}, this laptop {t2}", "{name:service}的版本为 T2 {version}，本机为 {t2}",
     ),
     "versions.same": ("T2 {t2} everywhere", "版本均为 T2 {t2}"),
     "versions.undecodable": ("{path}: {reason}", "{path}：{reason}"),
@@ -120,7 +120,7 @@ FINDINGS: dict[str, Words] = {
     "link.no_bridge": ("no bridge reports the board", "没有桥接服务报告主控板状态"),
     "link.no_relay": ("no frame of the board without the relay", "没有中继器，收不到主控板的数据帧"),
     "link.never": ("no frame received from the board at {board}", "从未收到主控板 {board} 的数据帧"),
-    "link.lost": ("the board at {board} is silent", "主控板 {board} 无响应"),
+    "link.lost": ("the board at {board} is silent", "主控板 {board} 无应答"),
     "link.rejects": ("the bridge rejects frames of the board: {counts}", "桥接服务拒收主控板的数据帧：{counts}"),
     "link.unsent": (
         "the system failed to send {count} datagrams to the board", "系统未能向主控板发送 {count} 个数据报",
@@ -148,8 +148,8 @@ FINDINGS: dict[str, Words] = {
     ),
     # patrol
     "patrol.unknown_source": (
-        "safety does not obey the source patrol: no round can move the vehicle",
-        "安全服务不接受请求源 patrol：巡逻无法移动车辆",
+        "safety does not obey patrol: no round can move the vehicle",
+        "安全服务不执行巡逻的指令：巡逻无法移动车辆",
     ),
     # safety
     "safety.no_state": ("safety publishes no state", "安全服务不发布状态"),
@@ -301,6 +301,7 @@ TEXTS: dict[str, Words] = {
     **catalogue.TEXTS,
     **{PREFIX + name: words for name, words in FINDINGS.items()},
     **{REMEDY + name: words for name, words in REMEDIES.items()},
+    **{REMEDY + row.name: row.remedy for row in catalogue.EVENTS if row.services == "camera"},
     **{f"{REMEDY}cause.{name}": entry.remedy for name, entry in catalogue.CAUSES.items()},
 }
 PLACES: dict[str, Words] = {
@@ -316,6 +317,7 @@ PLACES: dict[str, Words] = {
     "streams": ("streams", "数据流"),
     "map": ("map", "地图"),
     "patrol": ("patrol", "巡逻"),
+    "camera": ("camera", "摄像头"),
     "safety": ("safety", "安全"),
 }
 MARKS: dict[Level, Words] = {

@@ -58,7 +58,7 @@ def ask(
     for reply in decoded(client.call(call, request), call.reply):
         return reply
     raise T2Error(
-        f"the answer cannot be read: is patrol of this version? {client.inspector.doctor}"
+        f"the answer cannot be read: is {call.server} of this version? {client.inspector.doctor}"
     )
 
 

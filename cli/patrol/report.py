@@ -1,31 +1,33 @@
 """The page of a round: taught and driven path, uncertainty, stations and halts."""
 
-from pathlib import Path
+from functools import partial
 
+from cli.page import fill_page
 from cli.patrol.calls import duration, local
 from common.cli_args import needs_extra
 from t2 import messages as m
 from t2.words import Language, render
 
-TEMPLATE = Path(__file__).with_name("round.html")
-
 
 def page(reply: m.RoundsReply, language: Language) -> str:
     """Return the page of a round; its route and track may be missing."""
     with needs_extra("report", "a report"):
-        from jinja2 import Environment, StrictUndefined
-
         from cli.patrol import figures
     found, route, track = reply.rounds[0], reply.route, reply.track
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters["local"] = local
-    environment.filters["said"] = lambda it: render(it.phrases, language, it.text)
-    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+    return fill_page(
+        "patrol/round.html",
+        {"local": local, "said": partial(said, language=language)},
+        title=f"Round {found.id}",
         found=found,
         about=about(found, route),
         path=figures.path(found, route, track) if route is not None else "",
         uncertainty=figures.uncertainty(route, track) if route is not None and track else "",
     )
+
+
+def said(it: m.Round | m.Halt, language: Language) -> str:
+    """Return the text of a round or a halt."""
+    return render(it.phrases, language, it.text)
 
 
 def about(found: m.Round, route: m.Route | None) -> dict[str, str]:

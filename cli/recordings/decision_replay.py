@@ -52,6 +52,7 @@ from t2.messages import (
     Mileage,
     Motion,
     Phrase,
+    Phrases,
     ResetRequest,
     SafetyState,
     Switches,
@@ -335,8 +336,10 @@ def _continued(state: State, motion: Motion) -> State:
 def _compared(moment: Moment, shown: SafetyState, now_ns: int) -> Moment:
     """Return the moment after the comparison of its state with a recorded one."""
     verdict, latches = moment.state.verdict, moment.state.latches
-    agrees = (shown.verdict, shown.source, {cause.name for cause in shown.causes}) == (
-        verdict.name, verdict.source, set(latches)
+    causes = {cause.name: cause.phrases for cause in shown.causes}
+    starting = latches["starting"].phrases if "starting" in latches else ()
+    agrees = (shown.verdict, shown.source, causes.keys(), _awaited(causes.get("starting", ()))) == (
+        verdict.name, verdict.source, latches.keys(), _awaited(starting)
     )  # fmt: skip
     if not agrees:
         differed_ns = now_ns if moment.differed_ns is None else moment.differed_ns
@@ -345,6 +348,16 @@ def _compared(moment: Moment, shown: SafetyState, now_ns: int) -> Moment:
     agreed_ns = now_ns if moment.agreed_ns is None else moment.agreed_ns
     follows = moment.follows and now_ns - agreed_ns < AGREED_NS
     return replace(moment, agreed_ns=agreed_ns, differed_ns=None, follows=follows)
+
+
+def _awaited(phrases: Phrases) -> set[object]:
+    """Return the inputs without a first sample.
+
+    Safety may have had a sample that is older than the recording. The recorder may have one that
+    safety does not have: each of both subscribes on its own.
+    """
+    shown = [each.fields.get("inputs", ()) for each in phrases if each.name == "starting.missing"]
+    return {name for names in shown if isinstance(names, tuple | list) for name in names}
 
 
 def _adopted(state: State, shown: SafetyState, now_ns: int) -> State:

@@ -1,8 +1,8 @@
 """``t2 report FILE...``: an HTML report of each recording, in one self-contained file.
 
-It shows the stops with their reasons, the velocities (requested, allowed, measured), the path, also
-in the map, and rates and gaps of each stream. All content from the bus is escaped. It needs the
-extra ``report``.
+It shows the stops with their reasons, the pictures around each latch, the events with their
+authors, the velocities (requested, allowed, measured), the path, also in the map, and rates and
+gaps of each stream. All content from the bus is escaped. It needs the extra ``report``.
 """
 
 import argparse
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.inspect.addressing import chunks
+from cli.page import fill_page
 from cli.recordings.info import clock, open_recording, said, summary, timeline_of, warnings
 from cli.recordings.timeline import Timeline
 from common.cli_args import file_path, needs_extra, reader_language
@@ -20,8 +21,6 @@ from t2.words import Language
 
 if TYPE_CHECKING:
     from services.recorder.reader import Reader
-
-TEMPLATE = Path(__file__).with_name("report.html")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,21 +67,19 @@ def write_report(file: Path, out: Path, language: Language = "en") -> None:
 def page(timeline: Timeline, reader: "Reader", language: Language = "en") -> str:
     """Return the page of a recording that has been read to its end."""
     with needs_extra("report", "a report"):
-        from jinja2 import Environment, StrictUndefined
-
         from cli.recordings import figures
     # The fastest streams first, event-driven keys last.
     streams = sorted(timeline.streams.values(), key=lambda each: (-each.expected_hz, each.key))
     names = [chunks(stream.key)[1] or stream.key for stream in streams]
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    environment.filters["clock"] = clock
-    environment.filters["said"] = partial(said, language=language)
-    return environment.from_string(TEMPLATE.read_text(encoding="utf-8")).render(
+    return fill_page(
+        "recordings/report.html",
+        {"clock": clock, "said": partial(said, language=language)},
         timeline=timeline,
         title=reader.path.name,
         about=summary(timeline, reader),
         warnings=warnings(timeline, reader),
         streams=list(zip(names, streams, strict=True)),
+        latches=[latch for latch in timeline.pictures.latches if latch.pictures],
         path=figures.path(timeline) if timeline.path else "",
         map_path=figures.map_path(timeline) if timeline.map.path else "",
         speeds=figures.speeds(timeline),

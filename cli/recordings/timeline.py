@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from itertools import pairwise
 
 from cli.inspect.addressing import chunks, topic_of
+from cli.recordings.latch_pictures import LatchPictures
 from cli.recordings.path import MapTrack, PathSegment, segment_of
 from common.freshness import NS_PER_S
 from t2 import keys
@@ -158,9 +159,9 @@ class Stream:
 
     @property
     def expected_hz(self) -> float:
-        """Return the nominal rate; 0 for an event-driven key, also of a source that may pause."""
+        """Return the nominal rate; 0 for a key that may pause, or is recorded in part only."""
         topic = topic_of(self.key)
-        return topic.rate_hz if topic and topic not in (keys.DRIVE, keys.FIX) else 0.0
+        return topic.rate_hz if topic and topic not in (keys.DRIVE, keys.FIX, keys.PICTURE) else 0.0
 
     @property
     def hz(self) -> float | None:
@@ -198,6 +199,7 @@ class Timeline:
     events: list[TimedEvent] = field(default_factory=list)
     streams: dict[str, Stream] = field(default_factory=dict)  # by key
     versions: dict[str, str] = field(default_factory=dict)  # by service
+    pictures: LatchPictures = field(default_factory=LatchPictures)
 
     def add(self, key: str, kind: str, message: Message | None, log_ns: int) -> None:
         """Add a message of a key and its type; None for one that could not be decoded."""
@@ -208,6 +210,7 @@ class Timeline:
         if message is not None:
             self._add(message, key, at_s)
             self.map.add(message, key, at_s)
+            self.pictures.add(message, key, at_s)
 
     def utc(self, at_s: float) -> str:
         """Return the time of day of a moment, by the recorder's clock."""

@@ -24,6 +24,7 @@ SETTINGS = Path("/etc/t2/t2.toml")
 KEYS = Path("/etc/t2/keys/bus.toml")  # from `t2 keys issue robot`; lets laptops connect
 SIM = "t2-sim.service"
 EXTRAS = {
+    "t2-camera.service": "av",
     "t2-recorder.service": "mcap",
     "t2-dashboard.service": "uvicorn",
     "t2-ros2.service": "xxhash",
@@ -148,7 +149,7 @@ def names_here(sim: bool) -> list[str]:
         print(f"without {name}: {EXTRAS[name]} is not installed")
     if not sim:
         left_out.add(SIM)
-    return [name for name in names() if name not in left_out]
+    return [name for name in names() if name.partition(".d/")[0] not in left_out]
 
 
 def template(name: str) -> str:

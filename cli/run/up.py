@@ -7,6 +7,7 @@ import argparse
 import os
 import shlex
 import signal
+import socket
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -22,6 +23,7 @@ from common.cli_args import add_setting, add_sources, needs_extra, source_words,
 from common.config import load
 from common.errors import ConfigError
 from sim.config import add_profiles, load_model
+from sim.sockets import HOST
 
 Commands = dict[str, Sequence[str]]
 
@@ -57,7 +59,8 @@ def run(options: argparse.Namespace) -> int:
     if config.host.realtime:
         realtime.request(realtime.SUPERVISOR, alone=True)
     log.configure(config.log, "up")
-    started = selected(everything(options), options.only)
+    made = everything(options)
+    started = selected(made | camera(options, config, made), options.only)
     with claimed(wanted(config, started)):
         supervisor = Supervisor(started)
         for name in (signal.SIGINT, signal.SIGTERM):
@@ -100,6 +103,36 @@ def everything(options: argparse.Namespace) -> Commands:
             import xxhash  # noqa: F401
         made["ros2"] = command("services.ros2", *passed)
     return made
+
+
+def camera(options: argparse.Namespace, config: Everything, made: Commands) -> Commands:
+    """Return the camera of the settings, or else a simulated one; none without its library."""
+    is_simulated = "sim" in made and not config.camera.source
+    if not find_spec("av") or not (config.camera.source or is_simulated):
+        return {}
+    if not is_simulated:
+        return {"camera": command("services.camera", *source_words(options))}
+    control = config.sim.control_port or free_port(socket.SOCK_DGRAM)
+    port = config.sim.camera_port or free_port(socket.SOCK_STREAM)
+    of_sim = argparse.Namespace(
+        config=(), sets=[f"sim.control_port={control}", f"sim.camera_port={port}"]
+    )
+    of_camera = argparse.Namespace(
+        config=(), sets=[f"camera.source=tcp://{HOST}:{port}", "camera.latency=0"]
+    )
+    passed, ports = source_words(options), source_words(of_sim)
+    return {
+        "sim": [*made["sim"], *ports],
+        "sim.camera": command("sim.camera", *passed, *ports),
+        "camera": command("services.camera", *passed, *source_words(of_camera)),
+    }
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    """Return a port of this host that nothing uses at this moment."""
+    with socket.socket(socket.AF_INET, kind) as sock:
+        sock.bind((HOST, 0))
+        return int(sock.getsockname()[1])
 
 
 def commands(passed: Sequence[str], profiles: Sequence[str] = ()) -> Commands:

@@ -62,6 +62,10 @@ class Caller(Generic[R]):
             self._query.reply_err(codec.encode(refusal(*reasons)), encoding=encoding)
         self._query.drop()
 
+    def ignore(self) -> None:
+        """Leave the answer to another server of the same key."""
+        self._query.drop()
+
 
 class OverwritingQueue(Generic[T]):
     """Queue from Zenoh's threads to ``take`` in the owner's; overwritten items are ``overrun``."""
@@ -299,6 +303,7 @@ class Bus:
             payload=codec.encode(request),
             timeout=timeout_s,
             congestion_control=QUERY_CONGESTION,
+            priority=getattr(zenoh.Priority, call.priority),
         )
 
     # --- on Zenoh's threads -------------------------------------------------------------------

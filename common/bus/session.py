@@ -22,7 +22,7 @@ from common.log import Logger
 from common.loop import Post
 from common.settings import BusSettings, is_encrypted
 from t2.errors import LinkError
-from t2.keys import FAST, FIX, MOTION, TOPICS
+from t2.keys import FAST, FIX, MOTION, PICTURE, TOPICS
 from t2.text_file import pem_problem
 
 RETRY_PERIOD_S = 0.5  # between two attempts to connect
@@ -64,6 +64,7 @@ BURST = {"queue": {"size": {"interactive_high": 16}}, "batch_size": 8192}
 REDIAL = {"period_init_ms": 100, "period_max_ms": 100, "period_increase_factor": 1.0}
 # Links of laptops, which may be slow; services on board never use these.
 DOWNSAMPLED = ("tls", "quic")
+LAPTOP_PICTURES_HZ = 2.0  # of all cameras together
 
 
 class Session:
@@ -299,8 +300,8 @@ def router_config(
         parts |= {"mode": "peer", "region_name": "robot"}
     if access is not None:
         parts["access_control"] = access
-    if robot and (rules := downsampling_rules(robot, where.laptop_rate)):
-        parts["downsampling"] = rules
+    if robot:
+        parts["downsampling"] = downsampling_rules(robot, where.laptop_rate)
     full = {"congestion_control": {"block": {"wait_before_close": BLOCKED_TIMEOUT_US}}}
     accepting = {
         "max_sessions": MAX_SESSIONS,
@@ -324,8 +325,10 @@ def downsampling_rules(robot: str, rate_hz: float) -> list[dict[str, Any]]:
             # that one that is slightly early passes, too.
             every = ceil(topic.rate_hz / rate_hz)
             rules.append({"key_expr": topic.on(robot), "freq": topic.rate_hz / (every - 0.5)})
+    pictures = PICTURE.on(robot, camera="*")  # a page asks for them, by itself
+    rules.append({"key_expr": pictures, "freq": LAPTOP_PICTURES_HZ})
     egress = {"id": "laptops", "flows": ["egress"], "messages": ["put"], "rules": rules}
-    return [egress | {"link_protocols": list(DOWNSAMPLED)}] if rules else []
+    return [egress | {"link_protocols": list(DOWNSAMPLED)}]
 
 
 def _parsed(config: Mapping[str, object]) -> zenoh.Config:

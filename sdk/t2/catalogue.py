@@ -6,7 +6,7 @@ else. The tables of causes and events in the documents are generated from this f
 
 from typing import Any, NamedTuple
 
-from t2 import patrol_texts
+from t2 import log_texts, patrol_texts
 from t2.messages import CauseName, EventName
 from t2.patrol_texts import Words
 
@@ -64,8 +64,8 @@ START: Words = (
     "若进程存在，则已停止响应：请终止该进程",
 )
 WHO_LIMITS: Words = (
-    "`t2 echo safety/state --field limit_sources` shows who limits, and why",
-    "`t2 echo safety/state --field limit_sources` 显示限速源及其理由",
+    "`t2 echo safety/state --field limit_sources` shows which program limits, and why",
+    "`t2 echo safety/state --field limit_sources` 显示限速程序及其理由",
 )
 DRIVE_AGAIN: Words = ("let go of the controls, then drive", "请松开操纵装置，再驾驶")
 OWN_SWITCH: Words = (
@@ -86,12 +86,12 @@ CAUSES: dict[CauseName, Entry] = {
             "曾有一段时间无法接收急停信号。",
         ),
         then_reset(
-            "safety had lost the router: if frequent, check its log and the load of the computer",
-            "安全服务曾与路由器断开：若频繁出现，请检查其日志和计算机负载",
+            "safety had lost its connection: if frequent, check the router's log and the load of the computer",
+            "安全服务的连接曾中断：若频繁出现，请检查路由器日志和计算机负载",
         ),
     ),
     "estop_keepalive": Entry(
-        ("The emergency stop is no longer kept alive.", "急停保活信号中断。"),
+        ("The emergency stop is no longer kept alive.", "急停维持信号中断。"),
         then_reset(
             "start its pendant, page or `t2 estop --keepalive NAME`",
             "请重新启动其手持终端、页面或 `t2 estop --keepalive NAME`",
@@ -115,7 +115,7 @@ CAUSES: dict[CauseName, Entry] = {
         ),
     ),
     "not_stopping": Entry(
-        ("The vehicle does not stop.", "车辆未能停住。"),
+        ("Standstill is not confirmed.", "车辆停止未得到确认。"),
         (
             "use the switch on the vehicle; then check its brakes and the ground",
             "请使用车身上的急停开关；然后检查制动器和地面",
@@ -160,40 +160,37 @@ CAUSES: dict[CauseName, Entry] = {
         ),
     ),
     "limit_stop": Entry(
-        ("A limit source stops the vehicle.", "限速源要求停车。"),
+        ("A program that limits the speed stops the vehicle.", "限速程序要求停车。"),
         (
             f"clear the area; then {DRIVE_AGAIN[0]}; {WHO_LIMITS[0]}",
             f"请清空区域；然后{DRIVE_AGAIN[1]}；{WHO_LIMITS[1]}",
         ),
     ),
     "limit_silent": Entry(
-        ("A limit source is silent.", "收不到限速源的消息。"),
+        ("A program that limits the speed is silent.", "收不到限速程序的消息。"),
         (
             "start its program, check its network and certificate; see safety.limits",
             "请启动其程序，检查其网络和证书；见 safety.limits",
         ),
     ),
     "two_publishers": Entry(
-        ("Two publishers use one source.", "同一请求源有两个发布者。"),
+        ("Two programs send under one name.", "两个程序以同一名称发送。"),
         (
             "stop one of both: `t2 echo '@cmd/**' --json` shows boot and host of each",
             "请停止其中一个：`t2 echo '@cmd/**' --json` 显示各自的 boot 和 host",
         ),
     ),
     "neutral": Entry(
-        (
-            "Waiting for a neutral request: let go of the controls, then drive.",
-            "请先松开操纵装置，再驾驶。",
-        ),
+        ("Let go of the controls, then drive.", "请先松开操纵装置，再驾驶。"),
         DRIVE_AGAIN,
     ),
     "blocked": Entry(
         ("No room in that direction.", "该方向空间不足。"),
         ("drive another way, or remove the obstacle", "请向其他方向行驶，或移开障碍物"),
     ),
-    "no_request": Entry(("No source requests motion.", "没有行驶请求。"), NOTHING),
+    "no_request": Entry(("No command to drive.", "没有行驶指令。"), NOTHING),
     "release": Entry(("Creeping off the bumper.", "正在缓慢脱离碰撞。"), NOTHING),
-    "limit": Entry(("Slowed by a limit source.", "被限速源限速。"), WHO_LIMITS),
+    "limit": Entry(("Slowed by a program that limits the speed.", "因限速程序减速。"), WHO_LIMITS),
     "obstacle": Entry(
         ("Slowed by an obstacle.", "因障碍物减速。"),
         ("nothing to do: it drives on past it", "无需处理：驶过后恢复速度"),
@@ -215,7 +212,7 @@ PHRASES: dict[str, Words] = {
         "Waiting for the first sample of: {inputs:word}.", "正在等待首批数据：{inputs:word}。",
     ),
     "starting.keepalives": (
-        "Waiting for the emergency stop keepalive of {names}.", "正在等待 {names} 的急停保活信号。",
+        "Waiting for the emergency stop keepalive of {names}.", "正在等待 {names} 的急停维持信号。",
     ),
     "silent.old": ("No recent data: {inputs:word}.", "以下数据过旧：{inputs:word}。"),
     "silent.stalled": (
@@ -227,7 +224,7 @@ PHRASES: dict[str, Words] = {
         "安全服务曾停顿：可能漏收了急停。",
     ),
     "estop_keepalive.lost": (
-        "The emergency stop is no longer kept alive by {names}.", "{names} 的急停保活信号中断。",
+        "The emergency stop is no longer kept alive by {names}.", "{names} 的急停维持信号中断。",
     ),
     "predecessor.moved": (
         "The vehicle moved without a command while safety was absent.",
@@ -248,13 +245,13 @@ PHRASES: dict[str, Words] = {
     "link.never": ("No frame came from the board yet.", "尚未收到主控板的数据帧。"),
     "bumper.restarted": ("The bridge has restarted.", "桥接服务已重启。"),
     "bumper.samples": ("Samples of the bumper were lost.", "防撞条的采样有丢失。"),
-    "two_publishers.of": ("Two publishers use {sources}.", "{sources} 有两个发布者。"),
+    "two_publishers.of": ("Two programs send as {sources}.", "两个程序都以 {sources} 的名称发送。"),
     "limit_stop.by": ("Stopped by {sources}.", "{sources} 要求停车。"),
     "limit_silent.of": ("No speed limit arrives from {sources}.", "收不到 {sources} 的限速消息。"),
     "limit.by": ("Slowed by {source}.", "被 {source} 限速。"),
     "neutral.overruled": (
-        "{other} was in control: {source} needs a neutral request first.",
-        "{other} 曾取得控制权：{source} 需先发送零速请求。",
+        "{other} was in control: {source} must let go of the controls, then drive.",
+        "{other} 曾取得控制权：{source} 须先松开操纵装置，再驾驶。",
     ),
     "blocked.near": (
         "No room toward the {sonar:word}: {distance:.2f} m.",
@@ -287,12 +284,12 @@ PHRASES: dict[str, Words] = {
         "超声波传感器不可信：{sonar:word}（{fault:word}）。",
     ),
     # control
-    "control.of": ("{source} is in control.", "{source} 拥有控制权。"),
-    "control.you": ("You are in control.", "您拥有控制权。"),  # to the operator of that source
+    "control.of": ("{source} is in control.", "由 {source} 控制。"),
+    "control.you": ("You are in control.", "由您控制。"),  # to the operator of that source
     "control.asked": (
-        "{by} requests motion while {other} is in control.", "{other} 控制期间，{by} 请求行驶。",
+        "{by} begins to drive while {other} is in control.", "{other} 控制期间，{by} 开始驾驶。",
     ),
-    "control.none": ("No source is in control.", "没有请求源拥有控制权。"),
+    "control.none": ("No operator and no program is in control.", "当前没有操作员或程序在控制车辆。"),
     # the next step at a latch
     "next.reset": ("Reset to go on.", "复位后方可行驶。"),
     "next.move_off": (
@@ -303,8 +300,8 @@ PHRASES: dict[str, Words] = {
     ),
     "next.by_hand": ("Push the vehicle off by hand, then reset.", "请用手推开车辆，再复位。"),
     "next.estop": (
-        "It is still pressed or requested: unlock it, then reset.",
-        "急停仍被按下或仍在请求：请先解除，再复位。",
+        "It is still pressed or in effect: unlock it, then reset.",
+        "急停仍被按下或仍然有效：请先解除，再复位。",
     ),
     "next.estop_keepalive": (
         "Start its program again, then reset.", "请重新启动其程序，再复位。",
@@ -317,25 +314,26 @@ PHRASES: dict[str, Words] = {
     "reset.done": (
         "Reset. Let go of the controls, then drive.", "已复位。请先松开操纵装置，再驾驶。",
     ),
-    "reset.partial": ("Reset, but still latched:", "已复位，但仍锁定："),
+    "reset.partial": ("Reset, but these need another reset:", "已复位，但以下原因仍须复位："),
     "reset.still_present": ("Still present:", "仍然存在："),
-    "reset.nothing": ("Nothing is latched.", "没有锁定的原因。"),
+    "reset.nothing": ("Nothing needs a reset.", "当前无需复位。"),
     "reset.no_cause": (
-        "The reset names no cause. Send the `id` of each as `causes`. Latched:",
-        "复位未指定原因：请将各原因的 `id` 作为 `causes` 发送。当前锁定：",
+        "The reset names no cause. Send the `id` of each as `causes`. These need a reset:",
+        "复位未指定原因：请将各原因的 `id` 作为 `causes` 发送。当前须复位：",
     ),
     "reset.other_cause": (
-        "A cause that the reset names is no longer latched. Now latched:",
-        "复位所指定的原因已不再锁定。当前锁定：",
+        "The reset names a cause that no longer needs one. These do:",
+        "复位所指定的原因已无需复位。当前须复位：",
     ),
     "reset.motion": (
-        "Motion is requested: let go of the controls first.", "仍有行驶请求：请先松开操纵装置。",
+        "A command to drive is given: let go of the controls first.",
+        "仍有行驶指令：请先松开操纵装置。",
     ),
     "reset.pending": (
         "Another reset is being decided: try again.", "正在处理另一次复位：请重试。",
     ),
     "standstill.unknown": (
-        "Standstill is not confirmed: no velocity is received.", "未收到速度，无法确认车辆静止。",
+        "Standstill is not confirmed: no velocity is received.", "车辆停止未得到确认：未收到速度。",
     ),
     "standstill.moving": ("The vehicle still moves.", "车辆仍在移动。"),
     # release
@@ -353,8 +351,8 @@ PHRASES: dict[str, Words] = {
     "release.no_contact": ("There is no contact to release.", "当前没有碰撞。"),
     "release.bumper_free": ("The bumper is free. Next: reset.", "防撞条已松开。下一步：复位。"),
     "release.no_operator": (
-        "{source} may not release: only a source that an operator holds may.",
-        "{source} 不能执行脱离操作：仅限由操作员按住控制的请求源。",
+        "{source} may not release: only an operator who holds the controls may.",
+        "{source} 不能执行脱离操作：仅限按住操纵装置的操作员。",
     ),
     "release.forbidden": (
         "Release {direction:word} is forbidden until a reset: the bumper was pressed that way.",
@@ -378,7 +376,7 @@ PHRASES: dict[str, Words] = {
         "该指令未携带安全服务的心跳编号：请将最新的 SafetyState.heartbeat 作为 `echo` 发送。",
     ),
     "call.unknown_echo": (
-        "The call echoes an unknown heartbeat of safety: look again, then repeat it.",
+        "The call refers to an unknown state of safety: look again, then repeat it.",
         "该指令对应的安全服务状态未知：请查看画面后重试。",
     ),
     "call.late": (
@@ -386,13 +384,14 @@ PHRASES: dict[str, Words] = {
         "该指令已过 {age:.1f} s，最多允许 {limit:g} s：请重试。",
     ),
     "call.no_answer": (
-        "{service} does not answer; run {doctor}.", "{service} 无响应：请运行 {doctor}。",
+        "{service:service} does not answer; run {doctor}.",
+        "{service:service}无应答：请运行 {doctor}。",
     ),
     "call.not_allowed": (
-        "{service} does not answer: this certificate may not call it; see `t2 keys list`.",
-        "{service} 无响应：该证书无权调用；见 `t2 keys list`。",
+        "{service:service} does not answer: this certificate may not call it; see `t2 keys list`.",
+        "{service:service}无应答：该证书无权调用；见 `t2 keys list`。",
     ),
-    "call.not_connected": ("Not connected to a router.", "未连接到路由器。"),
+    "call.not_connected": ("Not connected to the robot.", "未连接到机器人。"),
     "call.invalid": ("The message is invalid: {reason}.", "消息无效：{reason}。"),
     "board.absent": (
         "The board is absent (link {link:word}).", "主控板不在线（连接状态：{link:word}）。",
@@ -413,16 +412,16 @@ PHRASES: dict[str, Words] = {
         "Safety has not acknowledged the bumper hit.", "安全服务尚未确认防撞条触发。",
     ),
     "waiting.uncommanded": (
-        "The vehicle moved without a command: safety has not latched that yet.",
-        "车辆在无指令的情况下移动：安全服务尚未将其锁定。",
+        "The vehicle moved without a command: safety has not acknowledged that yet.",
+        "车辆在无指令的情况下移动：安全服务尚未确认。",
     ),
     "waiting.latch_owner": (
-        "Safety has not taken over the latch of its predecessor.",
-        "安全服务尚未接管前一实例的锁定。",
+        "Safety has not taken over the stop from before its restart.",
+        "安全服务尚未接管重启前的停车状态。",
     ),
     "waiting.ready": ("The board is not ready.", "主控板尚未就绪。"),
     "waiting.neutral": (
-        "Waiting for a neutral motion from safety.", "正在等待安全服务的零速指令。",
+        "Waiting for a command of zero speed from safety.", "正在等待安全服务的零速指令。",
     ),
     "waiting.board": (
         "Nothing received from the board yet on UDP port {ports}.",
@@ -441,6 +440,9 @@ PHRASES: dict[str, Words] = {
     "relay.lost": ("The relay is silent.", "收不到中继器的数据。"),
     "relay.brakes": ("The relay brakes ({reason:word}).", "中继器正在制动（{reason:word}）。"),
     # the first part of the path that is missing
+    "camera.ended": (
+        "Camera {camera}: no picture. The stream has ended.", "摄像头 {camera}：没有图像。视频流已结束。",
+    ),
     "root.router": ("No connection to the robot.", "未连接到机器人。"),
     "root.safety": (
         "Safety does not run, or its state does not arrive.", "安全服务未运行，或收不到其状态。",
@@ -450,10 +452,10 @@ PHRASES: dict[str, Words] = {
         "桥接服务未运行或已停止响应：请在机器人上启动。",
     ),
     "root.relay": (
-        "The relay is silent: check its power and cable.", "中继器无响应：请检查其电源和线缆。",
+        "The relay is silent: check its power and cable.", "中继器无应答：请检查其电源和线缆。",
     ),
     "root.board": (
-        "The board is silent: check its power and cable.", "主控板无响应：请检查其电源和线缆。",
+        "The board is silent: check its power and cable.", "主控板无应答：请检查其电源和线缆。",
     ),
     "root.may_move": (
         "The vehicle may still move: use its own switch.",
@@ -506,8 +508,8 @@ PHRASES: dict[str, Words] = {
         "车辆已移动，但其位姿与上一次相同。",
     ),
     "fix.unplaced": (
-        "The vehicle is not placed, and the settings do not let this source place it.",
-        "车辆位置未设定，且设置不允许该来源设定位置。",
+        "The vehicle is not placed, and the settings do not let these fixes place it.",
+        "车辆位置未设定，且设置不允许由这些定位修正设定位置。",
     ),
     "fix.no_heading": (
         "The vehicle is not placed, and a fix without a heading cannot place it.",
@@ -541,56 +543,49 @@ PHRASES: dict[str, Words] = {
     "cmd_vel.taken": ("Taken.", "已接受。"),
     "cmd_vel.unreadable": ("A command cannot be read: {reason}.", "无法读取指令：{reason}。"),
     "cmd_vel.other_type": (
-        "A node publishes cmd_vel with another type than that of ros2.cmd_vel.",
-        "有节点以 ros2.cmd_vel 设置之外的类型发布 cmd_vel。",
+        "Publish cmd_vel with the type of ros2.cmd_vel: a node publishes another one.",
+        "请按 ros2.cmd_vel 设置的类型发布 cmd_vel：有节点以其他类型发布。",
     ),
     "cmd_vel.out_of_order": (
         "A command arrived again, or after a later one.", "指令重复到达，或晚于后一条指令到达。",
     ),
     "cmd_vel.held_back": (
-        "A command took over 0.2 s longer than the fastest of its publisher. The network held it "
-        "back, or the publisher's clock was set: restart that node.",
-        "指令比该发布者最快的指令多用了 0.2 s 以上：网络延迟，或发布者的时钟被调整；请重启该节点。",
+        "Restart that node if this continues: a command came 0.2 s late, or its clock was set.",
+        "若持续出现，请重启该节点：指令迟到 0.2 s 以上，或其时钟被调整。",
     ),
     "cmd_vel.settling": (
-        "A publisher begins, or its delay changes. Its commands are taken after 0.5 s.",
-        "发布者刚开始发布，或其延迟发生变化：0.5 s 后接受其指令。",
+        "Keep publishing: commands are taken after 0.5 s.", "请继续发布：0.5 s 后接受指令。",
     ),
     "cmd_vel.second_publisher": (
-        "Another publisher drives. One at a time may.", "另一个发布者正在驾驶：同一时间仅限一个。",
+        "Use one publisher at a time: another one drives.", "同一时间仅限一个发布者：另一个正在驾驶。",
     ),
     "cmd_vel.not_paused": (
-        "A publisher commanded motion while the robot was not allowed to move or another one drove, "
-        "or the network interrupted it. Stop publishing for 0.5 s, then publish again.",
-        "机器人被禁止行驶或由其他请求源驾驶期间，发布者仍在发送行驶指令，或网络曾中断：请停止发布 0.5 s 后重新发布。",
+        "Stop publishing for 0.5 s, then go on: motion was not allowed, or commands were lost.",
+        "请停止发布 0.5 s 后继续：此前不允许行驶，或有指令丢失。",
     ),
     "cmd_vel.not_zero": (
-        'ros2.neutral is "zero": publish zero before motion.',
-        'ros2.neutral 为 "zero"：行驶前请先发布零速。',
+        'Publish zero before motion: ros2.neutral is "zero".',
+        '行驶前请先发布零速：ros2.neutral 为 "zero"。',
     ),
     "cmd_vel.not_finite": (
         "A command has a number that is not finite, or over 1e9.", "指令中有非有限的数值，或超过 1e9。",
     ),
     "cmd_vel.other_axes": (
-        "A command asks for motion other than linear.x and angular.z. The vehicle cannot drive "
-        "sideways through this interface.",
-        "指令要求 linear.x 和 angular.z 之外的运动：此接口不支持横向行驶。",
+        "Use linear.x and angular.z alone: this interface has no sideways motion.",
+        "仅可使用 linear.x 和 angular.z：此接口不支持横向行驶。",
     ),
     # poses that ROS nodes measure
     "ros_fix.taken": ("Passed on to localization.", "已转交定位服务。"),
     "ros_fix.unreadable": ("A pose cannot be read: {reason}.", "无法读取位姿：{reason}。"),
     "ros_fix.clock": (
-        "The gateway published no odometry in the 0.1 s before its stamp, which is {seconds:.2f} s "
-        "older than the newest one. Synchronize the clocks of both computers (chrony or NTP), and "
-        "turn use_sim_time off.",
-        "其时间戳之前 0.1 s 内网关未发布里程计；该时间戳比最新里程计早 {seconds:.2f} s。请同步两台计算机的时钟"
-        "（chrony 或 NTP），并关闭 use_sim_time。",
+        "Synchronize the clocks, use_sim_time off: its stamp differs by {seconds:.2f} s from odometry.",
+        "请同步时钟并关闭 use_sim_time：其时间戳与里程计相差 {seconds:.2f} s。",
     ),
     "ros_fix.no_odometry": (
-        "Odometry is silent, so a pose cannot be related to it.", "收不到里程计：无法使用位姿。",
+        "Odometry is silent: a pose cannot be related to it.", "收不到里程计：无法使用位姿。",
     ),
     "ros_fix.frame": (
-        "Its frame is '{frame}', allowed is '{map}'.", "其坐标系为“{frame}”，应为“{map}”。",
+        "Use the frame '{map}': its frame is '{frame}'.", "请使用坐标系“{map}”：其坐标系为“{frame}”。",
     ),
     "ros_fix.orientation": (
         "Its quaternion is not of length 1, or it tilts the vehicle by over 0.3 rad.",
@@ -622,6 +617,7 @@ PHRASES: dict[str, Words] = {
     "gamepad.no_library": ("none: pygame-ce is not installed", "无：未安装 pygame-ce"),
     "gamepad.failed": ("none: {reason}", "无：{reason}"),
     # operators
+    "estop.by": ("Emergency stop by {who:operator}.", "{who:operator} 触发了急停。"),
     "operator.by": ("Certificate: {by}.", "证书：{by}。"),
     "driver.taken": (
         "{who:operator} has taken over control.", "{who:operator} 已接管控制权。",
@@ -639,11 +635,11 @@ LATCHED: Any = (  # names of both causes and events
 EVENTS: tuple[EventRow, ...] = (
     EventRow(
         "bridge", "link_up", "info", ("The board is connected.", "主控板已连接。"),
-        ("nothing to do; a neutral request re-arms", "无需处理；零速请求后可重新行驶"),
+        ("nothing to do; let go of the controls, then drive", "无需处理；松开操纵装置后可重新行驶"),
     ),
     EventRow(
         "bridge", "link_lost", "error",
-        ("The board is silent: STOP is being sent.", "主控板无响应：正在发送停止指令。"),
+        ("The board is silent: STOP is being sent.", "主控板无应答：正在发送停止指令。"),
         BOARD_LOST,
     ),
     EventRow(
@@ -676,7 +672,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "bridge", "relay_up", "info", ("The relay passes commands.", "中继器正在转发指令。"),
-        ("nothing to do; a neutral request re-arms", "无需处理；零速请求后可重新行驶"),
+        ("nothing to do; let go of the controls, then drive", "无需处理；松开操纵装置后可重新行驶"),
     ),
     EventRow(
         "bridge", "relay_braking", "warning",
@@ -689,7 +685,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "bridge", "relay_lost", "error",
-        ("The relay is silent: the vehicle does not move.", "中继器无响应：车辆不会移动。"),
+        ("The relay is silent: the vehicle does not move.", "中继器无应答：车辆不会移动。"),
         ("check the relay's power and cable; `t2 doctor`", "请检查中继器的电源和线缆；`t2 doctor`"),
     ),
     EventRow(
@@ -757,19 +753,19 @@ EVENTS: tuple[EventRow, ...] = (
     *(EventRow("safety", name, "error", *CAUSES[name]) for name in LATCHED),
     EventRow(
         "safety", "driver_fault", "error",
-        ("Latched: a motor driver reports a fault.", "已锁定：电机驱动器报告故障。"), DRIVER,
+        ("A motor driver reports a fault.", "电机驱动器报告故障。"), DRIVER,
     ),
     EventRow(
         "safety", "stop", "info, warning",
         (
-            "The vehicle has stopped, with the reason; info without a request of motion.",
-            "车辆已停止，并给出原因；没有行驶请求时级别为 info。",
+            "The vehicle has stopped, with the reason; info without a command to drive.",
+            "车辆已停止，并给出原因；没有行驶指令时级别为 info。",
         ),
         ("as in the text", "按文中所述处理"),
     ),
     EventRow(
         "safety", "source", "info",
-        ("Another source is in control, or none.", "控制权已切换，或没有请求源拥有控制权。"), NOTHING,
+        ("Control has changed.", "控制权已切换。"), NOTHING,
     ),
     EventRow(
         "safety", "release", "warning",
@@ -792,17 +788,17 @@ EVENTS: tuple[EventRow, ...] = (
         "safety", "release_refused", "warning",
         (
             "A release was refused; the text gives the first reason, the state the newest one.",
-            "脱离碰撞请求被拒绝；文中为首个原因，状态中为最新原因。",
+            "脱离碰撞操作被拒绝；文中为首个原因，状态中为最新原因。",
         ),
         ("as in the text", "按文中所述处理"),
     ),
     EventRow(
         "safety", "reset", "info", ("The named causes are cleared.", "所指定的原因已清除。"),
-        ("nothing to do; a neutral request re-arms", "无需处理；零速请求后可重新行驶"),
+        ("nothing to do; let go of the controls, then drive", "无需处理；松开操纵装置后可重新行驶"),
     ),
     EventRow(
         "safety", "reset_refused", "warning",
-        ("A reset was refused, with the reason.", "复位请求被拒绝，并给出原因。"),
+        ("A reset was refused, with the reason.", "复位被拒绝，并给出原因。"),
         ("as in the text", "按文中所述处理"),
     ),
     EventRow(
@@ -856,7 +852,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "localization", "fixes_refused", "warning",
-        ("Several fixes of a source in a row were refused.", "某来源连续多次定位修正被拒绝。"),
+        ("Several fixes in a row were refused.", "连续多次定位修正被拒绝。"),
         (
             "`t2 echo localization/pose --field sources` shows why",
             "`t2 echo localization/pose --field sources` 显示原因",
@@ -864,7 +860,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "localization", "fixes_back", "info",
-        ("Fixes of this source are used again.", "该来源的定位修正已恢复使用。"), NOTHING,
+        ("Fixes of {source} are used again.", "{source} 的定位修正已恢复使用。"), NOTHING,
     ),
     EventRow(
         "patrol", "round_start", "info", ("A round begins.", "巡逻开始。"), NOTHING,
@@ -884,7 +880,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "patrol", "round_paused", "info",
-        ("A round is paused, by a call or by another source.", "巡逻已暂停：由调用或其他请求源引起。"),
+        ("A round is paused, by an operator or another program.", "巡逻已暂停：由操作员或其他程序引起。"),
         ("`t2 rounds resume` goes on", "`t2 rounds resume` 可继续"),
     ),
     EventRow(
@@ -942,18 +938,18 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "teleop, dashboard, estop", "estop", "warning",
-        ("Emergency stop requested by {by:operator}.", "{by:operator} 请求急停。"),
+        ("Emergency stop by {by:operator}.", "{by:operator} 触发了急停。"),
         ("see `estop` of safety", "见安全服务的 `estop`"),
     ),
     EventRow(
         "teleop, dashboard", "reset_request", "info",
-        ("Reset requested by {by:operator}.", "{by:operator} 请求复位。"), NOTHING,
+        ("Reset pressed by {by:operator}.", "{by:operator} 按下了复位。"), NOTHING,
     ),
     EventRow(
         "dashboard", "round_request", "info",
         (
-            "{by:operator} requests of patrol: {action:word}.",
-            "{by:operator} 请求巡逻：{action:word}。",
+            "Patrol, by {by:operator}: {action:word}.",
+            "{by:operator} 操作巡逻：{action:word}。",
         ),
         NOTHING,
     ),
@@ -1028,13 +1024,59 @@ EVENTS: tuple[EventRow, ...] = (
     EventRow(
         "teleop", "barred", "error",
         (
-            "NOT ALLOWED: the router drops the requests of this certificate; it may only watch.",
-            "未获许可：路由器丢弃了此证书的请求，只能观看。",
+            "NOT ALLOWED: this certificate may not drive; it may only watch.",
+            "未获许可：此证书无权驾驶，只能观看。",
         ),
         (
             "use a driver's certificate for this robot; `t2 doctor`",
             "请使用本机器人的驾驶员证书；`t2 doctor`",
         ),
+    ),
+    EventRow(
+        "camera", "camera_up", "info",
+        (
+            "Camera {camera}: pictures arrive, {width} x {height}.",
+            "摄像头 {camera}：图像正常，{width} x {height}。",
+        ),
+        NOTHING,
+    ),
+    EventRow(
+        "camera", "camera_frozen", "warning",
+        (
+            "Camera {camera}: the picture does not change while the vehicle moves.",
+            "摄像头 {camera}：车辆移动时图像没有变化。",
+        ),
+        (
+            "restart the camera; from a distance driving is not possible until the picture changes",
+            "请重启摄像头；图像恢复变化之前不能远程驾驶",
+        ),
+    ),
+    EventRow(
+        "camera", "camera_lost", "warning",
+        (
+            "Camera {camera}: no picture. {reason}",
+            "摄像头 {camera}：没有图像。{reason}",
+        ),
+        (
+            "check the camera's power, its cable and `camera.source`",
+            "请检查摄像头的电源、线缆和 `camera.source`",
+        ),
+    ),
+    EventRow(
+        "dashboard", "in_sight", "warning",
+        (
+            "{by:operator} sees the vehicle and drives without the picture.",
+            "{by:operator} 目视车辆，不依靠图像驾驶。",
+        ),
+        NOTHING,
+    ),
+    EventRow(
+        "dashboard", "by_picture", "info",
+        (
+            "{by:operator} drives by the picture.",
+            "{by:operator} 依靠图像驾驶。",
+        ),
+        NOTHING,
     ),
     EventRow(
         "recorder", "black_box", "info",
@@ -1044,8 +1086,8 @@ EVENTS: tuple[EventRow, ...] = (
     EventRow(
         "recorder", "black_box_lost", "error",
         (
-            "{causes:word} latched, and the black box is not written: {problem}.",
-            "{causes:word}已锁定，黑匣子记录未写入：{problem}。",
+            "The black box is not written ({causes:word}): {problem}.",
+            "黑匣子记录未写入（{causes:word}）：{problem}。",
         ),
         ("free disk space", "请释放磁盘空间"),
     ),
@@ -1071,6 +1113,14 @@ EVENTS: tuple[EventRow, ...] = (
         ("copy recordings that you want to keep", "请备份需要保留的记录"),
     ),
     EventRow(
+        "recorder", "log_dropped", "warning",
+        (
+            "{count} events are not in the shift log: too many in a minute.",
+            "有 {count} 个事件未记入值班日志：一分钟内过多。",
+        ),
+        ("`t2 echo 'evt/*'` shows who publishes them", "`t2 echo 'evt/*'` 显示其发布者"),
+    ),
+    EventRow(
         "ros2", "cmd_vel_refused", "warning",
         (
             "A velocity command of a ROS node is refused, with the reason.",
@@ -1087,6 +1137,21 @@ EVENTS: tuple[EventRow, ...] = (
         ("as in the text ([ros2.md](ros2.md#poses-in-the-map))", "按文中所述处理（ros2.md）"),
     ),
 )  # fmt: skip
+
+# Services by their names on the bus.
+SERVICES: dict[str, Words] = {
+    "bridge": ("bridge", "桥接服务"),
+    "safety": ("safety", "安全服务"),
+    "odom": ("odometry", "里程计"),
+    "localization": ("localization", "定位服务"),
+    "patrol": ("patrol", "巡逻服务"),
+    "camera": ("camera", "摄像头"),
+    "teleop": ("teleop", "驾驶终端"),
+    "dashboard": ("dashboard", "仪表板"),
+    "recorder": ("recorder", "记录器"),
+    "metrics": ("metrics", "监控指标"),
+    "ros2": ("ROS 2", "ROS 2"),
+}
 
 # Words inside a phrase, such as names of inputs. A word without a row is shown as it is, with spaces.
 WORDS: dict[str, Words] = {
@@ -1109,12 +1174,10 @@ WORDS: dict[str, Words] = {
     "switches": ("switches", "紧急制动开关"),
     "lamps": ("lamps", "灯光"),
     "estop": ("emergency stop", "急停"),
-    "estop_path": (
-        "the emergency stop's path through the router", "经路由器的急停通路",
-    ),
+    "estop_path": ("the path of the emergency stop", "急停通路"),
     "never": ("never up", "从未连接"),
     "lost": ("lost", "已断开"),
-    "relay_start": ("it waits for a neutral command", "等待零速指令"),
+    "relay_start": ("it waits for a command of zero speed", "等待零速指令"),
     "relay_silent": ("it has lost the commands of the PC", "收不到工控机的指令"),
     "relay_hit": ("it waits for the answer to a bumper hit", "等待对防撞条触发的应答"),
     "silent": ("silent", "无数据"),
@@ -1127,15 +1190,14 @@ WORDS: dict[str, Words] = {
     "under_voltage": ("under voltage", "欠压"),
     "overload": ("overload", "过载"),
     "viewer": ("viewer", "观看者"),
-    "bridge": ("bridge", "桥接服务"),
-    "safety": ("safety", "安全服务"),
     "contact": ("contact", "防撞条触发"),
     "estop_reader": ("emergency stop not received", "急停信号接收中断"),
-    "estop_keepalive": ("emergency stop keepalive", "急停保活中断"),
+    "estop_keepalive": ("emergency stop keepalive", "急停维持信号中断"),
     "predecessor": ("restart of safety", "安全服务重启"),
     "uncommanded_motion": ("uncommanded motion", "无指令移动"),
     "flapping": ("repeated input failures", "输入反复失效"),
     "runaway": ("runaway", "未按指令运动"),
+    **SERVICES,
     **patrol_texts.STATES,
     **patrol_texts.ACTIONS,
 }  # fmt: skip
@@ -1143,6 +1205,7 @@ WORDS: dict[str, Words] = {
 TEXTS: dict[str, Words] = {
     **PHRASES,
     **patrol_texts.PHRASES,
+    **log_texts.PHRASES,
     **{name: entry.text for name, entry in CAUSES.items()},
     # An event of a cause that latches has the phrases of the cause.
     **{

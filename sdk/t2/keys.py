@@ -16,15 +16,17 @@ from t2 import messages as m
 ROOT = "t2/v1"
 
 SERVICES = (
-    "bridge", "safety", "odom", "localization", "patrol", "teleop", "dashboard", "recorder",
-    "metrics", "ros2",
+    "bridge", "safety", "odom", "localization", "patrol", "camera", "teleop", "dashboard",
+    "recorder", "metrics", "ros2",
 )  # fmt: skip
 
 MessageT = TypeVar("MessageT", bound=m.Message)
 RequestT = TypeVar("RequestT", bound=Struct)
 ReplyT = TypeVar("ReplyT", bound=Struct)
 
-Priority = Literal["REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA"]
+Priority = Literal[
+    "REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "BACKGROUND"
+]
 
 
 class ClassOfService(Struct, frozen=True):
@@ -49,6 +51,7 @@ STATE = ClassOfService(
 )
 FAST = ClassOfService("fast", "DATA_HIGH", "safety and odometry decide on it")
 SLOW = ClassOfService("slow", "DATA", "for people and recordings")
+BULK = ClassOfService("bulk", "BACKGROUND", "large: waits for everything else")
 EVENT = ClassOfService("event", "DATA", "rare, and useful even when late", history=100)
 
 
@@ -75,6 +78,7 @@ class Call(Struct, Generic[RequestT, ReplyT], frozen=True):
     reply: type[ReplyT]
     server: str
     what: str
+    priority: Priority = "DATA"
 
     def on(self, robot: str) -> str:
         """Return the full key for one robot."""
@@ -107,6 +111,17 @@ MAP_POSE = Topic(
 )
 PATROL = Topic(
     "tel/patrol/state", m.PatrolState, 5, SLOW, "patrol", "the round, its progress, the next one"
+)
+PICTURE = Topic(
+    "tel/camera/{camera}/picture",
+    m.Picture,
+    15,
+    BULK,
+    "camera",
+    "pictures, each with the newest heartbeat of safety when it was taken",
+)
+CAMERA = Topic(
+    "tel/camera/{camera}/state", m.Camera, 1, SLOW, "camera", "whether a camera has pictures"
 )
 SAFETY = Topic(
     "tel/safety/state",
@@ -160,18 +175,25 @@ PLACE = Call(
 )
 TEACH = Call("srv/patrol/teach", m.TeachRequest, m.Done, "patrol", "teach or change a route")
 ROUTES = Call("srv/patrol/routes", m.RoutesRequest, m.RoutesReply, "patrol", "read the routes")
+GET_PICTURE = Call(
+    "srv/camera/picture", m.PictureRequest, m.Picture, "camera",
+    "return the next picture, in a size that a slow link takes", "BACKGROUND",
+)  # fmt: skip
 ROUND = Call("srv/patrol/round", m.RoundRequest, m.Done, "patrol", "start, pause or end a round")
 ROUNDS = Call("srv/patrol/rounds", m.RoundsRequest, m.RoundsReply, "patrol", "read the ledger")
+LOG = Call("srv/recorder/log", m.LogRequest, m.LogReply, "recorder", "read the shift log")
 
 TOPICS: tuple[Topic[m.Message], ...] = (
     VELOCITY, MILEAGE, ULTRASONIC, BUMPER, DRIVER, SWITCHES, LINK,
-    ODOMETRY, MAP_POSE, PATROL, SAFETY, HEALTH, SETTINGS, EVENTS, DRIVE, LIMIT, FIX, MOTION,
+    ODOMETRY, MAP_POSE, PATROL, PICTURE, CAMERA, SAFETY, HEALTH, SETTINGS, EVENTS,
+    DRIVE, LIMIT, FIX, MOTION,
 )  # type: ignore[assignment]  # fmt: skip
 CALLS: tuple[Call[Struct, Struct], ...] = (
-    SET_SWITCHES, SET_LED, RESET, SET_POSE, PLACE, TEACH, ROUTES, ROUND, ROUNDS,
+    SET_SWITCHES, SET_LED, RESET, SET_POSE, PLACE, TEACH, ROUTES, ROUND, ROUNDS, GET_PICTURE,
+    LOG,
 )  # type: ignore[assignment]  # fmt: skip
 
-READING_CALLS = (ROUTES, ROUNDS)  # they change nothing
+READING_CALLS = (ROUTES, ROUNDS, GET_PICTURE, LOG)  # they change nothing
 
 
 def estop_key(robot: str) -> str:

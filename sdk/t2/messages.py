@@ -34,7 +34,12 @@ RoundState = Literal[
 RoundAction = Literal["start", "depart", "pause", "resume", "return", "abort"]
 RoundResult = Literal["home", "returned", "aborted"]
 WhenBlocked = Literal["wait", "return", "stop"]
+# A row of the shift log: what stopped, who took over, who reset what no stop is known of, a round,
+# another fact for the reader, and a time without a record.
+LogKind = Literal["stop", "takeover", "reset", "round", "note", "gap"]
 TeachAction = Literal["begin", "station", "end", "cancel", "save", "delete"]
+# Of a camera: pictures arrive; the same one arrives while the vehicle moves; none arrives.
+CameraState = Literal["up", "frozen", "lost"]
 LimitEffect = Literal["none", "slow", "stop", "brake"]
 # Of a source of speed limits: without effect, STOP, or BRAKE and a latch, as of a pendant.
 Silence = Literal["ignore", "stop", "latch"]
@@ -60,11 +65,12 @@ else:
     CauseName = Name  # the client library knows the names, for type checkers
 if TYPE_CHECKING:
     EventName = Literal[
-        "barred", "black_box", "black_box_lost", "board_restarted", "cmd_vel_refused", "contact",
+        "barred", "black_box", "black_box_lost", "board_restarted", "by_picture", "camera_frozen",
+        "camera_lost", "camera_up", "cmd_vel_refused", "contact",
         "disk_full", "disk_room", "drive_link_lost", "drive_link_up", "driver_fault", "estop",
         "estop_denied", "estop_keepalive", "estop_reader", "estop_unconfirmed", "fixes_back",
-        "fixes_refused", "flapping",
-        "gamepad", "gamepad_silent", "guard_gone", "link_lost", "link_up", "lost", "overruled",
+        "fixes_refused", "flapping", "gamepad", "gamepad_silent", "guard_gone", "in_sight",
+        "link_lost", "link_up", "log_dropped", "lost", "overruled",
         "placed", "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
         "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
         "release_refused", "reset", "reset_refused", "reset_request", "reset_unconfirmed",
@@ -97,6 +103,11 @@ MAX_POINTS = 10_000  # of a route
 MAX_TRACK = 2000  # poses of a driven round
 MAX_REASON = 80  # characters
 Reason = Annotated[str, Meta(max_length=MAX_REASON)]
+
+
+CameraName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,31}\Z", max_length=32)]
+MAX_SIDE = 4096  # pixels of a picture
+MAX_PICTURE = 1_000_000  # bytes
 
 
 class Command(str, Enum):
@@ -269,6 +280,32 @@ class MapPose(Message, frozen=True, kw_only=True):
     sources: Annotated[tuple[FixState, ...], Few] = ()  # those in the settings
     frame_id: Name = "map"
     child_frame_id: Name = "base_link"
+
+
+# --- tel/camera -----------------------------------------------------------------------------
+
+
+class Picture(Message, frozen=True, kw_only=True):
+    """A picture of a camera, with safety's newest heartbeat of the time when it was taken.
+
+    A driver who uses this picture echoes that number. Safety then judges the age of the picture.
+    """
+
+    heartbeat: int | None = None  # ``SafetyState.heartbeat``; None: none was received by then
+    safety_boot: int = 0  # of the safety service that sent it
+    width: Annotated[int, Meta(ge=1, le=MAX_SIDE)]  # pixels
+    height: Annotated[int, Meta(ge=1, le=MAX_SIDE)]
+    jpeg: Annotated[bytes, Meta(max_length=MAX_PICTURE)]
+
+
+class Camera(Message, frozen=True, kw_only=True):
+    """State of a camera."""
+
+    camera: CameraName
+    state: CameraState
+    rate: Cap = 0.0  # Hz, of the last second's pictures
+    text: Text  # the size of its pictures, or why there are none
+    phrases: Phrases = ()  # the same, for other languages
 
 
 class Cause(Struct, frozen=True, kw_only=True):
@@ -633,6 +670,15 @@ class TeachRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     echo: int | None = None  # the newest ``SafetyState.heartbeat`` that the operator's program saw
 
 
+class PictureRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Return a camera's next picture, as soon as there is one."""
+
+    camera: CameraName
+    boot: int = 0  # header of the last one that was received: a newer one is returned
+    seq: int = -1
+    width: Annotated[int, Meta(ge=16, le=MAX_SIDE)] = MAX_SIDE  # pixels, at most
+
+
 class RoutesRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """List the routes, or return one."""
 
@@ -667,6 +713,36 @@ class RoundsReply(Struct, frozen=True, kw_only=True):
     rounds: Annotated[tuple[Round, ...], Many] = ()
     route: Route | None = None
     track: Annotated[tuple[TrackPoint, ...], Meta(max_length=MAX_TRACK)] = ()
+
+
+class LogRequest(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Read the shift log, the newest rows first."""
+
+    since_ns: int = 0  # wall clock; rows that end before it are left out
+    before_ns: int | None = None  # wall clock; only rows that begin before it: the next page
+    most: Annotated[int, Meta(ge=1, le=500)] = 200
+
+
+class LogRow(Struct, frozen=True, kw_only=True):
+    """A row of the shift log."""
+
+    kind: LogKind
+    robot: Name
+    t_ns: int  # wall clock, its begin
+    end_ns: int = 0  # wall clock; 0: it has none, or it is not recorded
+    level: Level = "info"
+    by: Name = ""  # who stopped, took over or asked; empty if that is not recorded
+    reset_by: Name = ""
+    recording: Name = ""  # the file of the black box
+    text: Text
+    phrases: Phrases = ()  # the same, for other languages
+
+
+class LogReply(Struct, frozen=True, kw_only=True):
+    """Rows of the shift log, the newest first."""
+
+    rows: Annotated[tuple[LogRow, ...], Many] = ()
+    more: bool = False  # whether older rows follow
 
 
 class Refusal(Struct, frozen=True, kw_only=True):

@@ -43,8 +43,8 @@ PHRASES: dict[str, Words] = {
     ),
     # why a round stops, or cannot go on
     "patrol.latched": (
-        "A cause is latched: {causes:word}. Look at the vehicle, then reset.",
-        "已锁定：{causes:word}。请查看车辆，然后复位。",
+        "A reset is needed: {causes:word}. Look at the vehicle, then reset.",
+        "须复位：{causes:word}。请查看车辆，然后复位。",
     ),
     "patrol.forbidden": (
         "Safety forbids every motion: {causes:word}. See `t2 doctor`.",
@@ -61,6 +61,10 @@ PHRASES: dict[str, Words] = {
     ),
     "patrol.placed": (
         "The vehicle was placed anew during the round.", "巡逻期间车辆位置被重新设定。",
+    ),
+    "patrol.twice": (
+        "Another patrol service runs for this robot: end one of them.",
+        "该机器人有另一个巡逻服务正在运行：请停止其中一个。",
     ),
     "patrol.held_up": (
         "Patrol was held up for {seconds:.1f} s: the computer slept, or was overloaded.",
@@ -79,9 +83,9 @@ PHRASES: dict[str, Words] = {
         "{corridor:.2f} m。请在某一站设定车辆位置，或等待定位修正。",
     ),
     "patrol.unheard": (
-        "Safety takes no requests of the source patrol: add it to safety.sources "
-        "(--config config/patrol.toml), and see `t2 doctor`.",
-        "安全服务不接受请求源 patrol：请将其加入 safety.sources（--config config/patrol.toml），并查看 `t2 doctor`。",
+        "Safety does not obey patrol: add it to safety.sources (--config config/patrol.toml), and see "
+        "`t2 doctor`.",
+        "安全服务不执行巡逻的指令：请将 patrol 加入 safety.sources（--config config/patrol.toml），并查看 `t2 doctor`。",
     ),
     "patrol.stuck": (
         "The vehicle does not move although the way is free, for {seconds:.0f} s: look for a "
@@ -127,7 +131,7 @@ PHRASES: dict[str, Words] = {
         "车辆距路线 {route} 的起点（第一站）{distance:.2f} m，允许 {corridor:.2f} m：请将其驾驶到起点。",
     ),
     "patrol.other_drives": (
-        "{source} is in control: let go of the controls.", "{source} 拥有控制权：请松开操纵装置。",
+        "{source} is in control: let go of the controls.", "由 {source} 控制：请松开操纵装置。",
     ),
     "patrol.disk": (
         "{folder} cannot be written ({reason}): free disk space, or check its permissions.",

@@ -37,9 +37,15 @@ TOKEN_MIN = 8
 LOCAL_NAMES = ("localhost", "127.0.0.1", "::1")
 BODY_MAX = 1024  # bytes of a form with a token
 SAFE_METHODS = ("GET", "HEAD")
+PAGES = ("/", "/log")
 TOKEN_PAGE = (Path(__file__).parent / "static" / "token.html").read_text(encoding="utf-8")
 STYLE = TOKEN_PAGE.partition("<style>")[2].partition("</style>")[0]
 STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
+POLICY = (
+    f"default-src 'none'; script-src 'self'; connect-src 'self'; "
+    f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self'; "
+    "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+)
 HEADERS = {
     "x-frame-options": "DENY",
     "x-content-type-options": "nosniff",
@@ -98,7 +104,6 @@ class AuthMiddleware:
 
     def __init__(self, app: ASGIApp, credentials: Credentials, settings: Dashboard) -> None:
         self.app = app
-        self._policy = content_policy(settings.camera)
         self._credentials = credentials
         self._secure = bool(settings.certificate)
         self._guesses = GuessLimit()
@@ -110,7 +115,7 @@ class AuthMiddleware:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 headers.update(HEADERS)
-                headers.setdefault("content-security-policy", self._policy)
+                headers.setdefault("content-security-policy", POLICY)
             await send(message)
 
         answer = await self._answer(scope, receive)
@@ -169,7 +174,8 @@ def client_host(scope: Scope) -> str:
 def page_of(request: Request) -> str:
     """Return the page that a login leads to: this one, with its query but without a token."""
     pairs = [pair for pair in request.query_params.multi_items() if pair[0] != "token"]
-    return "/?" + urlencode(pairs) if pairs else "/"
+    path = request.url.path if request.url.path in PAGES else "/"
+    return f"{path}?{urlencode(pairs)}" if pairs else path
 
 
 def _token_page(text: str, page: str, wait_s: float = 0.0) -> Response:
@@ -178,17 +184,6 @@ def _token_page(text: str, page: str, wait_s: float = 0.0) -> Response:
     if not wait_s:
         return HTMLResponse(content, status_code=401)
     return HTMLResponse(content, 429, headers={"retry-after": str(math.ceil(wait_s))})
-
-
-def content_policy(camera: str) -> str:
-    """Return the policy of the page; only the camera's origin may be shown in it."""
-    parts = urlsplit(camera)
-    origin = f"{parts.scheme}://{parts.netloc}" if camera else ""
-    return (
-        f"default-src 'none'; script-src 'self'; connect-src 'self'; "
-        f"style-src 'self' 'sha256-{STYLE_HASH}'; img-src 'self' {origin}; "
-        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
-    )
 
 
 async def _close(_: Scope, __: Receive, send: Send) -> None:

@@ -1,7 +1,7 @@
 """Messages from the browser, as tagged JSON; any other message is refused.
 
-``echo`` is safety's heartbeat in the snapshot that a message answers. Its age is judged by safety;
-see ``driver_lock.py`` for a hold.
+``echo`` is safety's heartbeat in the snapshot that a message answers, or in the picture by which a
+driver holds. Its age is judged by safety; see ``driver_lock.py`` for a hold.
 """
 
 from typing import Annotated, Literal
@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from common.settings import GEARS
-from t2.messages import Direction, Number, RoundAction, RouteName, StationName
+from t2.messages import CameraName, Direction, Number, RoundAction, RouteName, StationName
 
 NAME_MAX = 40  # characters, of a viewer
 ROBOT = r"^[A-Za-z0-9_.-]{1,64}\Z"
@@ -45,6 +45,18 @@ class Hold(ClientMessage, frozen=True):
     x: Number = 0.0
     y: Number = 0.0
     release: Direction | None = None
+
+
+class Watch(ClientMessage, frozen=True):
+    """The last picture is shown, or none yet: send this camera's next one."""
+
+    camera: CameraName
+
+
+class Sight(Named, frozen=True):
+    """The driver sees the vehicle: holds answer snapshots, and not the pictures of a camera."""
+
+    in_sight: bool
 
 
 class Free(ClientMessage, frozen=True):
@@ -100,4 +112,7 @@ class Routes(ClientMessage, frozen=True):
     route: RouteName | None = None
 
 
-AnyMessage = Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Round | Teach | Routes
+AnyMessage = (
+    Take | Leave | Hold | Free | Gear | Alive | Estop | Reset | Round | Teach | Routes
+    | Watch | Sight
+)  # fmt: skip

@@ -1,6 +1,7 @@
 """The dashboard's settings."""
 
 from ipaddress import ip_address
+from math import hypot
 from typing import Annotated
 
 from msgspec import Meta
@@ -8,10 +9,12 @@ from msgspec import Meta
 from common import settings
 from common.settings import SourceName
 
-# Its origin is part of a Content-Security-Policy: no separator of that may occur.
-Url = Annotated[
-    str, Meta(pattern=r"^(https?://[A-Za-z0-9._-]+(:[0-9]{1,5})?(/[^\s\"'<>;,\\]*)?)?\Z")
-]
+APART_PX, APART_M = 20, 0.5  # of the points of a floor plan, at least
+
+
+Coordinate = Annotated[float, Meta(ge=-1e5, le=1e5)]
+# A point of the floor plan: pixels from the left and from the top, and x and y in the map (m).
+PlanPoint = Annotated[tuple[Coordinate, ...], Meta(max_length=4)]
 
 
 class Dashboard(settings.Section, frozen=True, kw_only=True):
@@ -26,10 +29,12 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
     certificate: str = ""  # PEM files for https; both or none
     private_key: str = ""
     source: SourceName = "web"  # the name to drive under; safety knows its priority
+    floor_plan: str = ""  # PNG, JPEG or WebP behind the trajectory, where localization is used
+    # two of its points: pixels from the left and the top, and x and y in the map (m)
+    floor_plan_first: PlanPoint = ()
+    floor_plan_second: PlanPoint = ()
     # A name in safety.limits whose silence latches: an open, visible page keeps it alive.
     estop_keepalive: Annotated[str, Meta(pattern=r"^([a-z][a-z0-9_-]{0,31})?\Z")] = ""
-    # The URL of an MJPEG stream; ``{robot}`` in the path is the robot's id. Empty: none.
-    camera: Url = ""
 
     def __post_init__(self) -> None:
         try:
@@ -38,11 +43,30 @@ class Dashboard(settings.Section, frozen=True, kw_only=True):
             raise ValueError(f"host is {self.host!r}, allowed is an IP address") from None
         if bool(self.certificate) != bool(self.private_key):
             raise ValueError("certificate and private_key must be set together: set both or none")
+        if self.floor_plan:
+            check_points(self.floor_plan_first, self.floor_plan_second)
+        elif self.floor_plan_first or self.floor_plan_second:
+            raise ValueError("floor_plan_first and floor_plan_second need floor_plan, the image")
 
     @property
     def is_local(self) -> bool:
         """Whether only this host can open the page."""
         return ip_address(self.host).is_loopback
+
+
+def check_points(first: PlanPoint, second: PlanPoint) -> None:
+    """Raise ``ValueError`` if two points of a floor plan give no scale."""
+    if not len(first) == len(second) == 4:
+        raise ValueError(
+            "floor_plan needs floor_plan_first and floor_plan_second, each with four numbers: "
+            "pixels from the left and the top, and x and y in the map"
+        )
+    apart = [b - a for a, b in zip(first, second, strict=True)]
+    if hypot(*apart[:2]) < APART_PX or hypot(*apart[2:]) < APART_M:
+        raise ValueError(
+            "floor_plan_first and floor_plan_second are too near each other: choose two points "
+            f"that are at least {APART_PX} pixels and {APART_M} m apart"
+        )
 
 
 class DashboardConfig(settings.Shared, frozen=True, kw_only=True):

@@ -61,6 +61,7 @@ class DriverLock:
     state: HoldState = HoldState.FREE
     push: Push = field(default_factory=Push)
     gear: int = 1
+    in_sight: bool = False  # the driver sees the vehicle, and needs no picture of a camera
     shown: Shown = None  # the state that the newest valid hold answers
 
     def take(self, viewer: str, force: bool, name: str = "") -> bool:
@@ -68,7 +69,7 @@ class DriverLock:
         if self.driver not in (None, viewer) and not force:
             return False
         if self.driver != viewer:
-            self.driver, self.gear = viewer, 1
+            self.driver, self.gear, self.in_sight = viewer, 1, False
             self.let_go()
         self.name = name
         return True

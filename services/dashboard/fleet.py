@@ -12,11 +12,15 @@ from common.bus.bus import Bus
 from common.freshness import NS_PER_S
 from common.service import Node
 from services.dashboard import client_messages as client
+from services.dashboard import shift_log
 from services.dashboard.client_messages import ROBOT
 from services.dashboard.config import DashboardConfig
 from services.dashboard.i18n import label
+from services.dashboard.patrol import SendText
 from services.dashboard.robot_page import RobotPage, Send, notice
 from t2 import keys
+from t2.messages import LogRequest, Phrase
+from t2.words import refusal
 
 PERIOD_S = 0.05
 IDLE_S = 30.0  # after which the page of a robot without viewers is closed
@@ -61,6 +65,23 @@ class Fleet:
         if robot == self._node.config.robot.id:
             self._node.bus.estop()  # at once: this session is always open
         self._open(robot).robot.estop(requested_by, age_s)
+
+    def log(self, robot: str, before_ns: int | None, send: SendText) -> None:
+        """Read rows of the shift log of a robot that ``knows`` accepts; needs no viewer."""
+        if robot == self._node.config.robot.id:
+            bus = self._node.bus  # always open
+        elif robot in self._pages or len(self._pages) < PAGES_MAX:
+            bus = self._open(robot).robot.bus
+        else:
+            send(shift_log.problem(refusal(Phrase("log.busy"))))
+            return
+        bus.call(
+            keys.LOG,
+            LogRequest(since_ns=1, before_ns=before_ns, most=shift_log.ROWS),
+            lambda reply: send(shift_log.log_view(reply)),
+            lambda refused: send(shift_log.problem(refused)),
+            shift_log.CALL_S,
+        )
 
     # --- called by the server in its own thread -------------------------------------------------
 

@@ -18,6 +18,7 @@ from common.config import Loaded
 from common.errors import ConfigError
 from common.service import STOP_TIMEOUT_S, Node
 from common.systemd import Systemd
+from services.dashboard import floor_plan
 from services.dashboard.auth import TOKEN_MIN, Credentials
 from services.dashboard.config import Dashboard, DashboardConfig
 from services.dashboard.fleet import Fleet
@@ -34,6 +35,7 @@ class Host:
         settings = loaded.config.dashboard
         self._credentials = credentials(settings)
         check_certificate(settings)
+        plan = floor_plan.read(settings)
         # The server's thread counts, the node's reads: all names exist from the start.
         counters = Counter({"requests_displaced": 0, "connections_aborted": 0})
         self._socket = listen(settings, counters)
@@ -51,6 +53,7 @@ class Host:
             hub,
             self._socket,
             template=page(settings, loaded.config.bus.endpoints, words),
+            plan=plan,
             alive=self._alive,
         )
         self._error: BaseException | None = None

@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from common.text import line
-from t2.catalogue import LATCHED
+from t2.catalogue import LATCHED, SERVICES
 from t2.messages import Direction, Event, Field, Phrase, Phrases
 from t2.words import LANGUAGES, Language, render
 
@@ -80,6 +80,11 @@ def rendered(phrases: Phrases, otherwise: str = "") -> Texts:
     """Return the text of a message, which came from the bus, by its phrases or as it is."""
     english, chinese = (line(render(phrases, language, otherwise)) for language in LANGUAGES)
     return Texts(english, chinese)
+
+
+def of_service(name: str) -> Texts:
+    """Return the name of a service for people."""
+    return Texts(*SERVICES.get(name, (name, name)))
 
 
 def of_event(service: str, event: Event) -> Texts:

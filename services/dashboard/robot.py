@@ -111,6 +111,7 @@ class Robot:
             name=lock.name,
             hold=lock.state,
             gear=lock.gear,
+            in_sight=lock.in_sight,
             other=self._contest.other,
             overruled=self._overruled,
             may=self.may_drive,

@@ -16,10 +16,15 @@ from services.dashboard import client_messages as client
 from services.dashboard.config import DashboardConfig
 from services.dashboard.driver_lock import HOLD_S, Push
 from services.dashboard.i18n import Texts, label, phrase
+from services.dashboard.pictures import Pictures
 from services.dashboard.robot import Robot
 from services.dashboard.snapshot import fast_snapshot, slow_snapshot
-from t2.messages import Level
+from t2.messages import EventName, Level
 
+SIGHT: dict[bool, tuple[EventName, Level]] = {
+    True: ("in_sight", "warning"),
+    False: ("by_picture", "info"),
+}
 SLOW_TICKS = 10  # between two slow snapshots
 
 # Takes the viewers, the text, and whether it replaces an older one that still waits.
@@ -40,10 +45,14 @@ class RobotPage:
         self.used_ns = 0  # the last time that it had a viewer, or was stopped
         self._config = config
         self._send_text = send
+        self.pictures = Pictures(
+            bus, self.robot.telemetry, lambda viewers, text: self._send_text(viewers, text, True)
+        )
         self._ticks = 0
 
     def join(self, viewer: str) -> None:
         """Add a browser; it gets all events, and later new ones."""
+        dashboard = self._config.dashboard
         self._send_events()
         self.viewers.add(viewer)
         hello = {
@@ -53,7 +62,8 @@ class RobotPage:
             "gears": self._config.vehicle.gears_linear,
             "hold_s": HOLD_S,
             "call_s": MAX_CALL_AGE_NS / NS_PER_S,
-            "keepalive": bool(self._config.dashboard.estop_keepalive),
+            "keepalive": bool(dashboard.estop_keepalive),
+            "floor_plan": [dashboard.floor_plan_first, dashboard.floor_plan_second],
         }
         self._send([viewer], hello)
         self._send([viewer], {"k": "events", "lines": self.robot.telemetry.events, "all": True})
@@ -63,6 +73,7 @@ class RobotPage:
         self.viewers.discard(viewer)
         self.robot.driver_lock.leave(viewer)
         self.robot.keepalive.left(viewer)
+        self.pictures.leave(viewer)
 
     def handle(self, viewer: str, message: client.AnyMessage) -> None:
         """Handle a viewer's message."""
@@ -71,6 +82,8 @@ class RobotPage:
                 self._alive(viewer, message)
             case client.Take():
                 self._take(viewer, message)
+            case client.Watch(camera):
+                self.pictures.watch(viewer, camera, clock.now_ns())
             case client.Routes(route):
                 self.robot.routes.ask(route, partial(self._send_route, viewer))
             case _ if self.robot.driver_lock.driver == viewer:
@@ -84,6 +97,7 @@ class RobotPage:
         if not self.viewers:
             return
         self.used_ns, self._ticks = now_ns, self._ticks + 1
+        self.pictures.tick()
         robot = self.robot
         fast = fast_snapshot(
             robot.telemetry,
@@ -95,8 +109,9 @@ class RobotPage:
         self._send(self.viewers, fast, replaces=True)
         if self._ticks % SLOW_TICKS == 0:
             slow = slow_snapshot(
-                robot.telemetry, robots, len(self.viewers), now_ns, routes=robot.routes.version
-            )
+                robot.telemetry, robots, len(self.viewers), now_ns,
+                routes=robot.routes.version, cameras=self.pictures.views(now_ns),
+            )  # fmt: skip
             self._send(self.viewers, slow, replaces=True)
         if self._ticks % SLOW_TICKS == 1:
             self._send_events()
@@ -125,8 +140,12 @@ class RobotPage:
         robot, lock, notify = self.robot, self.robot.driver_lock, partial(self._notify, viewer)
         match message:
             case client.Hold(echo, x, y, release):
-                shown = robot.telemetry.shown(echo)
+                by_picture = self.pictures.has_camera and not lock.in_sight
+                is_valid = not by_picture or self.pictures.has_sent(viewer, echo)
+                shown = robot.telemetry.shown(echo) if is_valid else None
                 lock.hold(Push(x, y, release), shown, clock.now_ns())
+            case client.Sight(in_sight, name=name):
+                self._set_sight(in_sight, name or f"viewer {viewer}")
             case client.Free():
                 lock.let_go()
             case client.Leave():
@@ -137,6 +156,14 @@ class RobotPage:
                 robot.reset(echo, name or f"viewer {viewer}", notify)
             case client.Round() | client.Teach():
                 robot.patrol(message, message.name or f"viewer {viewer}", notify)
+
+    def _set_sight(self, in_sight: bool, by: str) -> None:
+        lock = self.robot.driver_lock
+        if in_sight != lock.in_sight:
+            lock.in_sight = in_sight
+            lock.lapse()  # what is held now was pressed in the other mode
+            name, level = SIGHT[in_sight]
+            self.robot.event(name, level, by=by)
 
     def _send_route(self, viewer: str, message: bytes) -> None:
         self._send_text([viewer], message, False)

@@ -23,9 +23,11 @@ from starlette.websockets import WebSocket
 from services.dashboard.auth import AuthMiddleware, Credentials
 from services.dashboard.client_messages import NAME_MAX, ROBOT
 from services.dashboard.config import Dashboard
+from services.dashboard.floor_plan import FloorPlan
 from services.dashboard.i18n import table
 from services.dashboard.listener import BACKLOG, Listener
 from services.dashboard.websocket_hub import MESSAGE_MAX, WebSocketHub
+from services.dashboard.websocket_protocol import WebSocketProtocol
 from t2.errors import LinkError
 
 SHUTDOWN_S = 1  # for browsers to disconnect
@@ -44,6 +46,7 @@ def serving(
     listener: Listener,
     *,
     template: str,
+    plan: FloorPlan | None,
     alive: Callable[[], None],
 ) -> uvicorn.Server:
     """Return the server, ready to run; it calls ``alive`` in its own loop, once a second."""
@@ -53,7 +56,9 @@ def serving(
 
     return uvicorn.Server(
         uvicorn.Config(
-            AuthMiddleware(_application(template, robot, hub, listener), credentials, settings),
+            AuthMiddleware(
+                _application(template, robot, hub, listener, plan), credentials, settings
+            ),
             loop="asyncio",  # the listener needs it
             http="h11",
             h11_max_incomplete_event_size=HEADER_MAX,
@@ -64,9 +69,8 @@ def serving(
             log_config=None,  # its lines go through common/log.py
             log_level="error",  # any client can cause warnings
             access_log=False,
-            # Many small frames: compression costs more than it saves.
-            ws_per_message_deflate=False,
-            ws="websockets-sansio",
+            ws=WebSocketProtocol,
+            ws_per_message_deflate=True,
             ws_max_size=MESSAGE_MAX,
             ws_ping_interval=5.0,
             ws_ping_timeout=5.0,
@@ -79,14 +83,28 @@ def serving(
     )
 
 
-def _application(template: str, robot: str, hub: WebSocketHub, listener: Listener) -> Starlette:
+def _application(
+    template: str, robot: str, hub: WebSocketHub, listener: Listener, plan: FloorPlan | None
+) -> Starlette:
     """Return the application behind the authentication."""
+    log_template = Template((STATIC / "log.html").read_text(encoding="utf-8"))
+    log_page = log_template.substitute(robot=ROBOT_ID, texts=_script(table()))
 
     async def index(request: Request) -> Response:
         shown = request.query_params.get("robot", robot)
         if not re.match(ROBOT, shown):
             return PlainTextResponse("not the id of a robot\n", status_code=404)
-        return HTMLResponse(template.replace(ROBOT_ID, shown))
+        page = log_page if request.url.path == "/log" else template
+        return HTMLResponse(page.replace(ROBOT_ID, shown))
+
+    async def log_rows(request: Request) -> Response:
+        before = re.fullmatch(r"\d{1,18}|[1-8]\d{18}", request.query_params.get("before", ""))
+        rows = await hub.log(
+            request.query_params.get("robot", robot), int(before[0]) if before else None
+        )
+        if rows is None:
+            return PlainTextResponse("the bus does not respond\n", status_code=504)
+        return Response(rows, media_type="application/json")
 
     # Besides the WebSocket: a stop must arrive when that is congested or closed.
     async def stop(request: Request) -> Response:
@@ -106,11 +124,19 @@ def _application(template: str, robot: str, hub: WebSocketHub, listener: Listene
     return Starlette(
         routes=[
             Route("/", index),
+            *_floor_plan(plan),
+            Route("/log", index),
+            Route("/log/rows", log_rows),
             Mount("/t2", StaticFiles(directory=STATIC)),
             Route("/estop/{robot}", stop, methods=["POST"]),
             WebSocketRoute("/live", live),
         ]
     )
+
+
+def _floor_plan(plan: FloorPlan | None) -> list[Route]:
+    response = plan and Response(plan.image, media_type=plan.kind)
+    return [Route("/floor-plan", response, methods=["GET"])] if response else []
 
 
 def seconds(text: str) -> float:
@@ -135,7 +161,7 @@ def page(settings: Dashboard, router: Sequence[str], words: Sequence[str]) -> st
     template = Template((STATIC / "index.html").read_text(encoding="utf-8"))
     return template.substitute(
         robot=ROBOT_ID, texts=_script(table()),
-        camera=html.escape(settings.camera), router=html.escape(", ".join(router)),
+        router=html.escape(", ".join(router)),
         doctor=html.escape(doctor),
     )  # fmt: skip
 

@@ -14,8 +14,9 @@ from common.pose import Covariance
 from common.root_cause import RootCause, root_cause
 from common.text import line
 from services.dashboard.driver_lock import HoldState
-from services.dashboard.i18n import Texts, rendered
+from services.dashboard.i18n import Texts, phrase, rendered
 from services.dashboard.patrol import PatrolView, patrol_view
+from services.dashboard.pictures import CameraView
 from services.dashboard.telemetry_cache import TelemetryCache
 from t2 import keys
 from t2.messages import (
@@ -41,6 +42,7 @@ from t2.messages import (
 Tone = Literal["dark", "clear", "slow", "stop", "fault"]  # of a sonar sector
 WORST: tuple[Tone, ...] = ("dark", "clear", "slow", "stop", "fault")
 OF_STATUS: dict[RangeStatus, Tone] = {"no_echo": "clear", "too_near": "stop", "fault": "fault"}
+CLOSE_M, NEAR_M = 0.25, 0.5  # readings that are red and amber, also while the vehicle stands
 OF_CAUSE: dict[CauseName, Tone] = {"obstacle": "slow", "blocked": "stop"}
 SIGMAS = 2.0  # of the drawn ellipse
 YOU = Phrase("control.you")
@@ -53,6 +55,7 @@ class DriverState(Struct, frozen=True):
     name: str  # of its operator, as typed; may be empty
     hold: HoldState
     gear: int
+    in_sight: bool  # it sees the vehicle, and drives without a picture
     other: str | None  # another source that drives
     overruled: bool  # by that one, during a hold
     may: bool  # false: the router drops the requests of this certificate
@@ -79,6 +82,7 @@ class SafetyView(Struct, frozen=True):
     heartbeat: int
     text: Texts
     own_text: Texts  # the same, for the viewer that is in control
+    stopped_by: Texts | None  # who requested the emergency stop that is latched
     release: Release | None
     release_refusal: Texts | None
 
@@ -124,6 +128,7 @@ class SlowSnapshot(Struct, frozen=True, tag_field="k", tag="slow"):
     switches: Switches | None
     map: MapView | None
     patrol: PatrolView | None  # None: the robot has none
+    cameras: tuple[CameraView, ...]
 
 
 def fast_snapshot(
@@ -159,7 +164,7 @@ def fast_snapshot(
         tones=tones(sonar, state),
         bumper=bumper.pressed if bumper else None,
         link=link.state if link else None,
-        safety=safety_view(state) if state else None,
+        safety=safety_view(state, telemetry.stopped_by(state)) if state else None,
         driver=driver,
         keeper=keeper,
     )
@@ -172,6 +177,7 @@ def slow_snapshot(
     now_ns: int,
     *,
     routes: int = 0,
+    cameras: tuple[CameraView, ...] = (),
 ) -> SlowSnapshot:
     """Return the slow snapshot at this time; ``routes`` is the version of the routes."""
     services, pose = telemetry.services(), telemetry.newest(keys.MAP_POSE, now_ns)
@@ -186,6 +192,7 @@ def slow_snapshot(
         switches=telemetry.newest(keys.SWITCHES, now_ns),
         map=map_view(pose) if pose else None,
         patrol=patrol_view(telemetry, routes, now_ns),
+        cameras=cameras,
     )
 
 
@@ -202,8 +209,8 @@ def map_view(pose: MapPose) -> MapView:
     return MapView(pose.state, text, (pose.x, pose.y, pose.heading), ellipse, frame)
 
 
-def safety_view(state: SafetyState) -> SafetyView:
-    """Return the part of a state of safety that the page shows."""
+def safety_view(state: SafetyState, stopped_by: str | None = None) -> SafetyView:
+    """Return the part of a state of safety that the page shows, with who stopped the robot."""
     return SafetyView(
         verdict=state.verdict,
         latched=state.latched,
@@ -216,6 +223,7 @@ def safety_view(state: SafetyState) -> SafetyView:
         heartbeat=state.heartbeat,
         text=rendered(state.phrases, state.text),
         own_text=rendered(addressed(state.phrases), state.text),
+        stopped_by=phrase("estop.by", who=stopped_by) if stopped_by else None,
         release=state.release,
         release_refusal=(
             rendered(state.refusal_phrases, state.release_refusal)
@@ -235,7 +243,7 @@ def tones(ultrasonic: Ultrasonic | None, state: SafetyState | None) -> tuple[Ton
     if ultrasonic is None or state is None:
         return tuple("dark" for _ in SONAR_NAMES)
     own: dict[str, Tone] = {
-        name: OF_STATUS.get(status) or ("dark" if reading is None else "clear")
+        name: OF_STATUS.get(status) or of_reading(reading)
         for name, status, reading in zip(
             SONAR_NAMES, ultrasonic.status, ultrasonic.ranges, strict=True
         )
@@ -250,6 +258,13 @@ def tones(ultrasonic: Ultrasonic | None, state: SafetyState | None) -> tuple[Ton
         if name in own:
             own[name] = max(own[name], tone, key=WORST.index)
     return tuple(own.values())
+
+
+def of_reading(reading: float | None) -> Tone:
+    """Return the tone of a distance (m)."""
+    if reading is None:
+        return "dark"
+    return "stop" if reading < CLOSE_M else "slow" if reading < NEAR_M else "clear"
 
 
 def sonars_of(cause: Cause) -> list[str]:

@@ -9,8 +9,9 @@ from typing import NamedTuple, TypeVar
 
 from msgspec import Struct
 
-from common.freshness import Latest, fresh
-from services.dashboard.i18n import Texts, of_event, phrase
+from common.freshness import NS_PER_S, Latest, fresh
+from common.hits import Hits
+from services.dashboard.i18n import Texts, of_event, of_service, phrase
 from t2 import keys
 from t2.keys import Topic
 from t2.messages import Event, Message, SafetyState
@@ -25,13 +26,15 @@ MISSED = 4.0  # samples that may be missing before the last one is too old to sh
 # Names of sources and services come from the bus, where any client can invent them.
 INVENTED_MAX = 30
 MIN_AGE_S, MAX_AGE_S = 0.5, 3.0
+STOPS_MAX = 8  # emergency stops whose names are known
+AROUND_NS = 3 * NS_PER_S  # between a latch and the event that names who stopped
 
 
 class EventLine(Struct, frozen=True):
     """An event as the browsers show it."""
 
     t: float  # s, the sender's wall clock, which may be wrong: it orders nothing
-    service: str
+    service: Texts
     name: str
     level: str
     text: Texts
@@ -56,11 +59,13 @@ class TelemetryCache:
 
     alive: dict[str, set[str]] = field(default_factory=dict)  # instances by service
     _events: deque[Received] = field(default_factory=lambda: deque(maxlen=EVENTS_DEPTH))
+    _hits: Hits = field(default_factory=Hits)
     _new: int = 0  # events that ``take_new`` has not returned
     _history_turns: int = HISTORY_TURNS  # left
     _last: dict[str, tuple[int, int]] = field(default_factory=dict)  # boot and seq, by service
     _states: deque[Latest[SafetyState]] = field(default_factory=lambda: deque(maxlen=STATES_MAX))
     _latest: dict[str, Latest[Message]] = field(default_factory=dict)
+    _stops: deque[tuple[str, Event]] = field(default_factory=lambda: deque(maxlen=STOPS_MAX))
 
     def update(self, path: str, message: Message, received_ns: int) -> None:
         """Store a message of the stream with this path below the robot's key."""
@@ -91,13 +96,30 @@ class TelemetryCache:
         """The newest events, in the order of their arrival."""
         return [one.line for one in self._events][-EVENTS_MAX:]
 
+    def stopped_by(self, state: SafetyState) -> str | None:
+        """Return who requested the emergency stop that is latched; None if that is unknown.
+
+        It is the event nearest to the latch, by the clock of their host, else by the wall clocks.
+        """
+        held = next((cause for cause in state.causes if cause.name == "estop"), None)
+        if held is None or held.name not in state.latched:
+            return None
+        age_ns = round(held.age * NS_PER_S)
+        apart = [(_apart_ns(event, state, age_ns), by) for by, event in self._stops]
+        nearest_ns, by = min(apart, default=(AROUND_NS + 1, ""))
+        return by if nearest_ns <= AROUND_NS else None
+
     def add_event(self, service: str, event: Event) -> None:
         """Store an event, and a mark where events of its service are missing before it."""
-        t = event.t_ns / 1e9
+        t, by = event.t_ns / 1e9, of_service(service)
+        if event.name == "estop" and isinstance(who := event.about.get("by"), str):
+            self._stops.append((who, event))
         if missing := self._missing(service, event):
-            mark = EventLine(t, service, "gap", "warning", phrase("events.missing", count=missing))
+            mark = EventLine(t, by, "gap", "warning", phrase("events.missing", count=missing))
             self._add(event, mark)
-        self._add(event, EventLine(t, service, event.name, event.level, of_event(service, event)))
+        if not self._hits.is_repeat(service, event):
+            text = of_event(service, event)
+            self._add(event, EventLine(t, by, event.name, event.level, text))
 
     def take_new(self) -> tuple[list[EventLine], bool]:
         """Return the new events, and whether they replace all earlier ones.
@@ -136,6 +158,13 @@ class TelemetryCache:
         return sorted(healthy | set(self.alive))
 
 
+def _apart_ns(event: Event, state: SafetyState, age_ns: int) -> int:
+    """Return the time between an event and what a state of safety shows with this age."""
+    if event.host and event.host == state.host:
+        return abs(event.mono_ns - (state.mono_ns - age_ns))
+    return abs(event.t_ns - (state.t_ns - age_ns))
+
+
 def merged(events: list[Received]) -> list[Received]:
     """Return the events with those of each host in the order of its clock, on the same places."""
     of_host: dict[int, list[Received]] = defaultdict(list)
@@ -154,7 +183,7 @@ def path_of(key: str) -> str:
 
 
 FIXED = frozenset(
-    topic.path.format(service=service, side=side, source="")
+    topic.path.format(service=service, side=side, source="", camera="")
     for topic in keys.TOPICS
     for service in keys.SERVICES
     for side in ("left", "right")

@@ -17,12 +17,16 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from common.loop import Post
+from services.dashboard import shift_log
 from services.dashboard.client_messages import ROBOT, AnyMessage, Estop
 from services.dashboard.fleet import Fleet
+from t2.messages import Phrase
+from t2.words import refusal
 
 VIEWERS_MAX = 64
 OUTBOX_MAX = 64  # messages to one viewer
 MESSAGE_MAX = 4096  # bytes
+LOG_S = 8.0  # wait for rows of the shift log: longer than the call for them
 
 Call = Callable[[], None]
 
@@ -103,6 +107,27 @@ class WebSocketHub:
         self._inbox.stop(robot, partial(self._fleet.estop, robot, requested_by, age_s))
         return True
 
+    async def log(self, robot: str, before_ns: int | None) -> bytes | None:
+        """Return rows of the shift log as JSON, or why there are none; None without an answer."""
+        if not self._fleet.knows(robot):
+            return shift_log.problem(refusal(Phrase("log.unknown_robot")))
+        loop = asyncio.get_running_loop()
+        answer: asyncio.Future[bytes] = loop.create_future()
+
+        def take(text: bytes) -> None:
+            if not answer.done():
+                answer.set_result(text)
+
+        def send(text: bytes) -> None:
+            with contextlib.suppress(RuntimeError):  # the server has just ended
+                loop.call_soon_threadsafe(take, text)
+
+        self._inbox.put(partial(self._fleet.log, robot, before_ns, send))
+        try:
+            return await asyncio.wait_for(answer, LOG_S)
+        except TimeoutError:
+            return None
+
     async def serve(self, socket: WebSocket) -> None:
         """Serve one browser, on the page of the robot in its query, until it disconnects."""
         robot = socket.query_params.get("robot", "")
@@ -143,8 +168,10 @@ class WebSocketHub:
     async def _send(self, socket: WebSocket, outbox: Outbox) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while not outbox.full:
-                text = (await outbox.take()).decode()
-                await socket.send({"type": "websocket.send", "text": text})
+                message = await outbox.take()
+                is_text = message[:1] == b"{"
+                part = {"text": message.decode()} if is_text else {"bytes": message}
+                await socket.send({"type": "websocket.send", **part})
             await socket.close(code=1013, reason="too slow")
 
     def _put(self, viewers: Collection[str], text: bytes, replaces: bool) -> None:

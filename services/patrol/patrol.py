@@ -17,7 +17,7 @@ from common.service import Node
 from common.source import DriveSource
 from services.patrol.config import PatrolConfig
 from services.patrol.core.course import SOURCE, TICK_S, Note
-from services.patrol.core.patrol import Patrol
+from services.patrol.core.patrol import STOPPING, Patrol
 from services.patrol.core.routes import problem
 from services.patrol.core.teaching import Refused
 from services.patrol.schedule import Due, Schedule
@@ -34,7 +34,6 @@ WRITTEN_M = 1.0  # of progress, between two notes of the open round
 TAUGHT_S = 5.0  # between two notes of the route that is being taught
 RETRY_S = 10.0  # after a failure of the disk
 LAMP_OFF = 0  # mode
-ALWAYS = {"pause", "abort"}  # actions that stop: however late they arrive
 LOCALTIME = Path("/etc/localtime")
 
 
@@ -58,6 +57,7 @@ class PatrolService:
         self._to_state = bus.publisher(keys.PATROL)
         bus.subscribe(keys.MAP_POSE, self._on_pose, depth=QUEUED)
         bus.subscribe(keys.SAFETY, self._on_safety, depth=ECHOES)
+        bus.subscribe(keys.PATROL, self._on_patrol, refused=self._on_other)
         bus.subscribe(keys.EVENTS, self._on_recorder, depth=QUEUED, service="recorder")
         bus.serve(keys.TEACH, self._on_teach)
         bus.serve(keys.ROUTES, self._on_routes)
@@ -78,6 +78,14 @@ class PatrolService:
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
         self._echoes = self._echoes.received(arrival.message, arrival.received_ns)
         self._patrol.on_safety(arrival.message, arrival.received_ns)
+
+    def _on_patrol(self, arrival: Arrival[m.PatrolState]) -> None:
+        if arrival.message.boot != self._node.bus.boot:
+            self._patrol.on_other(arrival.received_ns)
+
+    def _on_other(self, *_: object) -> None:
+        """Note a state of another version: ours can be decoded."""
+        self._patrol.on_other(clock.now_ns())
 
     def _on_recorder(self, arrival: Arrival[m.Event]) -> None:
         """Note the black box of a latch during a round."""
@@ -204,7 +212,7 @@ class PatrolService:
     def _on_round(self, request: m.RoundRequest, caller: Caller[m.Done]) -> None:
         now_ns = clock.now_ns()
         late = self._echoes.refusal(request.echo, now_ns)
-        if late and request.action not in ALWAYS:
+        if late and request.action not in STOPPING:
             caller.refuse(*late)
             return
         if request.action == "start":

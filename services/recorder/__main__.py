@@ -20,15 +20,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Record continuously, for ``t2 record``; remove no recordings unless an option says so."""
     options.sets = ["recorder.make_room=false", *options.sets, "recorder.everything=true"]
-    return serve(options)
+    return serve(options, "without_log")
 
 
-def serve(options: argparse.Namespace) -> int:
+def serve(options: argparse.Namespace, builder: str = "Recorder") -> int:
     """Run the black box until SIGINT or SIGTERM; return the exit code."""
     return run_optional_service(
         "recorder",
         RecorderConfig,
-        "services.recorder.recorder.Recorder",
+        f"services.recorder.recorder.{builder}",
         sources(options),
         extra="record",
     )

@@ -5,6 +5,7 @@ the samples of the next seconds. A dump takes some seconds, so it is written in
 slices and the event loop continues in between. What waits for it stays in the buffer.
 """
 
+import re
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from common.freshness import NS_PER_S
+from t2 import keys
 from t2.codec import Sample
 from t2.messages import SafetyState
 
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 SPAN_NS, TAIL_NS = 120 * NS_PER_S, 10 * NS_PER_S  # kept before a latch, and recorded after it
 SIZE_MAX = 64_000_000  # bytes of memory
+PICTURE = re.compile(keys.PICTURE.on("[^/]+", camera="[^/]+"))  # keys of pictures
+CAMERAS_MAX = 16  # keys: any member can invent some
+PICTURE_NS, PICTURES_NS = NS_PER_S // 2, 30 * NS_PER_S  # between two pictures; before a latch
 SLICE = 400  # samples written at once: about 30 ms of work
 # Python's memory for a sample besides its bytes, with key and encoding: 450 B by tracemalloc.
 OVERHEAD = 470
@@ -28,6 +33,25 @@ OVERHEAD = 470
 # Opens a recording for its first sample and a reason; raises OSError.
 OpenRecording = Callable[[Sample, str], "RecordingWriter"]
 CloseRecording = Callable[["RecordingWriter"], None]
+
+
+class PictureThinning:
+    """Two pictures a second of each camera; everything else."""
+
+    def __init__(self) -> None:
+        self._last_ns: dict[str, int] = {}  # by key
+
+    def keeps(self, sample: Sample) -> bool:
+        """Return whether a sample is recorded."""
+        if not PICTURE.fullmatch(sample.key):
+            return True
+        last_ns = self._last_ns.get(sample.key)
+        if last_ns is not None and sample.received_ns - last_ns < PICTURE_NS:
+            return False
+        if last_ns is not None or len(self._last_ns) < CAMERAS_MAX:
+            self._last_ns[sample.key] = sample.received_ns
+            return True
+        return False
 
 
 class RingBuffer:
@@ -79,6 +103,7 @@ class Dump:
     number: int  # of the next sample in the buffer
     until_ns: int  # samples up to this time belong to the file
     limit_ns: int  # the latest value of until_ns, whatever else latches
+    pictures_ns: int  # pictures from this time on belong to the file
     recording: "RecordingWriter | None" = None
 
 
@@ -116,7 +141,8 @@ class BlackBox:
         """Start a dump, or extend the one in progress."""
         until_ns = now_ns + self._tail_ns
         if self._dump is None:
-            self._dump = Dump("-".join(causes), 0, until_ns, now_ns + self._span_ns)
+            limit_ns, pictures_ns = now_ns + self._span_ns, now_ns - PICTURES_NS
+            self._dump = Dump("-".join(causes), 0, until_ns, limit_ns, pictures_ns)
         else:
             self._dump.until_ns = min(until_ns, self._dump.limit_ns)
 
@@ -148,6 +174,8 @@ class BlackBox:
     def _write(self, dump: Dump, limit: int | None) -> None:
         for number, sample in islice(self._buffer.since(dump.number, dump.until_ns), limit):
             dump.number = number + 1
+            if sample.received_ns < dump.pictures_ns and PICTURE.fullmatch(sample.key):
+                continue
             if dump.recording is None:
                 dump.recording = self._open_recording(sample, f"latch-{dump.reason}")
             dump.recording.write(sample)

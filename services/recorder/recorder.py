@@ -1,20 +1,27 @@
 """The recorder's shell: subscribes to every key, writes files, stops before the disk is full."""
 
+import contextlib
+import re
 import shlex
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 from common import clock
+from common.bus.bus import Caller
+from common.freshness import NS_PER_S
 from common.service import Node
-from services.recorder.blackbox import BlackBox
+from services.recorder import shift
+from services.recorder.blackbox import BlackBox, PictureThinning
 from services.recorder.config import RecorderConfig
 from services.recorder.mcap_codec import Encoder
+from services.recorder.shift_log import ShiftLog, file_of
 from services.recorder.storage import MB, Storage, StoredFile
 from services.recorder.writer import RecordingWriter, RollingWriter
 from t2 import codec, keys
 from t2.codec import Sample
 from t2.errors import MessageError
-from t2.messages import Phrase, SafetyState
+from t2.messages import Event, LogReply, LogRequest, Phrase, SafetyState
 
 # `**` does not match chunks that begin with "@": two expressions cover all keys.
 EVERYTHING = ("**", "@cmd/**")
@@ -22,12 +29,13 @@ EVERYTHING = ("**", "@cmd/**")
 # unit's MemoryMax alone.
 DEPTH = 10_000
 SLICE_S, FLUSH_S, CHECK_S = 0.05, 0.5, 1.0
+LOG_S, LOG_RETRY_S = 1.0, 10  # of the shift log: between two writes, and after an error
 
 
 class Recorder:
-    """Connects bus, rolling writer, black box and storage."""
+    """Connects bus, rolling writer, black box, shift log and storage."""
 
-    def __init__(self, node: Node[RecorderConfig]) -> None:
+    def __init__(self, node: Node[RecorderConfig], *, keeps_log: bool = True) -> None:
         settings = node.config.recorder
         self._node = node
         self._encoder = Encoder(node.config.vehicle)
@@ -38,7 +46,13 @@ class Recorder:
         self._everything = settings.everything
         self._rolling = RollingWriter(*files)
         self._black_box = BlackBox(*files)
-        node.counters.update(recorded=0, not_recorded=0, removed=0)
+        self._thinning = PictureThinning()
+        robot = node.bus.robot
+        self._log_file = file_of(self._storage.folder, robot)
+        self._log = ShiftLog(self._log_file, robot, node.bus.host)
+        self._log_due_ns, self._keeps_log = 0, keeps_log
+        self._event_key = re.compile(keys.EVENTS.on(re.escape(node.bus.robot), service="([^/]+)"))
+        node.counters.update(recorded=0, not_recorded=0, removed=0, log_unwritten=0)
         self._check_storage(clock.now_ns())
         for each in EVERYTHING:
             node.bus.tap(f"{keys.ROOT}/{node.bus.robot}/{each}", self._on_sample, depth=DEPTH)
@@ -47,14 +61,27 @@ class Recorder:
         )
         node.loop.every(FLUSH_S, self._flush)
         node.loop.every(CHECK_S, self._check_storage)
+        if keeps_log:
+            node.bus.serve(keys.LOG, self._on_log)
+            node.loop.every(LOG_S, self._write_log)
+            node.loop.every(60.0, self._report_dropped)
         node.on_exit = self._close
 
     def _on_sample(self, sample: Sample) -> None:
+        if not self._thinning.keeps(sample):
+            return
         self._black_box.add(sample)
         if self._everything:
             self._on_disk(lambda: self._record(sample))
         if sample.key == self._safety_key:
             self._on_safety(sample)
+        elif self._keeps_log and (match := self._event_key.fullmatch(sample.key)):
+            self._on_event(match[1], sample)
+
+    def _on_event(self, service: str, sample: Sample) -> None:
+        with contextlib.suppress(MessageError):
+            event = codec.decode(sample.payload, Event)
+            self._log.note(service, event, sample.received_ns, sample.wall_ns)
 
     def _record(self, sample: Sample) -> None:
         if not self._storage.has_room:
@@ -68,12 +95,43 @@ class Recorder:
             state = codec.decode(sample.payload, SafetyState)
         except MessageError:
             return  # it is recorded unchanged
+        if self._keeps_log:
+            self._log.update(sample.received_ns, sample.wall_ns)
         causes = self._black_box.new_causes(state)
+        for cause in causes if self._keeps_log else ():
+            event = shift.latch(state, cause)
+            self._log.note("safety", event, sample.received_ns, sample.wall_ns)
         if causes and self._storage.has_room:
             self._black_box.trigger(causes, sample.received_ns)
         elif causes:
             problem = self._storage.problem
             self._node.event("black_box_lost", "error", causes=tuple(causes), problem=problem)
+
+    # --- the shift log ----------------------------------------------------------------------
+
+    def _on_log(self, request: LogRequest, caller: Caller[LogReply]) -> None:
+        """Answer with the newest rows; the file is small, see ``shift_log.SIZE_MAX``."""
+        try:
+            caller.reply(self._log.reply(request, clock.now_ns(), time.time_ns()))
+        except OSError as error:
+            reason = error.strerror or str(error)
+            caller.refuse(Phrase("log.unreadable", {"file": str(self._log_file), "reason": reason}))
+
+    def _write_log(self, now_ns: int) -> None:
+        if now_ns < self._log_due_ns:
+            return
+        try:
+            self._log.write()
+        except OSError as error:
+            self._log_due_ns = now_ns + LOG_RETRY_S * NS_PER_S
+            self._node.counters["log_unwritten"] += 1
+            self._node.log.error("cannot write the shift log", reason=str(error))
+
+    def _report_dropped(self, _: int) -> None:
+        if count := self._log.take_dropped():
+            self._node.event("log_dropped", "warning", count=count)
+
+    # --- files ------------------------------------------------------------------------------
 
     def _flush(self, now_ns: int) -> None:
         self._on_disk(self._black_box.flush)
@@ -135,3 +193,11 @@ class Recorder:
     def _close(self) -> None:
         self._on_disk(self._black_box.close)
         self._on_disk(self._rolling.close)
+        if self._keeps_log:
+            self._log.mark()
+            self._write_log(self._log_due_ns)
+
+
+def without_log(node: Node[RecorderConfig]) -> Recorder:
+    """Return a recorder beside the robot's own one, which keeps the shift log."""
+    return Recorder(node, keeps_log=False)

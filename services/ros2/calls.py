@@ -26,6 +26,10 @@ FRESH_NS = NS_PER_S // 2  # age of safety's state; older, and safety counts as s
 CALLS_MAX = 32  # stops that wait, and resets
 TOLERANCE_S = 0.2  # of the two clocks, and of the age of safety's state
 TRIGGER = "std_srvs/srv/Trigger"
+IN_ROS = {
+    "reset.done": "Reset. Stop publishing for 0.5 s, then publish again.",
+    "reset.motion": "Motion is requested, by a node or another source: stop publishing for 0.5 s.",
+}
 
 
 class Calls:
@@ -93,13 +97,13 @@ class Calls:
 
         def answered(done: m.ResetDone) -> None:
             check.answer(done)
-            self._resets.append((answer, check, done.text))
+            self._resets.append((answer, check, in_ros(done)))
 
         self._node.bus.call(
             keys.RESET,
             reset_request(state),
             answered,
-            lambda refused: answer((False, refused.text)),
+            lambda refused: answer((False, in_ros(refused))),
         )
 
     def _parameters(
@@ -108,6 +112,11 @@ class Calls:
         state = self._state(clock.now_ns() - FRESH_NS)
         known = parameters.parameters(self._node.config, state.limits if state else None)
         answer(respond(known, *(request or ())))
+
+
+def in_ros(answer: m.Done | m.Refusal) -> str:
+    """Return safety's text for a ROS node, which has no controls to let go of."""
+    return IN_ROS.get(answer.phrases[0].name, answer.text) if answer.phrases else answer.text
 
 
 def reset_refusal(state: m.SafetyState, sent_ns: int, now_ns: int) -> str:

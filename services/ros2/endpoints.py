@@ -31,7 +31,6 @@ Declare = Callable[[zenoh.Session, str, str], Any]  # with the key and the token
 DEPTH = 32  # commands that wait for the loop
 MAX_BYTES = 4096  # of a command or request; a TwistStamped has some 80
 LATCHED: dict[str, Any] = {
-    "cache": zenoh.ext.CacheConfig(max_samples=1),
     "publisher_detection": True,
     "sample_miss_detection": zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=0.5),
 }
@@ -93,20 +92,25 @@ class Endpoints:
         """Close the session: all tokens disappear."""
         self._session.close()
 
-    def publisher(self, topic: str, interface: str, *, latched: bool = False) -> Publisher:
-        """Return a publisher of an absolute topic."""
+    def publisher(self, topic: str, interface: str, *, kept: int = 0) -> Publisher:
+        """Return a publisher of an absolute topic; late subscribers get the last ``kept`` samples.
+
+        With any it is transient local in the words of ROS.
+        """
         made = Publisher(interface)
 
         def declare(session: zenoh.Session, key: str, token: str) -> Any:
-            if latched:
-                sent: Any = zenoh.ext.declare_advanced_publisher(session, key, **LATCHED)
+            if kept:
+                cache = zenoh.ext.CacheConfig(max_samples=kept)
+                sent: Any = zenoh.ext.declare_advanced_publisher(
+                    session, key, cache=cache, **LATCHED
+                )
             else:
                 sent = session.declare_publisher(key, **QOS)
             made.declared(sent, gid(token))
             return sent
 
-        qos = names.QOS_LATCHED if latched else names.QOS
-        self._declare("MP", topic, interface, declare, qos)
+        self._declare("MP", topic, interface, declare, names.qos(kept))
         return made
 
     def subscribe(

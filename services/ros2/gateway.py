@@ -11,7 +11,7 @@ from common.source import DriveSource
 from services.ros2 import fixes, names, translate
 from services.ros2.calls import FRESH_NS, Calls
 from services.ros2.cdr import Attachment, Value
-from services.ros2.command import MAX_PUBLISHERS, SOURCE, Commands, Refusal, Twist
+from services.ros2.command import MAX_PUBLISHERS, SETTLING, SOURCE, Commands, Refusal, Twist
 from services.ros2.config import Ros2Config
 from services.ros2.endpoints import Endpoints, Publisher, gid
 from services.ros2.streams import Streams
@@ -22,6 +22,7 @@ from t2.words import render
 REPORT_NS = NS_PER_S
 TWISTS = {"stamped": "geometry_msgs/msg/TwistStamped", "twist": "geometry_msgs/msg/Twist"}
 OTHER_TYPE = Refusal("other_type")
+LOG_KEPT = 1000  # lines of /rosout for late subscribers, as of every node
 
 
 class Gateway:
@@ -40,7 +41,7 @@ class Gateway:
         self._drive = DriveSource(node.bus, SOURCE)
         self._streams = Streams(node, self._publisher, self._diagnostics)
         Calls(node, self._ros, self._absolute, self._streams.state)
-        self._log = self._publisher("/rosout", "rcl_interfaces/msg/Log")
+        self._log = self._publisher("/rosout", "rcl_interfaces/msg/Log", kept=LOG_KEPT)
         self._types: list[str] = []  # of the commands that are taken
         for name, interface in TWISTS.items():
             if settings.cmd_vel in ("both", name):
@@ -75,7 +76,9 @@ class Gateway:
 
     def _refuse(self, refusal: Refusal, publisher: bytes, **fields: Field) -> None:
         self._node.counters[f"cmd_vel_{refusal.name}"] += 1
-        self._note(translate.WARN, Phrase(f"cmd_vel.{refusal.name}", fields), publisher)
+        # Each publisher settles when it begins: no reason to warn.
+        level = translate.OK if refusal.name == SETTLING.name else translate.WARN
+        self._note(level, Phrase(f"cmd_vel.{refusal.name}", fields), publisher)
 
     def _is_new(self, about: bytes | str, decision: str) -> bool:
         """Return whether it is not the last one; each of a publisher counts once a second."""
@@ -88,7 +91,10 @@ class Gateway:
         return True
 
     def _note(self, level: int, phrase: Phrase, publisher: bytes) -> None:
-        """Show a decision in the diagnostics; log a new one, and report a new refusal."""
+        """Show a decision in the diagnostics; log a new one, and report a new refusal.
+
+        ``ros2 topic echo`` cuts a text after 128 characters: what to do comes first.
+        """
         sender = self._publishers.get(publisher, "unknown")
         decision, text = phrase.name.partition(".")[2], render((phrase,))
         values = {"reason": decision, "publisher": sender}
@@ -96,7 +102,7 @@ class Gateway:
         known = publisher if publisher in self._publishers else b""  # anybody can invent a GID
         if not self._is_new(known, decision):
             return
-        logged = f"cmd_vel of {sender} ({decision}): {text}"
+        logged = f"{text} ({decision}, cmd_vel of {sender})"
         self._log.put(translate.log(time.time_ns(), level, logged))
         if level == translate.WARN:
             self._node.event("cmd_vel_refused", "warning", phrase, **values)
@@ -124,7 +130,7 @@ class Gateway:
         decision = phrase.name.partition(".")[2]
         if not self._is_new(source, decision):
             return
-        logged = f"pose of {source} ({decision}): {render((phrase,))}"
+        logged = f"{render((phrase,))} ({decision}, pose of {source})"
         self._log.put(translate.log(time.time_ns(), level, logged))
         if level == translate.WARN:
             self._node.event("ros_fix_refused", "warning", phrase, reason=decision, source=source)
@@ -145,8 +151,8 @@ class Gateway:
         self._reported.pop(publisher, None)
         self._commands.gone(publisher)
 
-    def _publisher(self, topic: str, interface: str, *, latched: bool = False) -> Publisher:
-        return self._ros.publisher(self._absolute(topic), interface, latched=latched)
+    def _publisher(self, topic: str, interface: str, *, kept: int = 0) -> Publisher:
+        return self._ros.publisher(self._absolute(topic), interface, kept=kept)
 
     def _absolute(self, name: str) -> str:
         return names.absolute(self._namespace, name)

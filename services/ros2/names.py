@@ -11,7 +11,11 @@ EMPTY = "%"  # an empty enclave or namespace
 CHUNKS = 13  # of an endpoint's token; newer peers may append one with backends
 PART = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 QOS = "::,10:,:,:,,"  # reliable, volatile, the last 10
-QOS_LATCHED = ":1:,1:,:,:,,"  # transient local, the last one
+
+
+def qos(kept: int) -> str:
+    """Return the QoS of a publisher that keeps samples for late subscribers: transient local."""
+    return f":1:,{kept}:,:,:,," if kept else QOS
 
 
 class Node(NamedTuple):

@@ -19,11 +19,12 @@ from t2 import keys
 from t2 import messages as m
 
 SIDES = ("left", "right")
-Declare = Callable[..., Publisher]  # topic, interface, latched
+Declare = Callable[..., Publisher]  # topic, interface, samples kept for late subscribers
 BOOL, TRANSFORMS = "std_msgs/msg/Bool", "tf2_msgs/msg/TFMessage"
-ODOM_HZ = 25.0  # at most, as the bridge counts the distance
+QUEUED = 8  # samples of odometry: a loop that is up to 0.3 s late loses none
 SONAR_HZ = 10.0  # at most, of each
 BUMPER_HZ = 10.0  # at most; a change is passed on at once
+EARLY = 0.25  # of a period: arrivals jitter
 DIAGNOSTICS_S = 1.0
 
 
@@ -54,13 +55,14 @@ class Streams:
         prefix = self._settings.frame_prefix
         odometry = self._publisher("odom", "nav_msgs/msg/Odometry")
 
-        def publish(message: m.Odometry) -> None:
+        def publish(arrival: Arrival[m.Odometry]) -> None:
+            message = arrival.message
             odometry.put(translate.odometry(message, prefix))
             if tf:
                 tf.put(translate.transform(message, prefix))
             self.odometry.note(message, clock.now_ns())
 
-        self._pass_on(keys.ODOMETRY, ODOM_HZ, publish)
+        self._node.bus.subscribe(keys.ODOMETRY, publish, depth=QUEUED)
 
     def _map(self, tf: Publisher | None) -> None:
         """Publish the pose in the map with the stamp of the odometry that it follows from.
@@ -99,14 +101,14 @@ class Streams:
                 made = translate.sonar_range(message, index, mount, config, doubted=is_doubted)
                 sonar.put(made)
 
-        self._pass_on(keys.ULTRASONIC, SONAR_HZ, publish)
+        self._thin(keys.ULTRASONIC, SONAR_HZ, publish)
 
     def _stops(self) -> None:
         bumper = self._publisher("bumper", BOOL)
-        self._pass_on(
+        self._thin(
             keys.BUMPER, BUMPER_HZ, lambda it: bumper.put((it.pressed,)), lambda it: it.pressed
         )
-        stopped = self._publisher("hardware/e_stop", BOOL, latched=True)
+        stopped = self._publisher("hardware/e_stop", BOOL, kept=1)
 
         def publish(arrival: Arrival[m.SafetyState]) -> None:
             before, latched = self._state, bool(arrival.message.latched)
@@ -133,27 +135,34 @@ class Streams:
 
     def _description(self) -> None:
         vehicle, prefix = self._node.config.vehicle, self._settings.frame_prefix
-        description = self._publisher("robot_description", "std_msgs/msg/String", latched=True)
+        description = self._publisher("robot_description", "std_msgs/msg/String", kept=1)
         description.put((translate.description(vehicle, prefix),))
-        static = self._publisher("/tf_static", TRANSFORMS, latched=True)
+        static = self._publisher("/tf_static", TRANSFORMS, kept=1)
         static.put(translate.static_transforms(time.time_ns(), vehicle, prefix))
 
-    def _pass_on(
+    def _thin(
         self,
         topic: keys.Topic[Any],
         rate: float,
         publish: Callable[[Any], None],
         value: Callable[[Any], object] = lambda _: None,
     ) -> None:
-        """Publish messages at a rate in Hz at most; one with another value at once."""
-        period_ns = round(0.9 * NS_PER_S / rate)  # arrivals jitter
-        last_ns, last = -period_ns, None
+        """Publish messages of a faster stream at this rate (Hz); one with another value at once.
+
+        The times at which one is due do not follow from the arrivals, which jitter: so the rate is
+        exact.
+        """
+        period_ns = NS_PER_S / rate
+        due_ns, last = 0.0, None
 
         def take(arrival: Arrival[Any]) -> None:
-            nonlocal last_ns, last
-            now = value(arrival.message)
-            if arrival.received_ns - last_ns >= period_ns or now != last:
-                last_ns, last = arrival.received_ns, now
+            nonlocal due_ns, last
+            now_ns, now = arrival.received_ns, value(arrival.message)
+            is_due = now_ns >= due_ns - EARLY * period_ns
+            if is_due:
+                due_ns = max(due_ns, now_ns - EARLY * period_ns) + period_ns
+            if is_due or now != last:
+                last = now
                 publish(arrival.message)
 
         self._node.bus.subscribe(topic, take)

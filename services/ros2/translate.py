@@ -154,7 +154,9 @@ def safety_status(state: m.SafetyState) -> Value:
         "linear limit": state.limits.forward,
         **{f"cause {cause.name}": cause.text for cause in state.causes},
     }
-    return status(WORST.get(state.verdict, ERROR), "safety", state.text, values)
+    stops = {cause.name for cause in state.causes if cause.action != "slow"}
+    level = OK if stops == {"no_request"} else WORST.get(state.verdict, ERROR)  # OK: it is idle
+    return status(level, "safety", state.text, values)
 
 
 def link_status(link: m.Link) -> Value:

@@ -11,6 +11,7 @@ from common.bus.bus import Arrival
 from common.bus.session import is_viewer, operator_name
 from common.cli_args import hint
 from common.freshness import NS_PER_S
+from common.hits import Hits
 from common.root_cause import root_cause
 from common.service import Node
 from common.source import DriveSource
@@ -63,6 +64,7 @@ class Controller:
         self._estop = OperatorEstop(self._bus, report, self._is_denied)
         self._reset = OperatorReset(self._bus, event_log, report, self._is_denied)
         self._telemetry = Telemetry(self._bus)
+        self._hits = Hits()
         self._bus.subscribe(keys.EVENTS, self._on_event, depth=LINES, service="*")
         self.view = self._make_view(clock.now_ns())
         node.loop.every(PERIOD_S, self.tick)
@@ -153,7 +155,8 @@ class Controller:
         event = arrival.message
         if event.boot != self._bus.boot:  # teleop's own events are in the log already
             service = arrival.key.rpartition("/")[2]
-            self._event_log.add(service, event.level, event.phrases, event.text, event)
+            if not self._hits.is_repeat(service, event):
+                self._event_log.add(service, event.level, event.phrases, event.text, event)
 
     def _is_denied(self) -> bool:
         return self._source.denied

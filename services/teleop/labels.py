@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from t2 import catalogue
 from t2.messages import Field, Phrase
 from t2.patrol_texts import Words
-from t2.words import Language, render
+from t2.words import Language, in_language, render
 
 LABELS: dict[str, Words] = {
     "title.safety": ("safety", "安全"),
@@ -17,8 +17,8 @@ LABELS: dict[str, Words] = {
     "title.events": ("events", "事件"),
     "no_data": ("no data", "无数据"),
     # header
-    "bus.up": ("● bus", "● 总线"),
-    "bus.no_router": ("○ no router", "○ 未连接路由器"),
+    "bus.up": ("● connected", "● 已连接"),
+    "bus.no_router": ("○ not connected", "○ 未连接"),
     "bridge.missing": ("○ bridge missing", "○ 桥接服务未运行"),
     "bridge.no_data": ("○ no data of the bridge", "○ 桥接服务无数据"),
     "board.up": ("● board", "● 主控板"),
@@ -34,16 +34,28 @@ LABELS: dict[str, Words] = {
     "verdict.slow": ("SLOW", "减速"),
     "verdict.stop": ("STOP", "停止"),
     "verdict.brake": ("BRAKE", "制动"),
-    "verdict.inhibited": ("INHIBITED", "禁止行驶"),
-    "verdict.no_safety": ("NO SAFETY", "安全服务无响应"),
-    "verdict.no_router": ("NO ROUTER", "未连接路由器"),
+    "verdict.inhibited": ("NOT READY", "禁止行驶"),
+    "verdict.no_safety": ("NO SAFETY", "安全服务无应答"),
+    "verdict.no_router": ("NO CONNECTION TO THE ROBOT", "未连接到机器人"),
     "text.no_safety": (
-        "no state of safety arrives through {router}", "经 {router} 收不到安全服务的状态",
+        "It may drive by itself: this terminal does not know. Look at it, then call a technician.",
+        "机器人可能正在自行行驶，本终端无法得知。请查看机器人，然后联系技术人员。",
     ),
-    "text.no_router": ("no answer at {router}", "{router} 无应答"),
+    "text.no_router": (
+        "It is told to stop within a second, unless another program drives it. Is it on, and its "
+        "network? Then call a technician.",
+        "除非其他程序在驾驶，机器人会在一秒内收到停车指令。请确认机器人已开机且网络正常，然后联系技术人员。",
+    ),
     "text.own_switch": (
-        "To stop, use the vehicle's own switch. Next: {doctor}",
-        "停车请使用车身上的急停开关。下一步：{doctor}",
+        "To stop the vehicle, use its own switch.", "停车请使用车身上的急停开关。",
+    ),
+    "technician.no_safety": (
+        "For the technician: no state of safety arrives through {router}. Next: {doctor}",
+        "供技术人员参考：经 {router} 收不到安全服务的状态。下一步：{doctor}",
+    ),
+    "technician.no_router": (
+        "For the technician: no answer at {router}. Next: {doctor}",
+        "供技术人员参考：{router} 无应答。下一步：{doctor}",
     ),
     "text.next": ("Next: {doctor}", "下一步：{doctor}"),
     "off.believed": ("RELEASE  believed free: ", "脱离碰撞  推断可脱离："),
@@ -60,7 +72,7 @@ LABELS: dict[str, Words] = {
     "off.held": (", held", "，已按住"),
     "off.left": ("{left:.2f} m left until reset", "复位前剩余 {left:.2f} m"),
     "off.way": ("{direction:word}", "{direction:word}"),
-    "cause.latched": ("LATCHED", "已锁定"),
+    "cause.latched": ("RESET NEEDED", "须复位"),
     "action.slow": ("slow", "减速"),
     "action.stop": ("stop", "停止"),
     "action.brake": ("brake", "制动"),
@@ -68,40 +80,40 @@ LABELS: dict[str, Words] = {
     "age.minutes": ("{minutes:.0f} min", "{minutes:.0f} 分钟"),
     # causes by name, where there is no room for their texts
     "cause.contact": ("contact", "碰撞"),
-    "cause.estop": ("estop", "急停"),
-    "cause.estop_reader": ("estop_reader", "急停接收中断"),
-    "cause.estop_keepalive": ("estop_keepalive", "急停保活中断"),
-    "cause.predecessor": ("predecessor", "重启前未复位"),
-    "cause.runaway": ("runaway", "未按指令运动"),
-    "cause.uncommanded_motion": ("uncommanded_motion", "无指令移动"),
-    "cause.not_stopping": ("not_stopping", "未能停住"),
-    "cause.driver_left": ("driver_left", "左电机故障"),
-    "cause.driver_right": ("driver_right", "右电机故障"),
-    "cause.flapping": ("flapping", "输入反复失效"),
-    "cause.leaving": ("leaving", "安全服务关闭"),
-    "cause.starting": ("starting", "等待首批数据"),
-    "cause.link": ("link", "主控板断开"),
-    "cause.switches": ("switches", "紧急制动未确认"),
-    "cause.bumper": ("bumper", "防撞条无数据"),
-    "cause.silent": ("silent", "数据过旧"),
-    "cause.unarmed": ("unarmed", "桥接服务未就绪"),
-    "cause.limit_stop": ("limit_stop", "限速源停车"),
-    "cause.limit_silent": ("limit_silent", "限速源无消息"),
-    "cause.two_publishers": ("two_publishers", "发布者重复"),
-    "cause.neutral": ("neutral", "请先松开"),
+    "cause.estop": ("E-STOP", "急停"),
+    "cause.estop_reader": ("E-STOP not received", "急停接收中断"),
+    "cause.estop_keepalive": ("E-STOP signal lost", "急停维持信号中断"),
+    "cause.predecessor": ("not reset before restart", "重启前未复位"),
+    "cause.runaway": ("moved otherwise", "未按指令运动"),
+    "cause.uncommanded_motion": ("moved by itself", "无指令移动"),
+    "cause.not_stopping": ("standstill not confirmed", "停止未确认"),
+    "cause.driver_left": ("left motor fault", "左电机故障"),
+    "cause.driver_right": ("right motor fault", "右电机故障"),
+    "cause.flapping": ("repeated failures", "输入反复失效"),
+    "cause.leaving": ("safety ends", "安全服务关闭"),
+    "cause.starting": ("waiting for data", "等待首批数据"),
+    "cause.link": ("board lost", "主控板断开"),
+    "cause.switches": ("brakes not verified", "紧急制动未确认"),
+    "cause.bumper": ("no bumper data", "防撞条无数据"),
+    "cause.silent": ("old data", "数据过旧"),
+    "cause.unarmed": ("bridge not ready", "桥接服务未就绪"),
+    "cause.limit_stop": ("stopped by a limit", "限速程序停车"),
+    "cause.limit_silent": ("limit silent", "限速程序无消息"),
+    "cause.two_publishers": ("two programs", "程序重复"),
+    "cause.neutral": ("let go first", "请先松开"),
     "cause.blocked": ("blocked", "空间不足"),
-    "cause.no_request": ("no_request", "无行驶请求"),
+    "cause.no_request": ("no command", "无行驶指令"),
     "cause.release": ("release", "脱离碰撞"),
     "cause.limit": ("limit", "限速"),
     "cause.obstacle": ("obstacle", "障碍物"),
-    "cause.sonar": ("sonar", "超声波不可信"),
+    "cause.sonar": ("sonar not trusted", "超声波不可信"),
     # sonars
     "around.bumper": ("BUMPER", "防撞条"),
     "sonar.fault": ("fault", "故障"),
     "sonar.too_near": ("near", "过近"),
     "sonar.no_echo": ("-", "-"),
     # motion
-    "motion.request": ("request", "请求"),
+    "motion.request": ("target", "目标"),
     "motion.allowed": ("allowed", "允许"),
     "motion.measured": ("measured", "实测"),
     "motion.pose": ("pose", "位姿"),
@@ -129,12 +141,12 @@ LABELS: dict[str, Words] = {
     "gamepad.frozen": ("FROZEN: let go of the deadman", "手柄无响应：请松开使能键"),
     "gamepad.ignored": ("OFF CENTRE, ignored: axis {axes}", "未居中，已忽略：轴 {axes}"),
     # what the bridge waits for, where there is no room for its text
-    "short.waiting.estop": ("safety must latch the E-STOP", "等待安全服务锁定急停"),
-    "short.waiting.hit": ("safety must latch the contact", "等待安全服务锁定碰撞"),
-    "short.waiting.uncommanded": ("safety must latch the motion", "等待安全服务锁定移动"),
-    "short.waiting.latch_owner": ("safety must take over the latch", "等待安全服务接管锁定"),
+    "short.waiting.estop": ("safety must confirm the E-STOP", "等待安全服务确认急停"),
+    "short.waiting.hit": ("safety must confirm the hit", "等待安全服务确认碰撞"),
+    "short.waiting.uncommanded": ("safety must confirm the motion", "等待安全服务确认移动"),
+    "short.waiting.latch_owner": ("safety must take over the stop", "等待安全服务接管停车状态"),
     "short.waiting.ready": ("the board is not ready", "主控板尚未就绪"),
-    "short.waiting.neutral": ("waits for a neutral motion", "等待零速指令"),
+    "short.waiting.neutral": ("waits for zero speed", "等待零速指令"),
     "short.waiting.board": ("nothing received yet", "尚未收到数据"),
     "short.waiting.link": ("the link is lost", "连接已断开"),
     "short.waiting.brakes": ("emergency brakes not confirmed", "紧急制动尚未确认"),
@@ -167,9 +179,9 @@ LABELS: dict[str, Words] = {
     ),
     # alarms
     "estop.not_sent_yet": (
-        "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch. It is sent if the "
-        "router is back within {seconds:.0f} s.",
-        "急停尚未发送：未连接路由器。请使用车身上的急停开关。若在 {seconds:.0f} 秒内恢复连接，将自动发送。",
+        "EMERGENCY STOP NOT SENT YET: no connection. Use the vehicle's own switch. It is sent if the "
+        "connection returns within {seconds:.0f} s.",
+        "急停尚未发送：没有连接。请使用车身上的急停开关。若在 {seconds:.0f} 秒内恢复连接，将自动发送。",
     ),
     "estop.repeated": (
         "It is repeated for {seconds:.0f} s.", "将继续发送 {seconds:.0f} 秒。",
@@ -225,6 +237,10 @@ class Labels:
     def render(self, phrases: Iterable[Phrase], otherwise: str = "") -> str:
         """Return phrases as a text, otherwise the text of their message."""
         return render(phrases, self._language, otherwise, TEXTS)
+
+    def service(self, name: str) -> str:
+        """Return the name of a service for people."""
+        return in_language(catalogue.SERVICES.get(name, (name, name)), self._language)
 
     def short(self, phrases: Iterable[Phrase], otherwise: str = "") -> str:
         """Return a shorter text of the first phrase if there is one."""

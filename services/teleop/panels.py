@@ -128,7 +128,9 @@ def _wrapped(one: Line, say: Labels, width: int) -> list[Text]:
     first, *rest = wrap(line(say.render(one.phrases, one.text)), width) or [""]
     style = LEVELS[one.level]
     time = f"{datetime.fromtimestamp(one.t_ns / 1e9):%H:%M:%S} "
-    head = Text.assemble((time, DIM), (f"{left(one.service, SERVICE)} ", "cyan"), (first, style))
+    head = Text.assemble(
+        (time, DIM), (f"{left(say.service(one.service), SERVICE)} ", "cyan"), (first, style)
+    )
     return [head, *(Text(" " * PREFIX + more, style=style) for more in rest)]
 
 
@@ -145,15 +147,19 @@ def safety(view: View, say: Labels, rows: int, width: int = 200) -> Text:
     lines = [Text(row, style=BAD) for row in wrap(say.render(view.alarm), width)]
     if state is None:
         name = "no_safety" if view.connected else "no_router"
-        badge, text = say(f"verdict.{name}"), say(f"text.{name}", router=view.router)
-        lines += _verdict(badge, BADGES["inhibited"], text, width)
-        return rows_of(*lines, *map(Text, wrap(say("text.own_switch", doctor=view.doctor), width)))
+        text = f"{say('text.own_switch')} {say(f'text.{name}')}"
+        lines += _verdict(say(f"verdict.{name}"), BADGES["inhibited"], text, width)
+        details = say(f"technician.{name}", router=view.router, doctor=view.doctor)
+        return rows_of(*lines, *(Text(row, style="dim") for row in wrap(details, width)))
     root, text = _root(view), _summary(view, state, say)
     if root.part in BELOW_SAFETY:
         text = say.render(
             (Phrase(f"root.{root.part}"), Phrase("text.next", {"doctor": view.doctor}))
         )
-    lines += _verdict(say(f"verdict.{state.verdict}"), BADGES[state.verdict], text, width)
+    badge = say(f"verdict.{state.verdict}")
+    if view.velocity is not None:
+        badge += f" {_signed(view.velocity.linear)} m/s"
+    lines += _verdict(badge, BADGES[state.verdict], text, width)
     lines += release(view, say)
     return rows_of(*lines, *_causes(state, root, say, max(1, rows - len(lines)), width))
 

@@ -6,7 +6,9 @@ from pathlib import Path
 
 from verification.harness.ports import free_port
 
-STACK = {"router", "sim", "bridge", "safety", "odom", "localization", "patrol", "recorder"}
+STACK = {
+    "router", "sim", "bridge", "safety", "odom", "localization", "patrol", "recorder", "camera",
+}  # fmt: skip
 
 
 def ports() -> list[str]:

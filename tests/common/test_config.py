@@ -163,7 +163,7 @@ def test_an_empty_table_takes_nothing_away(settings_dir: SettingsFixture, empty:
         ("[board]\nprot = 1", "over0.toml: board.prot: unknown; did you mean 'port'?"),
         ("[sim.drive]\ncoast = 1", "over0.toml: sim.drive: unknown"),
         ("[safety]\nprotections = 1", "over0.toml: safety.protections: unknown"),
-        ("[sim]\nzzz = 1", "over0.toml: sim.zzz: unknown; there are control_port, fix_delay,"),
+        ("[sim]\nzzz = 1", "over0.toml: sim.zzz: unknown; there are camera_port, control_port,"),
         ("[board.port]\nx = 1", "over0.toml: board.port.x: port is a value, not a table"),
         ("[board]\nport = 70000", "port = 70000: Expected `int` <= 65535; allowed is 1..65535"),
         ("safety.sources = 3", "over0.toml: safety.sources = 3: Expected `object`, got `int`"),

@@ -24,7 +24,7 @@ def test_an_unknown_or_missing_echo_is_refused() -> None:
     heartbeat = START.beat(5 * NS_PER_S)
     assert heartbeat.is_late(1000, 5 * NS_PER_S, NS_PER_S)
     assert render(heartbeat.refusal(1000, 5 * NS_PER_S)) == (
-        "The call echoes an unknown heartbeat of safety: look again, then repeat it."
+        "The call refers to an unknown state of safety: look again, then repeat it."
     )
     assert render(heartbeat.refusal(None, 5 * NS_PER_S)) == (
         "The call carries no echo of safety's heartbeat: send the newest SafetyState.heartbeat "

@@ -7,7 +7,7 @@ from t2 import keys, messages
 from t2.keys import CALLS, TOPICS, Call, Topic
 from t2.messages import Message
 
-NAMES = {"side": "left", "service": "bridge", "source": "web"}
+NAMES = {"side": "left", "service": "bridge", "source": "web", "camera": "front"}
 
 
 def whole(topic: Topic[Message]) -> str:

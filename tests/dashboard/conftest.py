@@ -12,6 +12,7 @@ from tests.dashboard.servers import CallServers, serving
 from verification.harness.bus import bus_on, router_process, running
 from verification.harness.dashboard import Server, dashboard
 from verification.harness.ports import free_port
+from verification.harness.stack import RunningStack, running_stack
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +28,13 @@ def peer(endpoint: str) -> Iterator[Peer]:
         peer = Peer(loop)
         with bus_on(endpoint, loop, peer.declare):
             yield peer
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
+    """The real chain with a simulated vehicle."""
+    with running_stack(tmp_path_factory.mktemp("stack")) as it:
+        yield it
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,7 @@ from verification.harness.waiting import wait_until
 ESTOP_S = 0.5  # from the request to the bus, at worst
 HALF_OPEN = 500
 FILES = 512  # that the dashboard may have open, about half of what systemd allows
+MESSAGE_TOO_BIG = 1009  # RFC 6455
 PING = bytes([0x89, 0x80, 0, 0, 0, 0])
 
 
@@ -72,6 +73,15 @@ def test_an_emergency_stop_beside_tls_handshakes_that_never_end(
         resource.prlimit(server.process.pid, resource.RLIMIT_NOFILE, (FILES, FILES))
         with silent(server, HALF_OPEN):
             assert estop_s(peer, lambda: posted(server)) < ESTOP_S
+
+
+def test_a_message_that_becomes_large_by_decompression_is_refused(server: Server) -> None:
+    with connected(server) as it:
+        it.socket.send(" " * 10_000_000)  # 10 kB on the wire
+        with pytest.raises(ConnectionClosed) as caught:
+            it.wait_for("nothing of the kind")
+    assert caught.value.rcvd is not None
+    assert caught.value.rcvd.code == MESSAGE_TOO_BIG
 
 
 def test_a_viewer_that_floods_is_disconnected(server: Server) -> None:

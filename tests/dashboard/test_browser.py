@@ -19,15 +19,9 @@ from tests.dashboard.page import (
     wait_for_text,
 )
 from verification.harness.dashboard import Server, dashboard
-from verification.harness.stack import RunningStack, running_stack
+from verification.harness.stack import RunningStack
 
 pytestmark = BROWSER_MARKS
-
-
-@pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
-    with running_stack(tmp_path_factory.mktemp("stack")) as it:
-        yield it
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +54,7 @@ def test_the_content_of_the_page(page: Page) -> None:
     reset_all(page)  # a stall of the host may have latched a cause
     page.click("#leave")
     wait_for_text(page, "#verdict", "STOP")
-    wait_for_text(page, "#sentence", "No source requests motion.")
+    wait_for_text(page, "#sentence", "No command to drive.")
     wait_for_text(page, "#driver", "No driver")
     wait_for_text(page, "#bumper", "clear")
     assert page.locator("#sonar-view .sector[data-tone=clear]").count() == 8  # an empty world
@@ -78,7 +72,7 @@ def test_the_content_of_the_page(page: Page) -> None:
     assert page.get_attribute("#robots a", "href") == "/?robot=001"
     page.click("#language")
     wait_for_text(page, "#verdict", "停止")
-    wait_for_text(page, "#sentence", "没有行驶请求")
+    wait_for_text(page, "#sentence", "没有行驶指令")
 
 
 def test_a_driver_holds_a_key_and_a_viewer_stops(
@@ -97,7 +91,7 @@ def test_a_driver_holds_a_key_and_a_viewer_stops(
     wait_for_standstill(stack)
     wait_for_text(page, "#verdict", "BRAKE")
     wait_for_text(phone, "#causes", "急停")
-    wait_for_text(page, "#events", "Emergency stop requested by viewer")
+    wait_for_text(page, "#events", "Emergency stop by viewer")
     page.keyboard.up("w")
     context.close()
     reset_all(page)
@@ -212,7 +206,9 @@ def test_the_server_is_lost_and_comes_back(page: Page, server: Server, stack: Ru
     wait_for_standstill(stack)
     wait_for_text(page, "#verdict", "NO CONNECTION")
     wait_for_text(page, "#sentence", "use its own switch")
-    wait_for_text(page, "#detail", "Next: t2 doctor --robot 001 --set bus.connect=")
+    wait_for_text(page, "#detail", "What you hold does not reach the robot")
+    wait_for_text(page, "#fault", "dashboard run: t2 doctor --robot 001 --set bus.connect=")
+    assert not page.is_visible("#fault p")
     page.click("#estop")
     wait_for_text(page, "#unsent", "NOT SENT YET: no connection. It is sent if")
     server.start()

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, Route
 
+from t2.messages import Cause, Phrase
 from tests.dashboard.bus_fixture import Peer
 from tests.dashboard.page import BROWSER_MARKS, take_control, text, wait_for_text
 from verification.harness.dashboard import Server, dashboard
@@ -88,7 +89,8 @@ def test_a_stop_without_a_network_is_sent_once_it_is_back(
     lonely.start()
     wait_until(lambda: peer.estops, "the emergency stop")
     peer.latched = ("estop",)
-    page.wait_for_function("() => !document.querySelector('#unsent').textContent")
+    page.wait_for_function("() => !localStorage.getItem('t2.estop.001')")  # it is confirmed
+    assert text(page, "#unsent") == ""
     page.reload()
     wait_for_text(page, "#delay-value", " s")
     assert text(page, "#unsent") == ""
@@ -233,3 +235,43 @@ def test_the_screen_stays_on_while_the_page_drives(page: Page, server: Server) -
     take_control(page)
     wait_for_text(page, "#awake", "cannot keep the screen on")
     page.wait_for_selector("#awake", state="visible")
+
+
+def take_control_as(page: Page, server: Server, name: str) -> None:
+    page.goto(server.url)
+    take_control(page)
+    page.fill("#name", name)
+    page.keyboard.press("Enter")  # the lock has the name, too
+
+
+def test_one_press_is_one_event_and_the_bar_names_its_operator(
+    page: Page, server: Server, peer: Peer
+) -> None:
+    take_control_as(page, server, "Anna")
+    page.click("#estop")
+    wait_until(lambda: peer.estops, "the emergency stop")
+    cause = Cause(name="estop", action="brake", age=0.0, text="", phrases=(Phrase("estop"),))
+    peer.latched, peer.causes = ("estop",), (cause,)
+    wait_for_text(page, "#detail", "Emergency stop by Anna.")
+    peer.wait_for_silence()  # the other way has arrived
+    mine = page.locator("#events li", has_text="Anna").all_inner_texts()
+    assert len(mine) == 1, mine
+    peer.causes = ()
+
+
+def test_another_viewer_sees_the_name_and_no_is_preselected(
+    page: Page, server: Server, browser: Browser
+) -> None:
+    take_control_as(page, server, "Anna")
+    other = browser.new_page(locale="en-GB")
+    other.goto(server.url)
+    wait_for_text(other, "#driver", "Anna")
+    other.click("#take")
+    wait_for_text(other, "#question-text", "Anna")
+    assert other.evaluate("document.activeElement.id") == "question-no"
+    other.keyboard.press("Enter")
+    wait_until(lambda: not other.is_visible("#question"), "the answer no")
+    other.wait_for_timeout(500)  # some snapshots
+    wait_for_text(other, "#driver", "Anna")
+    assert not other.locator(".is-driver").count()
+    other.close()

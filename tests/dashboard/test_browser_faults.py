@@ -158,3 +158,49 @@ def test_a_viewer_is_offered_no_stick_and_no_stop(page: Page, view_only: Server)
     page.keyboard.down("w")
     page.wait_for_timeout(500)
     assert "You drive" not in text(page, "#driver")
+
+
+TONES = """
+    window.tones = [];
+    const start = OscillatorNode.prototype.start;
+    OscillatorNode.prototype.start = function (...at) {
+        window.tones.push(this.frequency.value);
+        return start.apply(this, at);
+    };
+"""
+LATCH, READY, LOST = [440, 330], [880], [330, 330, 330]
+
+
+def test_a_stop_a_lost_connection_and_their_end_are_heard(
+    page: Page, endpoint: str, tmp_path: Path, peer: Peer
+) -> None:
+    page.add_init_script(TONES)
+
+    def heard(tones: list[int]) -> None:
+        # A stall of the host may add the tones of a lost connection.
+        page.wait_for_function("(it) => `${tones}`.includes(`${it}`)", arg=tones, timeout=20_000)
+        page.evaluate("window.tones = []")
+
+    with dashboard(endpoint, tmp_path) as server:
+        page.goto(server.url)
+        take_control(page)  # a press: the browser allows sound
+        page.wait_for_function("() => navigator.userActivation.hasBeenActive")
+        peer.latched = ("contact",)
+        heard(LATCH)
+        peer.latched = ()
+        heard(READY)
+        peer.latched = ("contact",)  # soon after the last one: the signal comes later
+        heard(LATCH)
+        page.uncheck("#sound")
+        page.wait_for_timeout(2500)
+        peer.latched = ()
+        page.wait_for_selector("#reset:not(.due)")
+        page.wait_for_timeout(500)
+        page.check("#sound")
+        assert page.evaluate("tones") == []
+    heard(LOST)
+
+
+def test_what_does_not_run_is_in_the_header(page: Page, server: Server) -> None:
+    page.goto(server.url)
+    wait_for_text(page, "#missing", "Not running: odometry, recorder")

@@ -132,9 +132,10 @@ def test_a_double_click_is_one_call_with_the_heartbeat_and_a_refusal_is_shown(
     page.click("#route-list button:has-text('hall')")
     assert page.is_disabled("#route-list button:has-text('old')")
     page.wait_for_selector("[data-round=start]:enabled")
+    assert text(page, "[data-round=start]") == "Start hall"
     page.dblclick("[data-round=start]")
     wait_for_text(page, "#toasts", "The vehicle is 7.00 m from home")
-    wait_for_text(page, "#events", "requests of patrol: start.")
+    wait_for_text(page, "#events", "Patrol, by viewer")
     page.wait_for_selector("[data-round=start]:enabled")  # the end of the lock
     assert [(it.action, it.route) for it in patrol.rounds] == [("start", "hall")]
     assert patrol.rounds[0].echo

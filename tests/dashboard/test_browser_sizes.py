@@ -16,7 +16,7 @@ from tests.dashboard.page import (
     wait_for_text,
 )
 from verification.harness.dashboard import Server, dashboard
-from verification.harness.stack import RunningStack, running_stack
+from verification.harness.stack import RunningStack
 
 pytestmark = BROWSER_MARKS
 
@@ -30,12 +30,6 @@ BOX = """where => {
 
 CUT = """[...document.querySelectorAll('.chip:not(#driver)')]
   .filter((it) => it.scrollWidth > it.clientWidth).map((it) => it.textContent)"""
-
-
-@pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningStack]:
-    with running_stack(tmp_path_factory.mktemp("stack")) as it:
-        yield it
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +139,7 @@ def test_a_driver_sees_everything(
     found |= on_all_screens(page, tmp_path, f"used-up-{language}", needed, notices=True)
     assert page.get_attribute("#reset", "title") == page.text_content("#release-forbidden")
     page.click("#estop")
-    wait_for_text(page, "#detail", "Also latched" if language == "en" else "同时锁定")
+    wait_for_text(page, "#detail", "Also to reset" if language == "en" else "还须复位")
     found |= on_all_screens(
         page, tmp_path, f"contact-{language}", (*NEEDED, "#reset"), notices=True
     )

@@ -203,7 +203,7 @@ def test_a_reset_of_an_unknown_state_is_refused(
     fleet.handle("001", "1", client.Take())
     receive(buses["001"], keys.SAFETY, safety_state(heartbeat=5))
     fleet.handle("001", "1", client.Reset(4))
-    assert sent[-1][1]["text"]["en"].startswith("Reset refused. The call echoes an unknown")
+    assert sent[-1][1]["text"]["en"].startswith("Reset refused. The call refers to an unknown")
     assert not buses["001"].call.called
     fleet.handle("001", "1", client.Reset(5))
     assert buses["001"].call.call_args.args[1].echo == 5

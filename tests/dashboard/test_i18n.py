@@ -84,20 +84,20 @@ def test_a_text_without_known_phrases_is_shown_as_its_publisher_wrote_it() -> No
             "safety",
             "contact",
             "contact",
-            ("Latched: The bumper was hit.", "已锁定：防撞条已触发。"),
+            ("Reset needed: The bumper was hit.", "须复位：防撞条已触发。"),
         ),
         ("safety", "stop", "leaving", ("Stopped: The safety", "已停车：安全服务正在关闭。")),
         (
             "safety",
             "reset_refused",
             "reset.nothing",
-            ("Reset refused. Nothing", "复位被拒绝。没有"),
+            ("Reset refused. Nothing", "复位被拒绝。当前"),
         ),
         (
             "safety",
             "release_refused",
             "next.by_hand",
-            ("Release refused. Push", "脱离请求被拒绝。请"),
+            ("Release refused. Push", "脱离操作被拒绝。请"),
         ),
     ],
 )

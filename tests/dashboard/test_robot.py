@@ -214,17 +214,17 @@ def test_a_refusal_is_reported(reset: RobotFixture) -> None:
 def test_an_event_names_who_stopped_and_who_reset(reset: RobotFixture) -> None:
     events = next(p for p in reset.bus.publishers if p.topic is keys.EVENTS)
     assert isinstance(events.last, Event)
-    assert (events.last.name, events.last.text) == ("reset_request", "Reset requested by Anna.")
+    assert (events.last.name, events.last.text) == ("reset_request", "Reset pressed by Anna.")
     for name in ("Bob", "viewer 3"):
         reset.robot.estop(name)
         assert isinstance(events.last, Event)
-        text = f"Emergency stop requested by {name}."
+        text = f"Emergency stop by {name}."
         assert (events.last.name, events.last.text, events.last.about) == (
             "estop",
             text,
             {"by": name},
         )
-    assert render(events.last.phrases, "zh") == "观看者 3 请求急停。"
+    assert render(events.last.phrases, "zh") == "观看者 3 触发了急停。"
 
 
 def test_an_event_names_the_certificate(
@@ -234,7 +234,7 @@ def test_an_event_names_the_certificate(
     events = next(p for p in fixture.bus.publishers if p.topic is keys.EVENTS)
     fixture.robot.estop("Anna")
     assert isinstance(events.last, Event)
-    assert events.last.text == "Emergency stop requested by Anna. Certificate: driver.hall."
+    assert events.last.text == "Emergency stop by Anna. Certificate: driver.hall."
 
 
 @pytest.mark.parametrize(
@@ -244,13 +244,13 @@ def test_an_event_names_the_certificate(
             client.Round(action="start", route="yard", echo=7),
             keys.ROUND,
             RoundRequest(action="start", route="yard", echo=7),
-            "Anna requests of patrol: start.",
+            "Patrol, by Anna: start.",
         ),
         (
             client.Teach(action="station", station="gate", stay=2.0, echo=7),
             keys.TEACH,
             TeachRequest(action="station", station="gate", stay=2.0, echo=7),
-            "Anna requests of patrol: mark a station.",
+            "Patrol, by Anna: mark a station.",
         ),
     ],
 )

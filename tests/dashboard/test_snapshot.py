@@ -55,7 +55,15 @@ def full() -> TelemetryCache:
 
 
 NOBODY = snapshot.DriverState(
-    None, "", HoldState.FREE, 1, None, overruled=False, may=True, may_stop=True
+    None,
+    "",
+    HoldState.FREE,
+    1,
+    in_sight=False,
+    other=None,
+    overruled=False,
+    may=True,
+    may_stop=True,
 )
 
 
@@ -140,6 +148,12 @@ def test_the_tone_of_a_sector(
     assert snapshot.tones(ultrasonic, state)[SONAR_NAMES.index("front")] == tone
 
 
+@pytest.mark.parametrize(("distance", "tone"), [(0.21, "stop"), (0.4, "slow"), (0.6, "clear")])
+def test_a_near_wall_has_its_tone_while_the_vehicle_stands(distance: float, tone: str) -> None:
+    ultrasonic = Ultrasonic(ranges=(distance,) * 8, status=("ok",) * 8)
+    assert set(snapshot.tones(ultrasonic, factories.safety_state())) == {tone}
+
+
 @pytest.mark.parametrize("name", SONAR_NAMES)
 def test_safety_names_the_sonar_in_its_phrases(name: str) -> None:
     state, index = PolicyFixture().ready().state, SONAR_NAMES.index(name)
@@ -157,10 +171,10 @@ def test_the_texts_of_safety_in_both_languages() -> None:
         )
     )
     assert view.text == Texts(
-        "The bumper was hit. web is in control.", "防撞条已触发。web 拥有控制权。"
+        "The bumper was hit. web is in control.", "防撞条已触发。由 web 控制。"
     )
     assert view.own_text == Texts(
-        "The bumper was hit. You are in control.", "防撞条已触发。您拥有控制权。"
+        "The bumper was hit. You are in control.", "防撞条已触发。由您控制。"
     )
     assert view.causes[0].text == Texts("a\\u001b", "a\\u001b")  # of a newer safety
     assert view.release_refusal == Texts("no", "no")

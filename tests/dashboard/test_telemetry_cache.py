@@ -1,5 +1,8 @@
 """Newest messages and events of a robot."""
 
+from typing import Any
+
+import pytest
 from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest
@@ -12,7 +15,7 @@ from services.dashboard.telemetry_cache import (
     TelemetryCache,
 )
 from t2 import keys
-from t2.messages import Bumper, Drive, Driver, Event, Velocity
+from t2.messages import Bumper, Cause, Drive, Driver, Event, Velocity
 from tests.factories import health, safety_state
 
 BUMPER = "tel/bridge/bumper"
@@ -119,3 +122,36 @@ def test_a_state_of_safety_is_found_by_its_heartbeat_while_it_is_new() -> None:
     assert telemetry.shown(2) == Latest(states[1], 20)
     assert telemetry.shown(STATES_MAX + 1) == Latest(states[-1], 10 * (STATES_MAX + 1))
     assert [telemetry.shown(number) for number in (0, 1, STATES_MAX + 2)] == [None] * 3
+
+
+@pytest.mark.parametrize(
+    ("host", "age_s", "by"),
+    [
+        (7, 0.5, "Bob"),  # the nearest one, although another one is as near as allowed
+        (7, 3.2, "Anna"),
+        (7, 60.0, "Eve"),
+        (7, 20.0, None),
+        (0, 0.5, "Bob"),  # of another computer, by its wall clock
+    ],
+)
+def test_who_stopped_the_robot_is_known_by_the_event_near_the_latch(
+    host: int, age_s: float, by: str | None
+) -> None:
+    cache, now_ns = TelemetryCache(), 100 * NS_PER_S
+    clock = "mono_ns" if host else "t_ns"
+    for name, ago_s in (("Eve", 61.0), ("Anna", 2.9), ("Bob", 0.5)):
+        about: Any = {"about": {"by": name}, clock: now_ns - round(ago_s * NS_PER_S)}
+        stop = Event(name="estop", level="warning", text="", host=host, **about)
+        cache.add_event("dashboard", stop)
+    cause = Cause(name="estop", action="brake", age=age_s, text="")
+    state = safety_state(causes=(cause,), latched=("estop",), host=host, **{clock: now_ns})
+    assert cache.stopped_by(state) == by
+    assert cache.stopped_by(replace(state, latched=())) is None
+
+
+def test_one_press_of_the_bumper_is_one_row() -> None:
+    telemetry = TelemetryCache()
+    contact = Event(name="contact", level="error", text="hit", host=1, mono_ns=NS_PER_S)
+    telemetry.add_event("bridge", contact)
+    telemetry.add_event("safety", replace(contact, mono_ns=NS_PER_S + 1))
+    assert [line.service.zh for line in telemetry.events] == ["桥接服务"]

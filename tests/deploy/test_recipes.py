@@ -24,7 +24,10 @@ REALTIME = "deploy/compose/realtime.yaml"
 CHAIN = {"router", "bridge", "safety"}
 OF_T2 = CHAIN | {"odom", "localization", "patrol", "recorder", "dashboard"}
 # Services with a profile.
-OPTIONAL = {"sim": "sim", "laptop": "laptop", "ros2": "ros2", "router-settings": "zenohd"}
+OPTIONAL = {
+    "sim": "sim", "laptop": "laptop", "ros2": "ros2", "camera": "camera",
+    "router-settings": "zenohd",
+}  # fmt: skip
 HOST_NETWORK = {"bridge", "sim"}
 NO_NETWORK = {"safety", "odom", "localization", "patrol", "recorder"}
 ISOLATED = (  # each container
@@ -64,7 +67,7 @@ def test_compose_gives_each_container_its_rights_only(overlays: tuple[str, ...])
     assert {name for name, text in services.items() if "cpuset: " in text} == CHAIN
     assert not [name for name in CHAIN if " cpus: " in services[name]]
     checked = {name for name, text in services.items() if "healthcheck:" in text}
-    assert checked == OF_T2 | {"ros2"}
+    assert checked == OF_T2 | {"ros2", "camera"}
     assert (ZENOHD in overlays) == ("target: zenohd" in services["router"])
     assert "T2__BUS__CONNECT: tls/192.168.201.1:7447\n" in services["laptop"]
     for name, text in services.items():

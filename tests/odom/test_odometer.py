@@ -99,7 +99,7 @@ def test_a_restart_and_slip_are_reported(odometry: Odometry) -> None:
 def test_a_pose_is_set_by_a_recent_call(odometry: Odometry) -> None:
     odometry.samples()
     fresh = {"echo": 7, "x": 10.0, "y": -5.0, "heading": 3.0}
-    assert "unknown heartbeat" in odometry.set_pose(**fresh)
+    assert "unknown state of safety" in odometry.set_pose(**fresh)
     odometry.node.fake.deliver(keys.SAFETY, safety_state(heartbeat=7))
     assert "no echo" in odometry.set_pose(x=10.0)
     assert "x 10.000 m" in odometry.set_pose(**fresh)

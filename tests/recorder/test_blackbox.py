@@ -4,12 +4,15 @@ import pytest
 
 from common.freshness import NS_PER_S
 from services.recorder.blackbox import (
+    CAMERAS_MAX,
     OVERHEAD,
     SIZE_MAX,
     SLICE,
     BlackBox,
+    PictureThinning,
     RingBuffer,
 )
+from services.recorder.reader import Reader
 from tests.recorder import samples
 from tests.recorder.files_fixture import SPAN_NS, TAIL_NS, Files, at, ns
 from tests.recorder.samples import bare
@@ -116,3 +119,30 @@ def test_close_writes_all_pending_samples_and_finish_none(files: Files) -> None:
     assert files.closed[0].name.endswith("-latch-estop-contact.mcap")
     box.write(ns(9))
     assert len(files.closed) == 2
+
+
+PICTURES = "tel/camera/front/picture"
+
+
+def test_two_pictures_a_second_are_recorded() -> None:
+    thinning = PictureThinning()
+    for path, expected in (("tel/camera/front/picture", 2), ("tel/camera/front/state", 15)):
+        kept = [n for n in range(15) if thinning.keeps(bare(path, b"", at_s=n / 15))]
+        assert len(kept) == expected
+    assert thinning.keeps(bare("tel/camera/rear/picture", b"", at_s=0.1))  # another camera
+    others = [bare(f"tel/camera/c{n}/picture", b"", at_s=1.0) for n in range(2 * CAMERAS_MAX)]
+    assert sum(map(thinning.keeps, others)) == CAMERAS_MAX - 2
+
+
+def test_a_dump_has_the_pictures_of_the_last_half_minute(files: Files) -> None:
+    box = BlackBox(files.open, files.close, 120 * NS_PER_S, TAIL_NS, SIZE_MAX)
+    for second in range(100):
+        box.add(bare(PICTURES, b"%d" % second, at_s=second))
+        box.add(at(second))
+    box.trigger(["contact"], ns(100))
+    box.close()
+    with Reader(files.closed[0]) as reader:
+        found = [each.sample for each in reader]
+    pictures = [one.payload for one in found if one.key.endswith("/picture")]
+    assert pictures == [b"%d" % second for second in range(70, 100)]
+    assert len(found) - len(pictures) == 100

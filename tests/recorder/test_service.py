@@ -29,7 +29,7 @@ from services.recorder.writer import RecordingWriter
 from t2 import codec, keys
 from t2 import messages as m
 from t2.messages import Event
-from tests.cli.inspect.tool import pretend
+from tests.cli.inspect.tool import Tool, pretend
 from tests.common.bus_fixture import BusFixture, until_received
 from tests.recorder import samples
 from verification.harness.bus import running
@@ -149,7 +149,7 @@ def test_a_latch_writes_the_black_box_and_old_recordings_make_room(
         received: list[m.Velocity] = []
         buses.bus(lambda bus: bus.subscribe(keys.VELOCITY, lambda a: received.append(a.message)))
         wait_until(lambda: len(received) > 50, "some history")
-        assert [path.name for path in tmp_path.iterdir()] == old[1:]
+        assert [path.name for path in tmp_path.glob("*.mcap")] == old[1:]
         latched.append("contact")
         wait_until(lambda: "black_box" in [each.name for each in events], "the black box")
     (path,) = tmp_path.glob("*-latch-contact.mcap")
@@ -183,10 +183,56 @@ def test_without_room_nothing_is_written(buses: BusFixture, tmp_path: Path) -> N
         wait_until(lambda: len(received) > 10, "safety's word")
         latched.append("estop")
         wait_until(lambda: "black_box_lost" in [each.name for each in events], "the second event")
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.glob("*.mcap")) == []
     (full,) = (each for each in events if each.name == "disk_full")
     assert full.level == "error"
     assert "recorder.free is 1000000" in full.text
+
+
+def test_the_shift_log_is_answered_and_survives_a_restart(
+    buses: BusFixture, tool: Tool, tmp_path: Path
+) -> None:
+    latched: list[str] = []
+    safety = pretend(buses, "safety", {keys.SAFETY: lambda: samples.state(*latched)})
+    page = buses.bus(lambda bus: None)
+    of_safety = safety.publisher(keys.EVENTS, service="safety")
+    of_page = page.publisher(keys.EVENTS, service="dashboard")
+
+    def event(name: m.EventName, phrase: m.Phrase, **about: m.Field) -> m.Event:
+        return Event(name=name, level="error", text="", phrases=(phrase,), about=about)
+
+    def texts() -> list[str]:
+        return [row["text"] for row in tool("log").lines if row["kind"] != "gap"]
+
+    log = tmp_path / f"{buses.robot}-log.jsonl"
+    with recorder(buses, tmp_path):
+        wait_until(log.exists, "the first mark")
+        of_page.put(event("estop", m.Phrase("event.estop", {"by": "Ann"}), by="Ann"))
+        of_safety.put(event("estop", m.Phrase("estop"), cause="estop"))
+        latched.append("estop")
+        wait_until(lambda: texts() == ["Emergency stop by Ann. No reset is recorded."], "the stop")
+        box = f"{buses.robot}-*-latch-estop.mcap"
+        wait_until(lambda: tool("log").lines[-1]["recording"], "the name of the black box")
+        (file,) = tmp_path.glob(box)
+        assert tool("log").lines[-1]["recording"] == file.name
+    size = log.stat().st_size
+    with recorder(buses, tmp_path):
+        wait_until(lambda: log.stat().st_size > size, "a mark after the restart")
+        of_page.put(event("reset_request", m.Phrase("event.reset_request", {"by": "Bob"})))
+        of_safety.put(event("reset", m.Phrase("reset.done")))
+        wait_until(lambda: texts() == ["Emergency stop by Ann. Reset by Bob."], "the reset")
+        (gap, stop) = tool("log").lines
+        assert (gap["kind"], stop["by"], stop["reset_by"]) == ("gap", "Ann", "Bob")
+        assert gap["end_ns"] < stop["t_ns"] < stop["end_ns"]
+        shown = tool("log", text=True).out
+    offline = tool("log", str(tmp_path), "--days", "1", text=True).out
+    assert shown.splitlines()[-1] == offline.splitlines()[-1]
+
+
+def test_t2_log_without_a_recorder_names_it(buses: BusFixture, tool: Tool) -> None:
+    result = tool("log")
+    assert result.code == 1
+    assert "recorder" in result.err
 
 
 def test_sigkill_loses_at_most_a_second(buses: BusFixture, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from services.ros2.calls import TOLERANCE_S, Calls, reset_refusal
 from services.ros2.cdr import Attachment
 from services.ros2.config import Ros2Config
 from t2.client import CONFIRM_S
-from t2.messages import Cause, ResetDone, SafetyState
+from t2.messages import Cause, Phrase, Refusal, ResetDone, SafetyState
 from tests.factories import safety_state
 
 NOW_NS = 1_700_000_000 * NS_PER_S
@@ -79,6 +79,7 @@ class Bench:
         self.ticks: list[Any] = []
         self.answers: list[Any] = []
         self.now_ns = 0
+        self.refusal: Refusal | None = None  # the answer of safety
         node: Any = SimpleNamespace(
             bus=SimpleNamespace(call=self._call, estop=lambda: None),
             config=Ros2Config(),
@@ -97,8 +98,12 @@ class Bench:
         self.now_ns += round(seconds * NS_PER_S)
         self.ticks[0](self.now_ns)
 
-    def _call(self, _: Any, request: Any, answered: Any, __: Any) -> None:
-        answered(ResetDone(text="Reset.", cleared=request.causes))
+    def _call(self, _: Any, request: Any, answered: Any, refused: Any) -> None:
+        if self.refusal:
+            refused(self.refusal)
+            return
+        phrases = (Phrase("reset.done"),)
+        answered(ResetDone(text="Let go.", phrases=phrases, cleared=request.causes))
 
 
 def test_a_reset_succeeds_when_safetys_state_shows_it() -> None:
@@ -108,7 +113,16 @@ def test_a_reset_succeeds_when_safetys_state_shows_it() -> None:
     assert bench.answers == []
     bench.newest = state()
     bench.tick(0.05)
-    assert bench.answers == [(True, "Reset.")]
+    assert bench.answers == [(True, "Reset. Stop publishing for 0.5 s, then publish again.")]
+
+
+def test_a_refused_reset_is_in_words_of_ros() -> None:
+    bench = Bench()
+    bench.refusal = Refusal(text="Let go.", phrases=(Phrase("reset.motion"),))
+    bench.reset()
+    ((success, text),) = bench.answers
+    assert not success
+    assert "stop publishing for 0.5 s" in text
 
 
 def test_a_reset_that_only_a_stranger_answers_fails() -> None:

@@ -12,9 +12,11 @@ from xml.etree import ElementTree
 import numpy
 import pytest
 import zenoh
+import zenoh.ext
 
 from common import child_process
 from common.bus.session import client_config
+from services.ros2 import names
 from services.ros2.definitions import HASHES
 from sim.requests import Bumper, Sonar
 from t2 import codec, keys
@@ -77,7 +79,7 @@ def make_ready(node: RosPeer) -> list[Any]:
     wait_until(lambda: reset(node), "a reset")
     came = node.subscribe("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
     wait_until(
-        lambda: "No source" in getattr(statuses(came).get("t2: safety"), "message", ""), "ready"
+        lambda: "No command" in getattr(statuses(came).get("t2: safety"), "message", ""), "ready"
     )
     return came
 
@@ -140,7 +142,7 @@ def test_a_localizer_of_ros_places_the_vehicle_in_the_map(
     def refused() -> bool:
         stamp = odom[-1].header.stamp
         amcl.publish(**measured(replace(stamp, sec=stamp.sec + 5), x=70.0))
-        return any("pose of amcl (clock): " in each.msg for each in log)
+        return any("(clock, pose of amcl)" in each.msg for each in log)
 
     wait_until(refused, "the refusal of a clock that is ahead")
     wait_until(lambda: "ros_fix_refused" in stack.log.read_text(), "the event")
@@ -282,10 +284,22 @@ def test_refusals_are_in_the_diagnostics_and_in_the_log(node: RosPeer, stack: Ru
 
     wait_until(refused, "the refusal")
     assert stack.speed() == 0
-    wait_until(lambda: any("(not_finite): " in each.msg for each in log), "the log of the refusal")
+    wait_until(
+        lambda: any("(not_finite, cmd_vel of " in each.msg for each in log),
+        "the log of the refusal",
+    )
     assert {(each.level, each.name) for each in log} == {(30, "t2")}
     node.commands(PLAIN)
-    wait_until(lambda: "another type" in log[-1].msg, "the log of a publisher of the other type")
+    wait_until(lambda: "(other_type, " in log[-1].msg, "the log of a publisher of the other type")
+    shown = [each.msg.encode() for each in log]
+    key = names.data_key(0, "/rosout", "rcl_interfaces/msg/Log")
+    late: list[bytes] = []
+    history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
+    with zenoh.open(client_config(at(stack.endpoint))) as session:
+        zenoh.ext.declare_advanced_subscriber(
+            session, key, lambda it: late.append(it.payload.to_bytes()), history=history
+        )
+        wait_until(lambda: all(it in b"".join(late) for it in shown), "the log of before")
 
 
 def test_a_gateway_with_other_settings(node: RosPeer, stack: RunningStack) -> None:
@@ -302,8 +316,10 @@ def test_a_gateway_with_other_settings(node: RosPeer, stack: RunningStack) -> No
                 plain.send(0.2, 0.1)
                 return any(text in each.msg for each in log)
 
-            wait_until(lambda: refused("another type"), "the log of a stamped publisher")
-            wait_until(lambda: refused("(not_zero): "), "the log of motion without a zero")
+            wait_until(lambda: refused("(other_type, "), "the log of a stamped publisher")
+            wait_until(
+                lambda: refused("(not_zero, cmd_vel of "), "the log of motion without a zero"
+            )
         finally:
             gateway.terminate()
 

@@ -1,5 +1,6 @@
 """Poses in the map as topics of ROS 2, on a fake bus."""
 
+import random
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -27,7 +28,7 @@ class Robot:
         self.sent: dict[str, list[Any]] = defaultdict(list)
         Streams(self.node, self._publisher, translate.Diagnostics())
 
-    def _publisher(self, topic: str, _: str, *, latched: bool = False) -> Any:
+    def _publisher(self, topic: str, _: str, *, kept: int = 0) -> Any:
         sent = self.sent[topic]
 
         class Publisher:
@@ -96,6 +97,24 @@ def test_a_stamp_comes_once_and_only_of_odometry_that_was_published(
     robot.pose(2)
     assert robot.transforms() == [(ODOM, 1), (MAP, 1)]
     assert len(robot.sent["map_pose"]) == 1
+
+
+def test_no_odometry_is_lost_and_faster_streams_are_thinned_by_phase(
+    robots: Callable[..., Robot],
+) -> None:
+    robot, draw = robots(), random.Random(1)
+    streams: tuple[tuple[keys.Topic[Any], m.Message, int], ...] = (
+        (keys.ODOMETRY, factories.odometry(), 25),
+        (keys.ULTRASONIC, m.Ultrasonic(ranges=(1.0,) * 8, status=("ok",) * 8), 20),
+        (keys.BUMPER, m.Bumper(pressed=False), 50),
+    )
+    for topic, message, rate in streams:
+        for number in range(20 * rate):
+            at_ns = round((number + draw.uniform(0.0, 0.4)) * 1e9 / rate)  # arrivals jitter
+            robot.node.fake.deliver(topic, message, at_ns)
+    assert len(robot.sent["odom"]) == len(robot.sent["/tf"]) == 20 * 25
+    for thinned in ("sonar_front/range", "bumper"):
+        assert len(robot.sent[thinned]) == pytest.approx(20 * 10, abs=2)
 
 
 @pytest.mark.parametrize(("settings", "frames"), [({}, [ODOM]), ({"publish_tf": False}, [])])

@@ -10,6 +10,8 @@ from common.settings import Vehicle, sonar_mounts
 from services.ros2 import translate
 from services.ros2.config import Ros2, Ros2Config
 from t2 import messages as m
+from t2.catalogue import PHRASES
+from t2.words import render
 from tests import factories
 
 T_NS = 1_700_000_000_250_000_000
@@ -132,6 +134,35 @@ def test_the_status_of_safety(verdict: str, level: int) -> None:
             ("linear limit", "1.0"), ("cause contact", "The bumper was hit."),
         ),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("causes", "level"), [(["no_request"], 0), (["no_request", "sonar"], 0), (["blocked"], 1)]
+)
+def test_a_robot_without_a_request_is_no_warning(causes: list[Any], level: int) -> None:
+    held = tuple(
+        m.Cause(name=name, action="slow" if name == "sonar" else "stop", age=1.0, text=name)
+        for name in causes
+    )
+    state = factories.safety_state(verdict="stop", causes=held)
+    assert translate.safety_status(state)[0] == level
+
+
+def test_ros_shows_a_refusal_as_a_whole() -> None:
+    shown = 128  # characters, by `ros2 topic echo`
+    fields: dict[str, m.Field] = {
+        "seconds": 12.5,
+        "frame": "base_link",
+        "map": "map",
+        "reason": "it is cut",
+    }
+    phrases = [
+        m.Phrase(name, fields) for name in PHRASES if name.startswith(("cmd_vel.", "ros_fix."))
+    ]
+    assert len(phrases) > 10
+    for phrase in phrases:
+        decision = phrase.name.partition(".")[2]
+        assert len(f"{render((phrase,))} ({decision}, cmd_vel of /teleop_twist)") <= shown, phrase
 
 
 @pytest.mark.parametrize(

@@ -44,9 +44,9 @@ def test_one_sentence_says_why() -> None:
     fixture = PolicyFixture()
     assert sentence_of(fixture.state).startswith("Waiting for the first sample of: velocity,")
     fixture.tick(40)
-    assert sentence_of(fixture.state) == "No source requests motion."
+    assert sentence_of(fixture.state) == "No command to drive."
     fixture.drive(0.5)
-    assert sentence_of(fixture.state).startswith("Waiting for a neutral request")
+    assert sentence_of(fixture.state).startswith("Let go of the controls")
     fixture.drive()
     assert sentence_of(fixture.state) == "teleop is in control."
     fixture.sonar(front=0.5)
@@ -88,7 +88,9 @@ def test_a_release_reports_its_beginning_its_first_refusal_and_its_success() -> 
 
 def test_a_repeated_emergency_stop_is_one_event() -> None:
     fixture = PolicyFixture().running()
-    assert noted(fixture, fixture.estop) == ["estop"]  # and not "No source is in control."
+    assert noted(fixture, fixture.estop) == [
+        "estop"
+    ]  # and not "No operator and no program is in control."
     first = fixture.latched()
     fixture.tick(30)
     assert noted(fixture, fixture.estop) == []
@@ -195,7 +197,11 @@ def test_the_longest_state_decodes() -> None:
         assert f"l{name[1:]}: \\u" in texts["limit_stop"]
     assert decode(encode(state), SafetyState) == state
     everything = " ".join(texts[name] for name in state.latched)
-    assert len(f"Reset, but still latched: {everything}") < max(map(len, texts.values())) < MAX_TEXT
+    assert (
+        len(f"Reset, but these need another reset: {everything}")
+        < max(map(len, texts.values()))
+        < MAX_TEXT
+    )
     longer = {**largest.sources, "one_more": Source(priority=99, lease=0.5)}
     named = {"x" * 33: LimitSource(lease=0.5, silence="latch")}
     for wrong in ({"sources": longer}, {"limits": named}):

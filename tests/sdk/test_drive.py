@@ -187,7 +187,7 @@ def test_a_latch_ends_a_drive_for_good(robot: t2.Robot) -> None:
         wait_until(lambda: not blocked(robot), "the reset")
         with pytest.raises(t2.Latched):
             drive.velocity(0.3, seconds=10)
-    with pytest.raises(t2.Refused, match="Nothing is latched"):
+    with pytest.raises(t2.Refused, match="Nothing needs a reset"):
         robot.reset()
 
 

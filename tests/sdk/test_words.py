@@ -32,7 +32,9 @@ def phrases() -> Iterator[tuple[Path, str]]:
 def test_every_text_is_complete_in_both_languages() -> None:
     for name, (english, chinese) in TEXTS.items():
         assert english, name
-        assert name in ("operator.by", "gamepad.device") or CHINESE.search(chinese), name
+        assert name in ("operator.by", "gamepad.device", "log.text") or CHINESE.search(chinese), (
+            name
+        )
         fields = [sorted(set(PLACEHOLDER.findall(text))) for text in (english, chinese)]
         assert fields[0] == fields[1], name
     for name, words in WORDS.items():
@@ -60,6 +62,13 @@ def test_a_phrase_has_its_figures_and_words() -> None:
     faults = Phrase("driver.faults", {"side": "left", "faults": ("over_current", "bit_7")})
     assert render((faults,)) == "The left motor driver reports: over current, bit 7."
     assert render((faults,), "zh") == "左侧电机驱动器报告：过流、bit 7。"
+
+
+def test_a_service_is_named_for_people_and_for_commands() -> None:
+    hangs = Phrase("doctor.services.absent", {"names": ("bridge", "odom", "mine")})
+    assert render((hangs,), "en", texts=findings.TEXTS) == "bridge, odom, mine are not running"
+    expected = "桥接服务（bridge）、里程计（odom）、mine未运行"
+    assert render((hangs,), "zh", texts=findings.TEXTS) == expected
 
 
 @pytest.mark.parametrize("phrases", [(), (Phrase("of_2030"),), (Phrase("next.reset"), Phrase("x"))])

@@ -167,7 +167,7 @@ def test_received_values_are_shown(screen: Screen) -> None:
         screen.controller.tick(0)
         await until(lambda: "Driving, slowly." in screen.text_of("safety"), "safety's words")
         assert "10.7.5.224:4002" in screen.text_of("motion")
-        assert "no router" in screen.text_of("header")
+        assert "not connected" in screen.text_of("header")
         assert "contact" in screen.text_of("events")
         assert "1.50 m" in screen.text_of("around")
         assert screen.text_of("around").count("fault") == 7
@@ -187,12 +187,12 @@ SITUATIONS: dict[str, tuple[dict[str, Any], tuple[Phrase, ...], list[str]]] = {
     "stopped": (
         {"verdict": "stop", "text": "-", "phrases": (Phrase("no_request"),)},
         (),
-        ["停止  没有行驶请求。"],
+        ["停止  没有行驶指令。"],
     ),
     "unconfirmed": (
         {"text": "-", "phrases": (Phrase("control.of", {"source": "web"}),)},
         (Phrase("event.estop_unconfirmed"), Phrase("estop.repeated", {"seconds": 27.0})),
-        ["急停未被确认：请使用车身上的急停开关。将继续发送 27 秒。", " 运行  web 拥有控制权。"],
+        ["急停未被确认：请使用车身上的急停开关。将继续发送 27 秒。", " 运行  由 web 控制。"],
     ),
     "contact": (
         {
@@ -211,7 +211,7 @@ SITUATIONS: dict[str, tuple[dict[str, Any], tuple[Phrase, ...], list[str]]] = {
             "制动  防撞条已触发。防撞条仍被压下：请先脱离，再复位。",
             "脱离碰撞  推断可脱离：后退（12 秒前前进，净 +0.43 m）",
             " F  前进    B  后退   复位前剩余 0.12 m",
-            "已锁定 碰撞 3 秒  停止 数据过旧 3 秒",
+            "须复位 碰撞 3 秒  停止 数据过旧 3 秒",
         ],
     ),
 }
@@ -240,7 +240,7 @@ def test_the_screen_in_chinese_fits_80_columns(
         screen.app.draw()
         await pilot.pause()
         assert screen.text_of("safety").strip().split("\n") == expected
-        assert "bridge    防撞条已触发：已发送制动指令。" in screen.text_of("events")
+        assert "桥接服务  防撞条已触发：已发送制动指令。" in screen.text_of("events")
         assert "主控板  等待零速指令" in screen.text_of("motion")
         assert "E 急停" in screen.text_of("hints")
         for panel in screen.app.query(Panel):

@@ -5,7 +5,7 @@ from rich.cells import cell_len
 
 from services.teleop.cells import centred, fitted, left, right, wrap
 
-NEXT = "主控板无响应：请检查其电源和线缆。下一步：`t2 doctor`"
+NEXT = "主控板无应答：请检查其电源和线缆。下一步：`t2 doctor`"
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ NEXT = "主控板无响应：请检查其电源和线缆。下一步：`t2 docto
         ("防撞条（前）", 8, 0, ["防撞条", "（前）"]),  # or ends with an opening bracket
         ("run `t2 doctor` now", 9, 0, ["run", "`t2 docto", "r` now"]),
         ("run `t2 doctor` now", 11, 0, ["run", "`t2 doctor`", "now"]),  # a command is one word
-        (NEXT, 30, 12, ["主控板无响应：请检", "查其电源和线缆。下一步：", "`t2 doctor`"]),
+        (NEXT, 30, 12, ["主控板无应答：请检", "查其电源和线缆。下一步：", "`t2 doctor`"]),
     ],
 )
 def test_wrap(text: str, columns: int, indent: int, rows: list[str]) -> None:

@@ -105,7 +105,7 @@ def test_an_estop_that_is_not_latched_is_reported(
     assert not operator.alarm.startswith(alarm)
 
 
-NOT_SENT = "EMERGENCY STOP NOT SENT YET: no router. Use the vehicle's own switch. "
+NOT_SENT = "EMERGENCY STOP NOT SENT YET: no connection. Use the vehicle's own switch. "
 LAPSED = "YOUR E-STOP WAS NOT SENT: press E again; use the vehicle's own switch."
 
 
@@ -114,7 +114,7 @@ def test_an_estop_without_a_router_is_sent_once_it_is_back(
 ) -> None:
     operator.press("e")
     operator.ticks(1)
-    alarm = f"{NOT_SENT}It is sent if the router is back within 30 s."
+    alarm = f"{NOT_SENT}It is sent if the connection returns within 30 s."
     assert operator.alarm == alarm
     operator.ticks(580)
     assert operator.alarm == alarm.replace("30", "1")
@@ -470,6 +470,7 @@ def test_events_of_others_are_shown_and_own_ones_only_once(operator: Operator) -
     contact = Event(name="contact", level="error", text="the bumper was hit", boot=5, t_ns=7)
     mine = Event(name="estop", level="info", text="mine", boot=fake.boot)
     fake.deliver(keys.EVENTS, contact, declared=everyone, service="safety")
+    fake.deliver(keys.EVENTS, contact, declared=everyone, service="bridge")  # of the same press
     fake.deliver(keys.EVENTS, mine, declared=everyone, service="teleop")
     (line,) = operator.node.event_log.lines()
     assert (line.t_ns, line.service, line.level) == (7, "safety", "error")

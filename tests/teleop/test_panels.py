@@ -28,8 +28,13 @@ MAY_MOVE = (Phrase("root.may_move"),)
 
 CONTACT = Cause(name="contact", action="brake", age=12.4, text="The bumper was hit.")
 SILENT = Cause(name="silent", action="stop", age=300.0, text="An input is too old.")
-NEXT = "To stop, use the vehicle's own switch. Next: `t2 doctor`"
-IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.")
+SWITCH = "To stop the vehicle, use its own switch."
+UNKNOWN = "It may drive by itself: this terminal does not know. Look at it, then call a technician."
+TOLD = (
+    "It is told to stop within a second, unless another program drives it. Is it on, and its "
+    "network? Then call a technician."
+)
+IDLE = Cause(name="no_request", action="stop", age=1.0, text="No command to drive.")
 
 
 # --- safety ---------------------------------------------------------------------------------
@@ -41,12 +46,18 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
         (
             {"router": "tcp/a:1"},
             2,
-            [" NO SAFETY  no state of safety arrives through tcp/a:1", NEXT],
+            [
+                f" NO SAFETY  {SWITCH} {UNKNOWN}",
+                "For the technician: no state of safety arrives through tcp/a:1. Next: `t2 doctor`",
+            ],
         ),
         (
             {"router": "tcp/a:1", "connected": False},
             2,
-            [" NO ROUTER  no answer at tcp/a:1", NEXT],
+            [
+                f" NO CONNECTION TO THE ROBOT  {SWITCH} {TOLD}",
+                "For the technician: no answer at tcp/a:1. Next: `t2 doctor`",
+            ],
         ),
         (
             {"alarm": MAY_MOVE, "safety": safety_state(text="Stands.")},
@@ -66,9 +77,17 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
             3,
             [
                 " BRAKE  No.",
-                "LATCHED The bumper was hit. 12 s",
+                "RESET NEEDED The bumper was hit. 12 s",
                 "stop An input is too old. 5 min",
             ],
+        ),
+        (
+            {
+                "safety": safety_state(text="You drive."),
+                "velocity": Velocity(linear=0.4, angular=0.0),
+            },
+            1,
+            [" RUN +0.40 m/s  You drive."],
         ),
         (  # what follows from a silent board is folded
             {
@@ -78,7 +97,7 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
             3,
             [
                 " RUN  The board is silent: check its power and cable. Next: `t2 doctor`",
-                "LATCHED The bumper was hit. 12 s",
+                "RESET NEEDED The bumper was hit. 12 s",
             ],
         ),
         (  # with few rows the causes are named in one line
@@ -87,7 +106,7 @@ IDLE = Cause(name="no_request", action="stop", age=1.0, text="No source requests
                 "link": link(),
             },
             2,
-            [" RUN  Driving.", "LATCHED contact 12 s  stop silent 5 min"],
+            [" RUN  Driving.", "RESET NEEDED contact 12 s  stop old data 5 min"],
         ),
     ],
 )
@@ -103,7 +122,7 @@ def test_alarm_and_verdict_are_wrapped() -> None:
         "use its own switch.",
         " BRAKE  It is still pressed:",
         "move off first, then reset.",
-        "LATCHED The bumper was hit. 12 s",
+        "RESET NEEDED The bumper was hit. 12 s",
     ]
 
 
@@ -137,7 +156,7 @@ def test_a_contact_says_which_way_is_believed_free_and_from_what() -> None:
         " BRAKE  The bumper is pressed.",
         "RELEASE  believed free: BACKWARD (moved forward, 12 s ago; net +0.43 m)",
         " F  forward    B  backward   0.12 m left until reset",
-        "LATCHED The bumper was hit. 12 s",
+        "RESET NEEDED The bumper was hit. 12 s",
     ]
 
 

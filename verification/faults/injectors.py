@@ -332,7 +332,7 @@ def repeated_estop(fixture: StackFixture, seconds: float) -> None:
 @injector
 def publish(fixture: StackFixture, payload: bytes) -> None:
     """Publish a payload once on every subscribed key except the E-STOP key, and with every call."""
-    names = {"source": "teleop", "service": "safety", "side": "left"}
+    names = {"source": "teleop", "service": "safety", "side": "left", "camera": "front"}
     bus = fixture.client.bus
     for topic in keys.TOPICS:
         bus.put(

@@ -27,7 +27,8 @@ HOSTILE: tuple[Any, ...] = (
     "", "run", "\x00", "近" * 40, b"", b"\xff", [], {}, [None] * 9, {"": {}}, {1: 2},
     msgpack.ExtType(5, b"x"), msgpack.Timestamp(1, 2), [[[[[]]]]],
 )  # fmt: skip
-PLAIN = {inspect.StrType: "近", inspect.IntType: 5, inspect.FloatType: 0.5, inspect.BoolType: True}
+PLAIN = {inspect.StrType: "近", inspect.IntType: 5, inspect.FloatType: 0.5, inspect.BoolType: True,
+         inspect.BytesType: b"x"}  # fmt: skip
 SETS = (
     "board.port=4002",
     "board.listen_ports=4002, 4001",
@@ -83,7 +84,7 @@ def _environ() -> Iterator[bytes]:
 
 def example(kind: inspect.Type) -> Any:
     """Return a valid value of a type, with every field and the fewest items of each list."""
-    made: Any = PLAIN.get(type(kind))
+    made: Any = _plain(kind)
     match kind:
         case inspect.StructType():
             made = {field.encode_name: example(field.type) for field in kind.fields}
@@ -98,6 +99,15 @@ def example(kind: inspect.Type) -> Any:
         case inspect.DictType():
             made = {example(kind.key_type): example(kind.value_type)}
     return made
+
+
+def _plain(kind: inspect.Type) -> Any:
+    """Return a valid value of a type without parts; None of another one."""
+    if isinstance(kind, inspect.StrType) and kind.pattern:
+        return "a"
+    if isinstance(kind, inspect.IntType) and kind.ge:
+        return kind.ge
+    return PLAIN.get(type(kind))
 
 
 def mutated(known: Sequence[bytes], random: Random) -> bytes:

@@ -14,7 +14,7 @@ import msgspec
 
 from cli.demo import host_stalls
 from cli.demo.score import Trace, read
-from cli.run.up import commands
+from cli.run.up import camera, commands
 from cli.settings import Everything
 from common import clock
 from common.cli_args import source_words
@@ -135,6 +135,7 @@ def running_stack(
     board: Callable[[Everything], list[str]] | None = None,
     sim_sets: Sequence[str] = (),
     beside: Callable[[Everything], Mapping[str, list[str]]] | None = None,
+    with_camera: bool = False,
 ) -> Iterator[RunningStack]:
     """Run the stack; on a host with scheduling stalls its time limits are relaxed.
 
@@ -143,7 +144,8 @@ def running_stack(
     simulator alone. ``listen`` is where the router listens, the endpoint of the services first;
     ``log`` is a file in the folder. ``route`` returns the command of another router, zenohd, for
     these settings, ``board`` that of another board, without the file of the trace. ``beside``
-    returns the commands of further processes, which are not waited for.
+    returns the commands of further processes, which are not waited for. ``with_camera`` adds a
+    simulated camera.
     """
     control = free_port(socket.SOCK_DGRAM)
     sets = _all_settings(sets, shipped, listen, control)
@@ -151,6 +153,7 @@ def running_stack(
     files = [file for file in (folder / SETTINGS_FILE,) if file.exists()]
     options = Namespace(config=files, sets=[*sets, f"sim.world={world}"])
     started = commands(source_words(options), profiles)
+    started |= camera(options, config, started) if with_camera else {}
     made = {name: list(command) for name, command in started.items()}
     if route:
         made["router"] = route(sets)

@@ -27,7 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     with get_context("spawn").Pool(initializer=prepare_worker) as pool:
         for each in pool.imap_unordered(measure, range(options.seed, options.seed + options.runs)):
             results.append(each)
-            for text in (*each.broken, *each.unexpected):
+            left = each.deviation > each.corridor
+            outside = f"{each.deviation:.2f} m off, corridor {each.corridor:.2f} m: {each.claims}"
+            for text in (*each.broken, *each.unexpected, *((outside,) if left else ())):
                 print(f"{each.seed}: {text}", flush=True)
     print_totals(results)
     return int(any(each.broken for each in results))

@@ -96,9 +96,10 @@ class Attendant:
             self._is_placed = False
         elif self._counts("refused"):
             answer = self._robot.act("resume")
-            if answer.done and self._counts("resume"):
+            if answer.done:
                 self._judge.resumed()
                 self._left["refused"] = REFUSALS
                 self.actions.append(f"resumed after: {why}")
-            elif not answer.done:
+                self._counts("resume")
+            else:
                 self.actions.append(f"refused after {why}: {answer.text}")

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
+import av
+
 from verification.harness.ports import udp_ports
 from verification.harness.waiting import wait_until
 from verification.system import frame
@@ -19,7 +21,8 @@ from verification.system.frame import ROOT, Container, Vehicle, attempt, run
 
 OVERLAYS = ("compose.yaml", "deploy/compose/tls.yaml")
 CHAIN = ("router", "bridge", "safety")
-HEALTHY = (*CHAIN, "odom", "localization", "patrol", "recorder", "dashboard")  # have a health check
+# They have a health check.
+HEALTHY = (*CHAIN, "odom", "localization", "patrol", "recorder", "dashboard", "camera")
 SERVICES = (*HEALTHY, "sim")
 USER, ROBOT_MB = 10001, 120.0
 TOOLS = ("sh", "bash", "busybox", "apt", "dpkg", "pip", "perl")
@@ -42,19 +45,25 @@ class Stack:
             f'[sim]\nworld = "empty"\ncontrol_port = {self.control_port}\n',
             encoding="utf-8",
         )
-        # There is no other host to connect from.
-        laptop.write_text('{"services": {"laptop": {"networks": ["site"]}}}', encoding="utf-8")
+        video = folder / "video.avi"
+        write_video(video)
+        overlay = {
+            "laptop": {"networks": ["site"]},  # there is no other host to connect from
+            "camera": {"volumes": [f"{video}:/video.avi:ro"]},
+        }
+        laptop.write_text(json.dumps({"services": overlay}), encoding="utf-8")
         self.files = [ROOT / name for name in OVERLAYS] + [laptop]
         self.variables = {
             "T2_BASE": base, "T2_TAG": self.name, "T2_CONFIG": str(settings),
             "T2_KEYS": f"{self.keys}/robot.001", "T2_DASHBOARD_PORT": "0",
-            "T2_ROUTER_ADDRESS": "127.0.0.1", "T2_ROUTER_PORT": "0",
+            "T2_ROUTER_ADDRESS": "127.0.0.1", "T2_ROUTER_PORT": "0", "T2_CAMERA": "/video.avi",
         }  # fmt: skip
 
     def compose(self, *words: str, **environ: str) -> str:
         """Run a command of Compose."""
         files = [f"--file={file}" for file in self.files]
-        options = (f"--project-name={self.name}", *files, "--profile=sim", "--profile=laptop")
+        profiles = [f"--profile={name}" for name in ("sim", "laptop", "camera")]
+        options = (f"--project-name={self.name}", *files, *profiles)
         return run(*compose(), *options, *words, **self.variables | environ)
 
     def __getitem__(self, service: str) -> Container:
@@ -128,6 +137,16 @@ def issue_keys(folder: Path) -> None:
         each.chmod(0o711)
 
 
+def write_video(file: Path) -> None:
+    """Write a second of grey pictures."""
+    with av.open(file, "w", format="avi") as container:
+        stream = container.add_stream("mjpeg", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 320, 180, "yuvj420p"
+        for _ in range(10):
+            container.mux(stream.encode(av.VideoFrame(320, 180, "yuvj420p")))
+        container.mux(stream.encode())
+
+
 # --- the checks -----------------------------------------------------------------------------------
 
 
@@ -163,6 +182,14 @@ def laptop_connects(stack: Stack) -> str:
     return "over TLS; the dashboard requires its token"
 
 
+def camera_publishes(stack: Stack) -> str:
+    """Receive a picture from the camera's container."""
+    words = ("echo", "tel/camera/front/picture", "--once", "--json", "--config")
+    picture = json.loads(stack["camera"].run("t2", *words, "/etc/t2/robot.toml"))
+    assert picture["message"]["width"] == 320
+    return "pictures of a file"
+
+
 def restart_when_killed(stack: Stack) -> str:
     """Kill all processes of a container: the vehicle stops, only that container is restarted."""
     seen = []
@@ -181,4 +208,6 @@ def restart_when_killed(stack: Stack) -> str:
     return f"{'; '.join(seen)}; drives again"
 
 
-CHECKS = drives_and_records, image_is_minimal, laptop_connects, restart_when_killed
+CHECKS = (
+    drives_and_records, image_is_minimal, laptop_connects, camera_publishes, restart_when_killed,
+)  # fmt: skip

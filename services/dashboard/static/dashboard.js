@@ -1,4 +1,6 @@
 // The page: WebSocket, messages from the server, commands, and language.
+import * as alarm from "./alarm.js";
+import * as camera from "./camera.js";
 import * as charts from "./charts.js";
 import * as delay from "./delay.js";
 import * as driving from "./driving.js";
@@ -9,6 +11,7 @@ import * as panels from "./panels.js";
 import * as patrol from "./patrol.js";
 import * as sonarView from "./sonar_view.js";
 import * as stateBar from "./state_bar.js";
+import { store, stored } from "./storage.js";
 import * as trail from "./trail.js";
 import * as wakeLock from "./wake_lock.js";
 
@@ -16,22 +19,11 @@ const { toast, confirm } = notices;
 
 const LOST_MS = 1000; // without a snapshot
 const RETRY_MS = 700;
+const ALARM_MS = 200;
+const EXPECTED = ["odom", "recorder"]; // services whose absence nothing else shows
 const CONGESTED = 2048; // bytes that wait in the browser
 const $ = (id) => document.getElementById(id);
 const estop = window.T2Estop;
-// A browser may forbid storage: then a reload forgets.
-const stored = (item, otherwise, from = "localStorage") => {
-  try {
-    return window[from].getItem(`t2.${item}`) ?? otherwise;
-  } catch {
-    return otherwise;
-  }
-};
-const store = (item, value, to = "localStorage") => {
-  try {
-    window[to].setItem(`t2.${item}`, value);
-  } catch { /* it is forbidden */ }
-};
 
 let socket = null;
 let fast = null; // the newest snapshots
@@ -46,12 +38,16 @@ let drawn; // the drawn snapshot; null without a connection
 const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
 const name = () => $("name").value.trim();
+// An emergency stop goes two ways: with one name it is one event.
+const who = () => name() || (hello ? `viewer ${hello.id}` : "");
+const take = (force) => send({ k: "take", force, name: name() });
 const off = () => lost() || !fast.connected;
 const cut = () => !lost() && !fast.connected; // the dashboard is there, without a router
 const { robot, router, doctor } = $("page").dataset;
 // The heartbeat of safety in a snapshot: its age is the age of what the operator saw.
 const echoOf = (snapshot) => snapshot?.safety?.heartbeat ?? 0;
 // A hold is sent only while the socket is not congested: a burst of old answers is useless.
+const alarmed = () => hello && alarm.update(newest(), performance.now());
 const send = (message) => {
   const open = socket?.readyState === WebSocket.OPEN
     && (message.k !== "hold" || socket.bufferedAmount < CONGESTED);
@@ -62,7 +58,8 @@ const send = (message) => {
 function connect() {
   const address = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live?robot=${robot}`;
   const opened = (socket = new WebSocket(address));
-  opened.onmessage = (event) => handle(JSON.parse(event.data));
+  opened.binaryType = "arraybuffer"; // the pictures
+  opened.onmessage = ({ data }) => (typeof data === "string" ? handle(JSON.parse(data)) : camera.receive(data));
   opened.onclose = () => {
     if (opened !== socket) return;
     driving.letGo();
@@ -86,9 +83,11 @@ const HANDLERS = {
     hello = message;
     delay.begin();
     patrol.forget();
+    camera.forget();
     events = [];
     sonarView.build(message.vehicle);
     trail.size(message.vehicle);
+    trail.lay(message.floor_plan);
   },
   fast(message) {
     if (!hello) return;
@@ -98,8 +97,9 @@ const HANDLERS = {
       const at = delay.ask(fastAt);
       if (at !== null) send({ k: "alive", echo: echoOf(fast), at });
     }
-    driving.answer(echoOf(fast), isDriver(), message.driver.hold, message.safety);
+    driving.answer(camera.echo(echoOf(fast)), isDriver(), message.driver.hold, message.safety);
     estop.update(message.safety);
+    alarmed();
     charts.add(message, fastAt);
     trail.add(message);
   },
@@ -109,6 +109,7 @@ const HANDLERS = {
     panels.showSlow(message);
     trail.locate(message.map);
     patrol.show(message.patrol);
+    camera.list(message.cameras);
     showRobots();
   },
   events(message) {
@@ -119,7 +120,7 @@ const HANDLERS = {
   route: (message) => patrol.route(message),
   notice: (message) => toast(message.text, message.level),
   taken: () => confirm("take_over", t("take_over_from", stateBar.driverName(fast)),
-    () => send({ k: "take", force: true, name: name() })),
+    () => take(true)),
 };
 const handle = (message) => HANDLERS[message.k]?.(message);
 
@@ -132,10 +133,13 @@ const newest = () => (lost() ? null : fast);
 const view = () => ({
   fast: newest(), robot, router, doctor, isDriver: isDriver(), viewer: hello?.id,
   ...delayNow(), keepsAlive: !!hello?.keepalive, viewers: slow?.viewers ?? 0,
+  withoutEffect: isDriver() ? driving.withoutEffect(fast.driver) : "",
+  missing: slow ? EXPECTED.filter((name) => !slow.instances[name]) : [],
 });
 
 function draw() {
   requestAnimationFrame(draw);
+  camera.show(isDriver() && !off(), newest()?.driver);
   if (newest() === drawn) return;
   drawn = newest();
   document.body.classList.toggle("stale", off());
@@ -200,20 +204,15 @@ function showRobot() {
   showChange = () => { $("robot-changed-text").textContent = t("robot_changed", robot, before); };
 }
 
-function showCamera(url) {
-  if (!url) return;
-  const [image, note] = $("camera").querySelectorAll("img, p");
-  $("camera").hidden = false;
-  image.onerror = () => { image.hidden = true; note.hidden = false; };
-  image.src = url;
-}
-
 function begin() {
   i18n.begin(stored("language", ""));
   const on = (id, call) => { $(id).onclick = call; };
   $("name").value = stored("name", "");
-  $("name").onchange = () => store("name", name());
-  on("take", () => send({ k: "take", force: false, name: name() }));
+  $("name").onchange = () => {
+    store("name", name());
+    if (isDriver()) take(false);
+  };
+  on("take", () => take(false));
   on("leave", () => { driving.letGo(); send({ k: "leave" }); });
   on("reset", reset);
   $("language").onclick = () => {
@@ -221,10 +220,12 @@ function begin() {
     showTexts();
   };
   notices.begin();
-  driving.begin({ send, reset, toast, isStopKeystroke: estop.isKeystroke, delay: delayNow, gears: () => hello?.gears ?? [] });
+  alarm.begin($("sound"), stored("sound", "on"), (value) => store("sound", value));
+  setInterval(alarmed, ALARM_MS);
+  driving.begin({ send, reset, toast, isStopKeystroke: estop.isKeystroke, delay: delayNow, picture: camera.refusal, gears: () => hello?.gears ?? [] });
   const stopToast = (text) => toast(text, text === "estop_asked" ? "warning" : "error");
-  estop.begin({ send, off, cut, toast: stopToast, name, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
-  showCamera($("page").dataset.camera.split("{robot}").join(robot));
+  estop.begin({ send, off, cut, toast: stopToast, name: who, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
+  camera.begin({ send, delay: delayNow, setSight: (value) => send({ k: "sight", in_sight: value, name: name() }) });
   trail.begin();
   patrol.begin({ send, toast, confirm, name, echo: () => echoOf(drawn), draw: trail.follow });
   showRobot();

@@ -1,6 +1,6 @@
 // Input of the driver: stick, keystrokes, gamepad, release. Only held controls drive. Every loss of
 // input lets go of them: blur, another tab, a lost socket, a lost touch, a lost gamepad. A hold is sent only
-// as the answer to a snapshot, with its heartbeat of safety, which bounds the age of the hold.
+// as the answer to a snapshot, with the heartbeat of safety that it answers (camera.js), which bounds its age.
 import * as gamepads from "./gamepad.js";
 import { joined, t } from "./i18n.js";
 import { duration } from "./panels.js";
@@ -120,12 +120,23 @@ function holdText(isDriver, driver) {
   if (isDriver && driver.overruled) return t("hold.overruled");
   if (refused) return t(refused.reason);
   if (!isDriver) return "";
-  const { delay, limit } = page.delay();
-  const isSlow = driver.hold !== "held" && (isHeld || driver.hold === "lapsed") && delay > limit;
-  if (isSlow) return t("hold.slow", delay.toFixed(2), limit.toFixed(2));
+  const late = lateText(driver);
+  if (late) return late;
   if (pad.state) return t(`hold.${pad.state}`);
   return t(driver.hold === "free" && isHeld ? "hold.waiting" : `hold.${driver.hold}`);
 }
+
+// Why a hold is too late for the robot, by the picture or by the link; empty if it is not.
+function lateText(driver) {
+  const noPicture = page.picture();
+  if (noPicture) return noPicture;
+  const { delay, limit } = page.delay();
+  const isSlow = driver.hold !== "held" && (isHeld || driver.hold === "lapsed") && delay > limit;
+  return isSlow ? t("hold.slow", delay.toFixed(2), limit.toFixed(2)) : "";
+}
+
+/** Return why what the driver holds moves nothing; empty if nothing is held, or if it is not known. */
+export const withoutEffect = (driver) => (isHeld && driver.hold !== "held" ? lateText(driver) : "");
 
 // Why safety refuses a release in this direction now, as the name of a text; empty if it does not.
 function refusal(direction) {

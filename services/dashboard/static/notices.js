@@ -39,11 +39,12 @@ export function place() {
   });
 }
 
-// Not modal: the emergency stop must remain one tap away.
+// Not modal: the emergency stop must remain one tap away. Enter says no.
 export function confirm(title, text, yes) {
   $("question-title").textContent = t(title);
   $("question-text").textContent = text;
   $("question").setAttribute("open", ""); // as show() of newer browsers
   $("question-yes").onclick = () => { $("question").removeAttribute("open"); yes(); };
   $("question-no").onclick = () => $("question").removeAttribute("open");
+  $("question-no").focus();
 }

@@ -121,7 +121,7 @@ export function showEvents(events) {
   const lines = [...events].reverse().map((it) => {
     const line = create("li", "", { "data-level": it.level, "data-name": it.name });
     const clock = new Date(it.t * 1000).toLocaleTimeString([], { hour12: false });
-    line.append(create("time", clock), create("span", it.service), create("b", t(it.text)));
+    line.append(create("time", clock), create("span", t(it.service)), create("b", t(it.text)));
     return line;
   });
   $("events").replaceChildren(...(lines.length ? lines : [create("li", t("no_events"))]));

@@ -119,6 +119,8 @@ const clock = (seconds) => new Date(seconds * 1000).toLocaleString(language, {
 function showRoutes() {
   $("routes").hidden = !has("start");
   const shown = shownRoute();
+  write("round-start", t("round_start", shown));
+  if (!shown) $("round-start").hidden = true;
   fill($("route-list"), JSON.stringify([routes, shown, language]), () => {
     if (!routes.length) return [create("p", t("no_routes"), { class: "hint" })];
     return routes.map((it) => routeButton(it, it.name === shown));
@@ -172,10 +174,8 @@ const TEACH = {
 // --- calls ----------------------------------------------------------------------------------
 
 function act(action) {
-  if (action === "start") {
-    if (shownRoute()) call({ k: "round", action, route: shownRoute() });
-    else page.toast("no_routes", "warning");
-  } else if (action === "abort") {
+  if (action === "start") call({ k: "round", action, route: shownRoute() });
+  else if (action === "abort") {
     page.confirm("round_abort", t("round_abort_text"), () => call({ k: "round", action }));
   } else call({ k: "round", action });
 }

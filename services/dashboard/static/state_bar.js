@@ -6,7 +6,7 @@ const TONES = { run: "clear", slow: "slow", stop: "stop", brake: "stop", inhibit
 // Verdicts of the page, not of safety, with their sentences.
 const WITHOUT_STATE = { lost: "no_dashboard", none: "root.safety", no_router: "root.router" };
 const MOVING = ["run", "slow"];
-const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
+export const QUIET = ["no_request", "neutral"]; // causes of a parked vehicle
 const $ = (id) => document.getElementById(id);
 
 /** Show a view of `dashboard.js`; its `fast` is the newest snapshot, null without a connection. */
@@ -29,7 +29,9 @@ function showState(view) {
   const known = !(verdict in WITHOUT_STATE);
   const reason = known ? sentence(view) : joined([t("own_switch"), t(WITHOUT_STATE[verdict])]);
   set("sentence", reason);
-  set("detail", known ? detail(view, worst) : whatNext(view, verdict));
+  set("detail", known ? detail(view, worst) : t(`fault.${verdict}`));
+  $("fault").hidden = known;
+  if (!known) setText($("fault").lastElementChild, whatNext(view, verdict));
   set("speed", !fast?.measured ? "–" : fast.measured[0].toFixed(2));
   set("turn", !fast?.measured ? "–" : fast.measured[1].toFixed(2));
 }
@@ -37,16 +39,17 @@ function showState(view) {
 // Which address does not answer, and the command that finds out why.
 function whatNext({ fast, router, doctor }, verdict) {
   const address = fast ? router : location.host;
-  return `${t(verdict === "none" ? "router_at" : "no_answer_at", address)} · ${t("next_step", doctor)}`;
+  return joined([t(verdict === "none" ? "router_at" : "no_answer_at", address), t("next_step_at", doctor)]);
 }
 
-// The first missing part, the other latched causes, and what to do.
+// The first missing part, who stopped the robot, the other latched causes, and what to do.
 function detail({ fast, isDriver, doctor }, worst) {
   const { safety } = fast;
   const root = rootText(fast);
   const others = safety.causes.filter((it) => (root || it !== worst) && safety.latched.includes(it.name));
   return joined([
     root,
+    safety.stopped_by ? t(safety.stopped_by) : "",
     others.length ? t("also_latched", joined(others.map((it) => t(it.text)))) : "",
     safety.latched.length && !isDriver && fast.driver.may ? t("take_to_reset") : "",
     root ? t("next_step", doctor) : "",
@@ -69,8 +72,9 @@ const RESET_REFUSALS = { "": "reset.nothing", release: "next.move_off", by_hand:
 /** Return why safety would refuse a reset, as the name of a text; empty if it does not. */
 export const resetRefusal = (fast) => (fast?.connected ? RESET_REFUSALS[nextStep(fast)] ?? "" : "call.not_connected");
 
-function sentence({ fast, isDriver }) {
+function sentence({ fast, isDriver, withoutEffect }) {
   if (rootText(fast)) return t("root.may_move");
+  if (withoutEffect && QUIET.includes(fast.safety.causes[0]?.name)) return withoutEffect;
   return t(isDriver && !fast.driver.other ? fast.safety.own_text : fast.safety.text);
 }
 
@@ -85,6 +89,8 @@ function showHead(view) {
   $("delay").dataset.tone = delay > limit ? "late" : "";
   const keeper = off || !keepsAlive ? "" : fast.keeper === viewer ? "keeps_alive" : "keeps_not_alive";
   chip("keeper", keeper && t(keeper), keeper === "keeps_alive" ? "clear" : "slow");
+  const missing = view.missing.map((name) => t(`missing_${name}`)).join(", ");
+  chip("missing", off || !fast.safety || !missing ? "" : t("missing", missing));
   chip("watching", off || !view.viewers ? "" : t("watching", view.viewers));
 }
 
@@ -108,7 +114,8 @@ function chip(id, text, tone = "") {
   $(id).dataset.tone = tone;
 }
 
-function set(id, text) {
-  const element = $(id);
+const set = (id, text) => setText($(id), text);
+
+function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }

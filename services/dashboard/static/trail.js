@@ -1,4 +1,5 @@
-// The trajectory on a grid, in odom: x to the right, y up, metres; and a route, which is in the map.
+// The trajectory on a grid, in odom: x to the right, y up, metres; and what is in the map: a route, and the
+// floor plan.
 import { fitted } from "./charts.js";
 
 const SPACING = 0.05; // m between two stored points
@@ -11,6 +12,7 @@ let center = [0, 0];
 let epoch = null;
 let pose = null;
 let route = null; // of patrol
+let plan = null; // { image, toMap, stamp }: the floor plan, and what turns its pixels into metres of the map
 let frame = null; // of odom in the map: x, y, heading; null while the vehicle is not placed
 let uncertainty = null; // of the pose in the map: half axes, m, and the direction of the first, rad
 
@@ -22,6 +24,24 @@ export const locate = (map) => {
 };
 
 export const follow = (given) => { route = given; };
+
+/** Load the floor plan, by two of its points: pixels from the top left, and x and y in the map. */
+export function lay(points) {
+  const stamp = JSON.stringify(points);
+  if (plan?.stamp === stamp) return;
+  plan = null;
+  if (!points[0].length) return;
+  // Complex numbers: metres = first + factor * pixels, where v counts upwards.
+  const [[u0, v0, x0, y0], [u1, v1, x1, y1]] = points;
+  const [du, dv, dx, dy] = [u1 - u0, v0 - v1, x1 - x0, y1 - y0];
+  const length = du * du + dv * dv;
+  const [re, im] = [(dx * du + dy * dv) / length, (dy * du - dx * dv) / length];
+  const toMap = ([u, v]) => [
+    x0 + re * (u - u0) - im * (v0 - v), y0 + im * (u - u0) + re * (v0 - v),
+  ];
+  plan = { image: new Image(), toMap, stamp };
+  plan.image.src = "/floor-plan";
+}
 
 export function add(snapshot) {
   if (!snapshot.pose) return;
@@ -41,6 +61,7 @@ export function draw(given) {
   const css = getComputedStyle(document.documentElement);
   const color = (name) => css.getPropertyValue(`--${name}`);
   const screen = ([x, y]) => [width / 2 + (x - center[0]) * scale, height / 2 - (y - center[1]) * scale];
+  if (plan?.image.naturalWidth && frame) floor(pen, screen);
   grid(pen, width, height, screen, color);
   if (route && frame) corridor(pen, screen, color);
   pen.strokeStyle = color("measured");
@@ -60,6 +81,17 @@ function inOdom([x, y]) {
   const [dx, dy] = [x - frame[0], y - frame[1]];
   const [cos, sin] = [Math.cos(frame[2]), Math.sin(frame[2])];
   return [cos * dx + sin * dy, cos * dy - sin * dx];
+}
+
+/** Draw the floor plan, by where its corners are on the screen. */
+function floor(pen, screen) {
+  const { naturalWidth: w, naturalHeight: h } = plan.image;
+  const [[x, y], [right, rightY], [low, lowY]] = [[0, 0], [w, 0], [0, h]].map((it) => screen(inOdom(plan.toMap(it))));
+  pen.save();
+  pen.globalAlpha = 0.5;
+  pen.transform((right - x) / w, (rightY - y) / w, (low - x) / h, (lowY - y) / h, x, y);
+  pen.drawImage(plan.image, 0, 0);
+  pen.restore();
 }
 
 /** Draw the line of the route on a band, its corridor. */

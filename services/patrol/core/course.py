@@ -28,7 +28,14 @@ from msgspec import Struct
 from common.freshness import NS_PER_S
 from common.pose import Pose
 from services.patrol.core.diary import Diary
-from services.patrol.core.inputs import Inputs, has_changed, is_known, located_of, lost
+from services.patrol.core.inputs import (
+    SILENT_S,
+    Inputs,
+    has_changed,
+    is_known,
+    located_of,
+    lost,
+)
 from services.patrol.core.track import Fit
 from services.patrol.core.way import Stop, Way
 from t2 import messages as m
@@ -39,7 +46,6 @@ from t2.motion import Path
 SOURCE = "patrol"  # in ``safety.sources``
 TICK_S = 0.05
 FRESH_S = 0.5  # of safety's state and the pose: older, and zero is requested
-SILENT_S = 2.0  # of these, and of this program: stopped
 OTHER_S = 0.5  # that another source drives
 UNHEARD_S = 3.0  # that requests have no effect
 BLOCKED_S, FREE_S = 0.5, 1.0  # until a stop counts as waiting, and as over
@@ -485,6 +491,9 @@ class Course:
         gap_s = (now_ns - (self._ticked_ns or now_ns)) / NS_PER_S
         return Phrase("patrol.held_up", {"seconds": gap_s}) if gap_s > SILENT_S else None
 
+    def _twice(self, now_ns: int) -> Phrase | None:
+        return self._inputs.twice(now_ns)
+
     def _silent(self, now_ns: int) -> Phrase | None:
         safety, pose = self._inputs.safety, self._inputs.pose
         if safety is None or safety.age_s(now_ns) > SILENT_S:
@@ -556,6 +565,7 @@ class Rule(NamedTuple):
 
 RULES = (
     Rule("stopped", Course._held_up),
+    Rule("stopped", Course._twice),
     Rule("stopped", Course._silent),
     Rule("stopped", Course._restarted),
     Rule("stopped", Course._latched_or_lost),

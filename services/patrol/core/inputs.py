@@ -4,11 +4,12 @@ import math
 
 from msgspec import Struct
 
-from common.freshness import Latest
+from common.freshness import NS_PER_S, Latest
 from common.pose import Covariance, Pose
 from t2 import messages as m
 from t2.messages import Phrase
 
+SILENT_S = 2.0  # of a program: it does not run any more
 CHANGED_M, CHANGED_RAD = 0.1, 0.1  # of a pose
 
 
@@ -17,6 +18,12 @@ class Inputs(Struct):
 
     safety: Latest[m.SafetyState] | None = None
     pose: Latest[m.MapPose] | None = None
+    other_ns: int | None = None  # when another patrol service published its state
+
+    def twice(self, now_ns: int) -> Phrase | None:
+        """Return the reason while another patrol service runs for this robot."""
+        is_alive = self.other_ns is not None and now_ns - self.other_ns <= SILENT_S * NS_PER_S
+        return Phrase("patrol.twice") if is_alive else None
 
 
 def has_changed(before: Pose, now: Pose) -> bool:

@@ -15,6 +15,7 @@ from t2.messages import Phrase, Phrases
 from t2.words import render
 
 STATIONS = 128  # that the state lists
+STOPPING = {"pause", "abort"}  # actions that are done however late, and beside another service
 SPEED = 0.5  # m/s, of a new route; its file has it
 
 
@@ -48,6 +49,10 @@ class Patrol:
             if teaching.phrases:
                 self.notes.append(Note("teaching", "warning", teaching.phrases))
 
+    def on_other(self, now_ns: int) -> None:
+        """Note that another patrol service runs for this robot."""
+        self._inputs.other_ns = now_ns
+
     def tick(self, now_ns: int, wall_ns: int) -> m.Drive | None:
         """Return the request of this tick, or None."""
         if self.course is None:
@@ -67,7 +72,7 @@ class Patrol:
         self, route: m.Route, round_id: str, schedule: str, now_ns: int, wall_ns: int
     ) -> Phrase | None:
         """Start a round on a route that has no problem."""
-        if reason := self._start_refusal(route):
+        if reason := self._inputs.twice(now_ns) or self._start_refusal(route):
             return reason
         record = m.Round(
             id=round_id, route=route.name, robot=self._robot, schedule=schedule, start_ns=wall_ns
@@ -84,6 +89,8 @@ class Patrol:
     def act(self, action: m.RoundAction, now_ns: int, wall_ns: int) -> Phrase | None:
         """Act on the round; "start" is another call."""
         course = self.course
+        if action not in STOPPING and (reason := self._inputs.twice(now_ns)):
+            return reason  # the other service answers the call, too
         if course is None or action not in course.actions:
             return self._not_now(action)
         # A restored round may be in a folder that was copied from another robot.
@@ -156,6 +163,8 @@ class Patrol:
 
     def begin(self, name: str, home: str, stay: float, now_ns: int) -> Phrases:
         """Begin to teach a route where the vehicle is; raise ``Refused``."""
+        if reason := self._inputs.twice(now_ns):
+            raise Refused(reason)
         if self.is_open and self.course is not None:
             raise Refused(Phrase("patrol.busy", {"route": self.course.route.name}))
         if self._teaching is not None:
@@ -230,6 +239,8 @@ class Patrol:
         """Return the state, without the next round."""
         course, teaching = self.course, self._teaching
         phrases: Phrases = (Phrase("patrol.idle"),) if course is None else course.phrases
+        if course is None and (twice := self._inputs.twice(now_ns)):
+            phrases = (twice,)
         actions: tuple[m.RoundAction, ...] = ("start",) if course is None else course.actions
         message = m.PatrolState(
             state="idle" if course is None else course.state,

@@ -549,7 +549,7 @@ def test_a_call_is_answered_by_the_boards_echo(
         (nothing, lamp, "The board is absent (link never up)."),
         (nothing, brakes, "The board is absent (link never up)."),
         (Bench.arm, lambda bench, to: bench.switch(to, bumper_brake=False), "no echo"),
-        (Bench.arm, lambda bench, to: bench.switch(to, echo=1), "unknown heartbeat"),
+        (Bench.arm, lambda bench, to: bench.switch(to, echo=1), "unknown state of safety"),
         (Bench.arm, called_late, "The call is 1.0 s old, allowed is 1 s"),
     ],
 )

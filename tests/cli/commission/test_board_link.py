@@ -100,7 +100,7 @@ class Measure:
 
 def test_a_board_without_a_watchdog(measure: Measure) -> None:
     assert measure() == 0
-    text = measure.report.read_text()
+    text = measure.report.read_text().partition("<!--")[0]  # without its record
     assert (
         "drives on for at least 1.5 s without a motion command, and for 1.5 s without any" in text
     )
@@ -122,8 +122,13 @@ def test_a_board_with_a_watchdog(measure: Measure) -> None:
         r"by itself ([0-9.]+) s \(.* in 2 tries\) after .* in silence ([0-9.]+)", text
     )
     assert found, text
-    for seconds in map(float, found.groups()):
-        assert 0.75 < seconds < 1.3
+    fed_s, silent_s = map(float, found.groups())
+    assert 0.75 < fed_s < 1.3
+    # On a busy host it is seen as late as the silence of 1.5 s ends: the way is what shows it.
+    assert 0.75 < silent_s < 2.5
+    way = re.search(r"silence of 1.5 s \| slows at [0-9.]+ s, ([0-9.]+) m", text)
+    assert way, text
+    assert 0.06 < float(way[1]) < 0.13
     assert "silence of 0.3 s | drives on for 0.3 s" in text
     assert measure.board.ends_braked()
 

@@ -1,5 +1,6 @@
 """Dialogue of ``t2 checkout``; on a real stack: ``tests/cli/test_on_stack.py``."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import pytest
 
 from cli.__main__ import main
 from cli.commission import command, steps
-from cli.commission.report import Verdict, failed
+from cli.commission.report import Report, Verdict, failed, render
 from cli.commission.steps import PHRASE, RESET_PHRASE, Step, confirm
 from common.cli_args import EXIT_CONFIG
 from common.errors import ConfigError
@@ -30,7 +31,7 @@ def drive(_: object) -> Verdict:
         ([RESET_PHRASE, PHRASE], DRIVEN),
         (["", "wheel", "", PHRASE], DRIVEN),
         (["", "", PHRASE, PHRASE], DRIVEN),  # too late: it tries again
-        (["", "", "next"], NOT_CONFIRMED),
+        (["", "", "no key"], failed(f"{NOT_CONFIRMED.text} Remark: no key")),
     ],
 )
 def test_the_phrase_neither_skips_nor_continues(
@@ -39,8 +40,27 @@ def test_the_phrase_neither_skips_nor_continues(
     answers = iter(typed)
     for module in (command, steps):
         monkeypatch.setattr(module, "prompt", lambda _: next(answers))
-    assert command.verdict(Step("forward", "Forward", "", drive), SESSION) == found
+    assert command.verdict(Step("forward", ("Forward", "前进"), ("", ""), drive), SESSION) == found
     assert list(answers) == []
+
+
+@pytest.mark.parametrize(
+    ("typed", "signed"),
+    [(["ada"], "Ada"), (["Adam", "Ada"], "Ada"), ([""], ""), (["Adam", "Bob", ""], "")],
+)
+def test_a_wrong_signature_is_asked_again(
+    typed: list[str], signed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers, asked = iter(typed), []
+
+    def prompt(question: str) -> str:
+        asked.append(question)
+        return next(answers)
+
+    monkeypatch.setattr(command, "prompt", prompt)
+    assert command.signature("Ada") == signed
+    assert list(answers) == []
+    assert all("is not Ada" in question for question in asked[1:])
 
 
 @pytest.mark.parametrize(
@@ -48,6 +68,7 @@ def test_the_phrase_neither_skips_nor_continues(
     [
         (["--only", "straight"], "--only straight: allowed are link, sonar, bumper, estop, forwa"),
         (["--space", "2"], "--space: is an option of `t2 checkout drive`"),
+        (["drive", "--resume", "a.md"], "--resume: is no option of `t2 checkout drive`"),
         (["drive", "--only", "link"], "--only link: allowed are standstill, straight, spot, curve"),
     ],
 )
@@ -56,6 +77,73 @@ def test_options_of_another_part_are_refused(
 ) -> None:
     assert main(["checkout", *words]) == EXIT_CONFIG
     assert error in capsys.readouterr().err
+
+
+def report(steps: list[tuple[str, Verdict]], unit: str = "rad", robot: str = "001") -> Report:
+    settings = [("wire.unit", unit, "default")]
+    facts = [("board", "here")]
+    return Report(robot=robot, date="today", facts=facts, settings=settings, steps=steps)
+
+
+LINK, SONARS = ("Link", Verdict("passed", "up")), ("Sonars", Verdict("passed", "in place"))
+DONE = "[today, Ada]"
+
+
+@pytest.mark.parametrize(
+    ("unit", "board", "taken", "changed"),
+    [
+        ("rad", "here", [f"up {DONE}", f"in place {DONE}"], ""),
+        ("degree", "here", [f"in place {DONE}"], "wire.unit"),
+        ("rad", "there", [], "board is now there"),
+    ],
+)
+def test_a_resumed_checkout_repeats_what_has_not_passed_or_may_have_changed(
+    unit: str, board: str, taken: list[str], changed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = report([LINK, SONARS, ("Bumper", failed("stuck"))])
+    before.operator = "Ada"
+    now, again = report([], unit), Verdict("passed", "again")
+    now.facts = [("board", board)]
+    monkeypatch.setattr(command, "verdict", lambda *_: again)
+    command.run_steps(now, SESSION, [], before)
+    assert [found.finding for _, found in now.steps if found is not again] == taken
+    assert len(now.steps) == len(steps.STEPS)
+    assert [value for name, value in now.facts if name.startswith("changed")] == [changed] * bool(
+        changed
+    )
+    third = report([], unit)
+    third.facts = now.facts
+    command.run_steps(third, SESSION, ["link"], now)
+    assert len(third.steps) == 1  # only what is selected, with its first origin
+    assert third.steps[0][1].finding.count("[") == 1
+
+
+def test_steps_that_were_not_reached_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    it, outcomes = report([]), iter([LINK[1], failed("no hand")])
+    monkeypatch.setattr(command, "verdict", lambda *_: next(outcomes))
+    with pytest.raises(StopIteration):
+        command.run_steps(it, SESSION, [])
+    assert it.missing == [step.title[0] for step in steps.STEPS[1:]]
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("# A page", "is no report of the steps, of this version of T2"),
+        (render(report([])), "is no report of the steps, of this version of T2"),
+        (render(report([LINK], robot="7")), "is of robot 7, not of 001"),
+        (render(replace(report([LINK]), language="zh")), "has another language; use T2_LANG=zh"),
+        (None, "cannot be read: No such file"),
+    ],
+)
+def test_what_cannot_be_resumed(
+    text: str | None, error: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "old.md"
+    if text is not None:
+        file.write_text(text)
+    assert main(["checkout", "--resume", str(file)]) == EXIT_CONFIG
+    assert f"--resume {file}: {error}" in capsys.readouterr().err
 
 
 def test_an_unwritable_report_is_found_before_the_checkout(

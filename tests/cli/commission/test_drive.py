@@ -233,6 +233,31 @@ def test_its_own_latch_stays_when_an_operator_has_pressed_too(
         assert it.run("BRAKE backward from 0.50 m/s")[-1] == "passed"
 
 
+@pytest.mark.parametrize("stop", [press, unnamed])
+@pytest.mark.parametrize("after_ms", [0, 100, 500, 900])
+def test_a_stop_shortly_after_its_own_reset_is_of_this_manoeuvre(
+    after_ms: int, stop: Callable[[Fixture], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = iter(["", "go on"])
+    with driving(monkeypatch, answers=lambda _: next(answers)) as it:
+        was_latched, since_ms = False, 0
+
+        def once_reset() -> None:
+            nonlocal was_latched, since_ms
+            latched = it.session.latched() == ("estop",)
+            was_latched = was_latched or latched
+            if was_latched and not latched and it.session.states:
+                since_ms += STEP_MS
+                if since_ms > after_ms:
+                    it.inspector.each_step = lambda: None
+                    stop(it)
+
+        it.inspector.each_step = once_reset
+        assert it.run("BRAKE forward from 0.50 m/s") == ["failed"]
+        assert "The emergency stop stays latched. Another emergency stop has" in it.finding
+        assert it.session.fresh_state().latched == ("estop",)
+
+
 def test_its_own_latch_stays_when_emergency_stops_are_not_received(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -61,7 +61,7 @@ def test_a_state_that_overtakes_its_cause_and_commands_after_the_reset_pass() ->
         ({"motions": [motion(0.6, Command.BRAKE)]}, "Safety took 0.60 s to command BRAKE"),
         ({"motions": [motion(0.01, Command.BRAKE), motion(0.03, Command.RUN)]}, "safety sent RUN"),
         ({"reset": RESET._replace(granted=False, text="It moves.")}, "failed: It moves."),
-        ({"reset": RESET._replace(latched=("estop",))}, "Still latched after the reset: estop."),
+        ({"reset": RESET._replace(latched=("estop",))}, "Latched after the reset: estop."),
     ],
 )
 def test_missing_parts_are_named(change: dict[str, object], phrase: str) -> None:

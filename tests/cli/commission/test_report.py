@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from cli.commission.report import Report, Verdict, render
+from cli.commission.report import Report, Verdict, parse, render
 
 GOOD = ("Link", Verdict("passed", "The board's link is up."))
 SKIPPED = ("Turn", Verdict("skipped", "no blocks | today\nsorry"))
@@ -51,3 +51,20 @@ def test_a_manoeuvre_is_a_row_with_its_figures() -> None:
     assert "## Steps" not in shown
     assert "| STOP forward | +0.200 m/s |  |  |  |  |  | 0.024 m |  |  | passed | As ex" in shown
     assert "| Turn |  |  |  |  |  |  |  |  |  | skipped | no blocks" in shown
+
+
+def test_a_report_contains_itself_whatever_the_operator_types() -> None:
+    typed = ("Sonars", Verdict("failed", "--> <!-- t2 checkout {} -->\n| x |", (("a", "b"),)))
+    settings = [("wire.unit", "rad", "default")]
+    report = replace(REPORT, steps=[GOOD, typed], settings=settings, left_out=[])
+    shown = render(report)
+    assert parse(shown) == report
+    assert "Still missing: Sonars." in shown
+    assert parse(shown.replace('"robot"', '"vehicle"')) is None
+    assert parse("# A page\n") is None
+
+
+def test_a_report_in_chinese() -> None:
+    shown = render(replace(REPORT, steps=[GOOD, SKIPPED], language="zh"))
+    assert shown.startswith("# 机器人 001 验收报告\n\n**不合格。**尚未合格：Turn。\n")
+    assert "| Turn | 已跳过 | no blocks" in shown

@@ -84,8 +84,18 @@ def test_faulty_blind_wrong_and_double_detection() -> None:
     assert verdict.text == (
         "left is faulty: the board reports 0xFFFF. "
         "front left: the hand was detected by front right. front: no sonar detected the hand. "
-        "rear: the hand was detected by rear and rear left."
+        "rear: the hand was detected by rear, rear left."
     )
     assert [row[1] for row in verdict.data[:2]] == [
         "detected by none; at rest no reading", "detected by front right; at rest 1.50 m",
     ]  # fmt: skip
+
+
+def test_a_step_that_is_left_judges_the_sonars_before() -> None:
+    found = judge_sonars(FREE, [["left"], []], "the hand does not reach it")
+    assert found.outcome == "failed"
+    assert found.text == (
+        "front left: no sonar detected the hand. Left after 2 of 8 sonars: the hand does not reach "
+        "it."
+    )
+    assert len(found.data) == 2

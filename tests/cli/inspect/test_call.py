@@ -16,7 +16,7 @@ from tests.cli.inspect.tool import FakeSafety, Tool, pretend
 from tests.common.bus_fixture import BusFixture
 
 CONTACT = m.Cause(name="contact", action="brake", age=1.0, text="The bumper was hit.", id=41)
-IDLE = m.Cause(name="no_request", action="stop", age=1.0, text="No source requests motion.", id=40)
+IDLE = m.Cause(name="no_request", action="stop", age=1.0, text="No command to drive.", id=40)
 CLEARS = "t2 call: asks to clear contact: The bumper was hit.\n"
 Serve = tuple[keys.Call[Any, Any], Callable[..., None]]
 NOT_CONFIRMED = "not confirmed: safety's state does not show this reset"

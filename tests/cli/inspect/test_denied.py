@@ -176,7 +176,7 @@ def test_members_reach_their_own_robots_through_the_sites_router(site: Site, joi
         with inspecting(room) as session:
             SafetyClient(session, "001").report_stop("001", operator_name(room))
             wait_until(lambda: first.events, "its event")
-        assert first.events[0].message.text.startswith("Emergency stop requested by fleet.room.")
+        assert first.events[0].message.text.startswith("Emergency stop by fleet.room.")
 
 
 def test_a_revoked_certificate_has_no_rights(join: Join, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from cli.inspect import diagnosis as d
 from cli.inspect.diagnosis import Observation, diagnose
-from cli.inspect.findings import REMEDIES, TEXTS, Finding
+from cli.inspect.findings import REMEDIES, REMEDY, TEXTS, Finding
 from common.root_cause import FROM_LINK
 from services.safety.core.causes import BY_NAME
 from t2 import keys
@@ -80,11 +80,11 @@ def test_a_healthy_robot() -> None:
 
 def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
     given = health("safety"), health("odom", lateness=0.3), health("teleop")
-    instances = {"safety": 2, "odom": 1, "mine": 1, "teleop": 2}
+    instances = {"safety": 2, "odom": 1, "mine": 1, "teleop": 2, "patrol": 2}
     observed = seen(instances=instances, healths={each.service: each for each in given})
     found = {each.text().split()[0]: each for each in d.services(observed)}
     assert {name: each.level for name, each in found.items()} == {
-        "bridge": "wrong", "safety": "wrong", "odom": "note", "mine": "wrong",
+        "bridge": "wrong", "safety": "wrong", "odom": "note", "mine": "wrong", "patrol": "wrong",
         "teleop": "ok",  # any number of a tool may run
     }  # fmt: skip
 
@@ -142,7 +142,7 @@ REJECTED = [
          [("note", "the relay is T2 2, this laptop 0.1.0", remedy("relay_copy"))]),
         ({"state": state("contact", "neutral", **HIT)}, [
             ("wrong", "The bumper was hit. (brake, latched)", of_cause("contact")),
-            ("note", "Waiting for a neutral request: let go of the controls, then drive. (stop)",
+            ("note", "Let go of the controls, then drive. (stop)",
              of_cause("neutral"))]),
         ({"state": state("contact", release=factories.release(left=0.0), **HIT)},
          [("wrong", "The bumper was hit. (brake, latched)", remedy("by_hand"))]),
@@ -298,7 +298,7 @@ def round_(state: m.RoundState, name: str = "patrol.idle", left: float = 9.0) ->
         ({"patrol": round_("driving"), "obeys_patrol": True}, []),
         ({"patrol": round_("idle")}, []),  # the settings are not known
         ({"patrol": round_("idle"), "obeys_patrol": False}, [
-            ("note", "safety does not obey the source patrol: no round can move the vehicle",
+            ("note", "safety does not obey patrol: no round can move the vehicle",
              remedy("patrol_source"))]),
         ({"patrol": round_("stopped", "patrol.restarted")},
          [("wrong", "Patrol has restarted during the round.", "")]),
@@ -309,3 +309,16 @@ def round_(state: m.RoundState, name: str = "patrol.idle", left: float = 9.0) ->
 )  # fmt: skip
 def test_rounds(given: dict[str, Any], expected: list[tuple[str, str, str]]) -> None:
     assert problems(seen(**given)) == expected
+
+
+def test_cameras() -> None:
+    lost = m.Phrase("event.camera_lost", {"camera": "rear", "reason": "refused"})
+    cameras = {
+        "rear": m.Camera(camera="rear", state="lost", text="?", phrases=(lost,)),
+        "front": m.Camera(camera="front", state="up", text="Pictures arrive."),
+    }
+    assert problems(seen(cameras=cameras)) == [
+        ("wrong", "Camera rear: no picture. refused", TEXTS[f"{REMEDY}camera_lost"][0])
+    ]
+    ok = [it.text() for it in diagnose(seen(cameras=cameras), "001") if it.where == "camera"]
+    assert ok == ["Pictures arrive.", "Camera rear: no picture. refused"]

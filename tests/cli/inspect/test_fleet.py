@@ -64,7 +64,7 @@ def test_stop_of_one_site(join: Join, t2: Tool) -> None:
     wait_until(lambda: len(events) == 2, "an event for each robot")
     key, event = events[0].key, events[0].message
     assert key in ("t2/v1/berlin-001/evt/estop", "t2/v1/berlin-002/evt/estop")
-    assert (event.name, event.text) == ("estop", f"Emergency stop requested by {USER}.")
+    assert (event.name, event.text) == ("estop", f"Emergency stop by {USER}.")
     assert event.about == {"by": USER}
 
 

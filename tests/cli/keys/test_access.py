@@ -154,7 +154,7 @@ def test_own_keys_are_at_the_robots_of_the_certificate(robots: tuple[str, ...]) 
 def test_a_robots_router_writes_only_its_own_keys() -> None:
     given = rights(member("robot", OTHER), ROUTER)
     for topic in keys.TOPICS:
-        names = {"service": "x", "side": "left", "source": "x"}
+        names = {"service": "x", "side": "left", "source": "x", "camera": "x"}
         assert may(given, "write", topic.on(OTHER, **names))
         assert not may(given, "write", topic.on(MINE, **names))
 

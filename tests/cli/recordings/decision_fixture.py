@@ -29,7 +29,7 @@ class Tap:
         self._stack = stack
         process = stack.process("recorder")
         for topic in keys.TOPICS:
-            names = dict.fromkeys(("side", "source", "service"), "*")
+            names = dict.fromkeys(("side", "source", "service", "camera"), "*")
             key = topic.on(ROBOT, **names)
             stack.net.subscribe(Subscription(process, key, self._take, depth=1000))
         stop = keys.estop_key(ROBOT)

@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from itertools import pairwise
 
+import msgspec
 import pytest
 
 from cli.recordings.decision_replay import Decided, Replay, new_stops
-from cli.recordings.safety_inputs import Run, runs
+from cli.recordings.safety_inputs import Recorded, Run, runs
 from common.settings import Vehicle
 from services.safety.config import SafetyConfig
 from sim import requests as q
@@ -145,3 +146,52 @@ def test_every_motion_comes_out_again(happens: Callable[[Drive], None], causes: 
     assert sum(not one.is_compared for one in decisions) < 80  # 1.6 s, of which 1.5 are the start
     assert sum(one.is_reordered for one in decisions) <= 2
     assert [name for name in stops(decisions) if name != "starting"] == causes
+
+
+def test_a_recording_that_begins_after_the_first_sample_of_a_slow_input() -> None:
+    stack = Stack(plan=load_plan("office", Vehicle()), step_ns=STEP_MS * MS)
+    tap = Tap(stack)
+    drive(stack)
+    stack.vehicle.inject(q.Mute(reports=("bumper",)))  # safety is starting for 0.7 s
+    stack.run(200)
+    stack.vehicle.inject(q.Mute(reports=()))
+    stack.run(3000)
+    config = stack.processes["safety"].config
+    assert isinstance(config, SafetyConfig)
+    early_ns = tap.recorded[0].log_ns + 500 * MS  # the next switches come after 1 s
+    lost = [it for it in tap.recorded if isinstance(it.message, m.Switches)]
+    lost = [it for it in lost if it.log_ns < early_ns]
+    (run,) = runs([one for one in tap.recorded if one not in lost])
+    decisions = replayed(config, run)
+    assert lost
+    assert differing(decisions) == []
+    assert sum(one.is_compared for one in decisions) > 50
+
+
+def test_a_first_sample_that_the_recorder_has_and_safety_does_not_have() -> None:
+    stack = Stack(plan=load_plan("office", Vehicle()), step_ns=STEP_MS * MS)
+    tap = Tap(stack)
+    drive(stack)
+    stack.vehicle.inject(q.Mute(reports=("bumper", "driver")))
+    stack.run(1000)
+    stack.vehicle.inject(q.Mute(reports=("driver",)))
+    stack.run(700)
+    stack.vehicle.inject(q.Mute(reports=()))
+    stack.run(3000)
+    config = stack.processes["safety"].config
+    assert isinstance(config, SafetyConfig)
+    recorded = tap.recorded
+    at_ns = recorded[0].log_ns + 100 * MS  # safety receives the first ones after 1.7 s
+    early = []
+    for path in ("tel/bridge/driver/left", "tel/bridge/driver/right"):
+        first = next(it for it in recorded if it.path == path)
+        assert isinstance(first.message, m.Driver)
+        past_ns = first.log_ns - at_ns
+        assert past_ns > 1000 * MS
+        mono_ns = first.message.mono_ns - past_ns
+        message = msgspec.structs.replace(first.message, mono_ns=mono_ns)
+        early.append(Recorded(path, message, at_ns))
+    (run,) = runs(sorted([*recorded, *early], key=lambda one: one.log_ns))
+    decisions = replayed(config, run)
+    assert differing(decisions) == []
+    assert sum(one.is_compared for one in decisions) > 50

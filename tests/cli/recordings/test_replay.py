@@ -120,7 +120,8 @@ def test_a_service_that_starts_ends_the_replay(
     assert f"robot {buses.robot} has a running safety" in result.err
 
 
-PATHS = [topic.path.format(service="odom", side="left", source="web") for topic in keys.TOPICS]
+NAMES = {"service": "odom", "side": "left", "source": "web", "camera": "front"}
+PATHS = [topic.path.format(**NAMES) for topic in keys.TOPICS]
 
 
 def test_what_is_played_onto_the_bus() -> None:

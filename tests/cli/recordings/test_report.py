@@ -38,6 +38,7 @@ def test_report_content(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ):  # fmt: skip
         assert word in text, word
     assert re.search(r'<td class="n">22:13:\d\d</td>', text)  # of a stop
+    assert '<td class="bad">The &lt;b&gt;bumper&lt;/b&gt; was hit.</td>' in text  # of an event
     # It loads nothing, and content of the bus is escaped.
     assert not re.findall(r"<script|(?:src|href|action|data|poster)=[^#]{2}", text)
     assert text.count("<svg") == 3

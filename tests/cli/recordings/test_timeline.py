@@ -81,7 +81,7 @@ def test_events_and_sources_have_no_gaps_and_an_emergency_stop_no_message_to_dec
 
 # --- stops --------------------------------------------------------------------------------------
 
-IDLE = Cause(name="no_request", action="stop", age=0.0, text="No source requests motion.")
+IDLE = Cause(name="no_request", action="stop", age=0.0, text="No command to drive.")
 LINK = Cause(name="link", action="stop", age=0.0, text="The link to the board is lost.")
 SLOWED = Cause(name="obstacle", action="slow", age=0.0, text="Slowed by an obstacle.")
 

@@ -94,7 +94,7 @@ def test_each_stop_with_its_cause_input_age_and_rule(why: Callable[..., tuple[in
         "BRAKE  contact: The bumper was hit.",
         "            input: bumper: pressed, 0.000 s old, limit 0.07 s\n"
         "            rule: BRAKE latched until a reset, then a neutral request",
-        "STOP   no_request: No source requests motion.",
+        "STOP   no_request: No command to drive.",
         "input: drive teleop: 0.200 m/s, 0.000 rad/s, 0.320 s old, limit 0.30 s, TOO OLD",
     ):
         assert line in shown

@@ -29,10 +29,10 @@ def test_the_motions_of_a_real_stack_come_out_again(
                 "recorder.everything=true")  # fmt: skip
         return {"recorder": [sys.executable, "-m", "services.recorder", *set_options(*sets)]}
 
-    with running_stack(tmp_path, shipped=True, beside=recorder) as stack, running(Loop()) as loop:
+    with running_stack(tmp_path, beside=recorder) as stack, running(Loop()) as loop:
         source = ConstantSource(loop)
         with bus_on(stack.endpoint, loop, source.declare):
-            time.sleep(1.0)
+            time.sleep(2.0)
             drive_until_moving(stack, source)
             stack.control.do(Bumper(pressed=True))
             time.sleep(0.5)
@@ -46,5 +46,8 @@ def test_the_motions_of_a_real_stack_come_out_again(
     found = re.search(r"replay: (\d+) of (\d+) motions agree", shown)
     assert found, shown
     assert int(found[1]) >= AGREEING * int(found[2]) > 50, shown
-    assert "BRAKE  contact: The bumper was hit." in shown
+    _, contact, after = shown.partition("BRAKE  contact: The bumper was hit.")
+    assert contact, shown
+    # A stop before it may follow from one of the motions that do not agree.
+    assert "not verified" not in after.partition("\n\n")[0], shown
     assert "\nsettings: those of safety in the recording\n" in shown

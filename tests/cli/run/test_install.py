@@ -14,7 +14,7 @@ from common.config import DEFAULT_FILE, Sources, load
 
 PREFIX = "/opt/t2/current"
 UNITS = "usr/local/lib/systemd/system"
-OPT_IN = "t2-ros2.service"  # lets ROS nodes drive
+OPT_IN = {"t2-ros2.service", "t2-camera.service"}  # lets ROS nodes drive; needs a source
 
 
 def t2_install(root: Path, *words: str) -> int:
@@ -56,14 +56,16 @@ def test_all_units_except_the_simulator(tmp_path: Path) -> None:
         "recorder",
         "dashboard",
         "ros2",
+        "camera",
     )
     assert services == {f"t2-{name}.service" for name in names}
     assert not any("@PREFIX@" in text for text in written.values())
     start = f"ExecStart={PREFIX}/bin/python -P -m services.safety --config /etc/t2/t2.toml"
     assert start in written[f"{UNITS}/t2-safety.service"]
     wants = " ".join(x for x in written[f"{UNITS}/t2.target"].splitlines() if "Wants=" in x)
-    assert {name for name in services if name not in wants} == {OPT_IN}
-    assert unit(written[f"{UNITS}/{OPT_IN}"])["Install"]["WantedBy"] == "t2.target"
+    assert {name for name in services if name not in wants} == OPT_IN
+    for name in OPT_IN:
+        assert unit(written[f"{UNITS}/{name}"])["Install"]["WantedBy"] == "t2.target"
     sleep = unit(written["etc/systemd/sleep.conf.d/t2.conf"])["Sleep"]
     assert len(sleep) == 4
     assert set(sleep.values()) == {"no"}
@@ -100,9 +102,13 @@ def test_install_again_keeps_edited_settings_and_renews_the_units(
     (tmp_path / UNITS / "t2-odom.service").write_text("older\n")
     assert t2_install(tmp_path) == 0
     assert files(tmp_path) == before
-    monkeypatch.setattr(install, "find_spec", lambda name: None if name == "uvicorn" else True)
+    monkeypatch.setattr(
+        install, "find_spec", lambda name: None if name in ("uvicorn", "av") else True
+    )
     t2_install(tmp_path)
-    assert files(tmp_path).keys() == before.keys() - {f"{UNITS}/t2-dashboard.service"}
+    camera = f"{UNITS}/t2-camera.service"
+    absent = {f"{UNITS}/t2-dashboard.service", camera, f"{camera}.d/20-devices.conf"}
+    assert files(tmp_path).keys() == before.keys() - absent
 
 
 def test_invalid_settings_write_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

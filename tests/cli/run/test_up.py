@@ -11,7 +11,9 @@ import pytest
 from cli.__main__ import main
 from cli.run import up
 from cli.run.up import everything, selected
-from common.cli_args import EXIT_CONFIG, EXIT_LINK
+from cli.settings import Everything
+from common.cli_args import EXIT_CONFIG, EXIT_LINK, sources
+from common.config import load
 from common.errors import ConfigError
 from t2.errors import T2Error
 from tests.cli.processes import PATIENCE_S, children, ran, running, sets, t2, wait_gone
@@ -94,6 +96,21 @@ def test_processes_in_order_of_dependency(words: tuple[str, ...], names: str) ->
     passed = ["--config", "a.toml", *sets("sim.world=x", "robot.id=2")]
     for command in found.values():
         assert command[-len(passed) :] == passed
+
+
+def test_the_camera_of_the_settings_or_a_simulated_one() -> None:
+    def found(*words: str) -> dict[str, list[str]]:
+        given = options(*words)
+        config = load(Everything, sources(given)).config
+        return {k: list(v) for k, v in up.camera(given, config, everything(given)).items()}
+
+    simulated = found()
+    assert list(simulated) == ["sim", "sim.camera", "camera"]
+    port = next(one for one in simulated["sim"] if one.startswith("sim.camera_port="))
+    assert f"camera.source=tcp://127.0.0.1:{port.partition('=')[2]}" in simulated["camera"]
+    own = sets("camera.source=/dev/video0")
+    assert found(*own) == found(*own, "--no-sim") == {"camera": [*simulated["camera"][:4], *own]}
+    assert found("--no-sim") == {}
 
 
 def test_a_process_that_does_not_exist(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -125,7 +125,7 @@ def test_the_routers_own_timeout_is_no_refusal(client: Client) -> None:
 def test_without_a_server_or_router_the_refusal_comes_at_once(buses: BusFixture) -> None:
     assert Client(buses.bus()).asked(timeout_s=600.0).refusals == [NO_ANSWER]
     never_opened = Client(Bus(at(buses.endpoint), buses.robot, buses.loop.post))
-    assert never_opened.asked().refusals == ["Not connected to a router."]
+    assert never_opened.asked().refusals == ["Not connected to the robot."]
 
 
 @pytest.mark.parametrize(

@@ -180,8 +180,9 @@ def test_every_nth_sample_passes_early_or_late_by_less_than_half(
 
 def test_a_robots_router_downsamples_fast_streams_towards_laptops_and_nothing_on_board() -> None:
     fast = {t.on("007") for t in keys.TOPICS if t.service is keys.FAST and t.rate_hz > 10}
-    assert set(rules(10.0)) == {*fast, keys.MOTION.on("007")}
-    assert downsampling_rules("007", 50.0) == []
+    pictures = keys.PICTURE.on("007", camera="*")  # at any rate of the others
+    assert set(rules(10.0)) == {*fast, keys.MOTION.on("007"), pictures}
+    assert rules(50.0) == {pictures: 2.0}
     config = router_config(settings.BusSettings(), robot="007")
     zenoh.Config.from_json5(json.dumps(config))  # refuses unknown fields
     (egress,) = downsampling_rules("007", settings.BusSettings().laptop_rate)

@@ -39,7 +39,7 @@ def test_nothing_is_known_before_odometry_and_a_placement() -> None:
     assert refused.name == "place.no_odometry"
     pose = drive.go()
     assert (pose.state, pose.x, pose.odom) == ("unplaced", None, None)
-    assert "settings do not let this source place it" in drive.fix()
+    assert "settings do not let these fixes place it" in drive.fix()
     assert "place the vehicle" in pose.text
 
 

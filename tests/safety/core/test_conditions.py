@@ -99,7 +99,7 @@ BY_INPUTS: list[tuple[dict[str, Any], str, str | None]] = [
     ({"leaving": True}, "leaving", ""),
     ({"estop_connection": 0}, "starting", "Waiting for the first sample of: emergency stop."),
     ({"estop_path": None}, "starting",
-     "Waiting for the first sample of: the emergency stop's path through the router."),
+     "Waiting for the first sample of: the path of the emergency stop."),
     ({"switches": None}, "starting", "Waiting for the first sample of: switches."),
     (linked(state="lost"), "link", "The link to the board is lost."),
     (linked(state="never"), "link", "No frame came from the board yet."),
@@ -123,7 +123,7 @@ BY_INPUTS: list[tuple[dict[str, Any], str, str | None]] = [
      "No recent data: left driver, right driver."),
     (driver("left", age_s=2.0) | driver("right", age_s=2.0), "silent", None),
     ({"estop_path": newest(safety_state(), 0.201)}, "silent",
-     "No recent data: the emergency stop's path through the router."),
+     "No recent data: the path of the emergency stop."),
 ]  # fmt: skip
 
 
@@ -177,7 +177,7 @@ BY_STATE: list[tuple[dict[str, Any], str, str | None]] = [
      "The vehicle does not stop: 0.25 m/s, -0.50 rad/s."),
     ({"arbiter": Arbiter(SETTINGS.safety.sources, {"teleop": DriveChannel(**TWICE)}),
       "speed_limits": SpeedLimits({"lidar": LIDAR}, {"lidar": LimitChannel(**TWICE)})},
-     "two_publishers", "Two publishers use teleop, limit lidar."),
+     "two_publishers", "Two programs send as teleop, limit lidar."),
 ]  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def test_two_publishers_stop_the_vehicle_until_one_is_left_and_neutral() -> None
     fixture.request(0.5)
     assert fixture.refused == "second_publisher"
     assert fixture.verdict.command == "stop"
-    assert render(fixture.state.latches["two_publishers"].phrases) == "Two publishers use teleop."
+    assert render(fixture.state.latches["two_publishers"].phrases) == "Two programs send as teleop."
     fixture.driver_boot, fixture.driver_seq = 99, 10_000
     assert fixture.drive(0.5, seconds=0.4).command == "stop"
     assert fixture.drive(0.5, seconds=0.2).name == "inhibited"  # the stick is still pushed
@@ -104,7 +104,7 @@ def test_the_higher_priority_drives_and_letting_go_hands_over_after_a_neutral_re
     fixture.drive(0.2, source="nav", seconds=3.0)
     assert fixture.verdict.source == "nav"
     assert fixture.verdict.name == "inhibited"
-    text = "teleop was in control: nav needs a neutral request first."
+    text = "teleop was in control: nav must let go of the controls, then drive."
     assert fixture.text("neutral") == text
     fixture.request(0.0, source="nav")
     assert fixture.drive(0.2, source="nav").command == "run"

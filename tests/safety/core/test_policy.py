@@ -73,7 +73,7 @@ def test_a_latched_trip_holds_until_a_reset_and_a_neutral_request(
     fixture.linear = 0.0
     fixture.drive(0.5, seconds=2.0)
     assert fixture.verdict.command == command
-    assert fixture.reset() == "Motion is requested: let go of the controls first."
+    assert fixture.reset() == "A command to drive is given: let go of the controls first."
     fixture.tick(40)
     assert fixture.reset() == ""
     assert not latched(fixture.state.latches)
@@ -263,9 +263,7 @@ def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_reque
     fixture.muted = {"estop_path"}
     assert fixture.drive(0.3, seconds=0.18).command == "run"
     assert fixture.drive(0.3, seconds=0.08).command == "stop"
-    assert "the emergency stop's path through the router" in render(
-        fixture.state.latches["silent"].phrases
-    )
+    assert "the path of the emergency stop" in render(fixture.state.latches["silent"].phrases)
     fixture.muted = set()
     assert fixture.drive(0.3, seconds=1.0).command == "stop"
     fixture.drive()
@@ -278,7 +276,7 @@ def test_nothing_drives_before_the_emergency_stop_s_path_was_proven() -> None:
     fixture.tick(40)
     fixture.drive()
     assert fixture.drive(0.3, seconds=60.0).command == "stop"
-    path = "the emergency stop's path through the router"
+    path = "the path of the emergency stop"
     assert fixture.text("starting") == f"Waiting for the first sample of: {path}."
     fixture.muted = set()
     assert fixture.drive(0.3, seconds=1.0).command == "stop"
@@ -477,7 +475,10 @@ def test_a_successor_gives_no_release_for_a_contact_beside_the_latch(first: str)
     fixture.link = replace(fixture.link, latched_by=OWN)
     fixture.tick(10)
     assert fixture.reset() == ""
-    assert fixture.answer() == f"Reset, but still latched: The bumper was hit. {UNKNOWN_TEXT}"
+    assert (
+        fixture.answer()
+        == f"Reset, but these need another reset: The bumper was hit. {UNKNOWN_TEXT}"
+    )
     for direction in DIRECTIONS:
         fixture.let_go()
         assert fixture.hold(direction) == UNKNOWN_TEXT

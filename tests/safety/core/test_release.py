@@ -23,7 +23,7 @@ from tests.safety.core.policy_fixture import (
 )
 
 BOTH = "The bumper was pressed in both directions. Push the vehicle off by hand, then reset."
-PROGRAM = "nav may not release: only a source that an operator holds may."
+PROGRAM = "nav may not release: only an operator who holds the controls may."
 MOVES = "The vehicle still moves."
 LOST = "The link to the board is lost."
 Given = Callable[[PolicyFixture], object]
@@ -104,7 +104,7 @@ CASES: dict[str, tuple[Given, Direction, str]] = {
     "no link": (feed(link=link(state="lost")), "backward", LOST),
     "motion": (feed(linear=0.3), "backward", MOVES),
     "an old velocity": (silent, "backward", "No recent data: velocity."),
-    "two publishers": (two_publishers, "backward", "Two publishers use teleop."),
+    "two publishers": (two_publishers, "backward", "Two programs send as teleop."),
     "a free bumper": (freed, "backward", BUMPER_FREE),
     "a new press": (press_anew, "backward", LET_GO),
     "an earlier safety": (with_release(unknown=True), "backward", UNKNOWN_TEXT),

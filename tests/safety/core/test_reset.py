@@ -79,17 +79,17 @@ def blink(fixture: PolicyFixture) -> int:
 
 
 def test_a_reset_of_nothing_is_refused() -> None:
-    assert PolicyFixture().ready().reset() == "Nothing is latched."
+    assert PolicyFixture().ready().reset() == "Nothing needs a reset."
     fixture = stopped()
     assert fixture.reset() == ""
     fixture.tick()
-    assert fixture.reset() == "Nothing is latched."  # a repetition
+    assert fixture.reset() == "Nothing needs a reset."  # a repetition
 
 
 def test_a_reset_that_names_nothing_is_refused() -> None:
     fixture = stopped()
     fixture.decide(reset=ResetRequest(echo=fixture.echo))
-    asked = "The reset names no cause. Send the `id` of each as `causes`. Latched:"
+    asked = "The reset names no cause. Send the `id` of each as `causes`. These need a reset:"
     assert (fixture.reply().done, fixture.answer()) == (False, f"{asked} Emergency stop.")
     assert latched(fixture.state.latches) == ("estop",)
     blink(fixture)
@@ -106,7 +106,7 @@ def test_a_contact_that_is_free_and_others_stay_latched_by_their_texts() -> None
     driver = blink(fixture)
     texts = f"The bumper was hit. {render(fixture.state.latches['estop'].phrases)}"
     assert fixture.reset(driver) == ""
-    assert fixture.answer() == f"Reset, but still latched: {texts}"
+    assert fixture.answer() == f"Reset, but these need another reset: {texts}"
 
 
 @pytest.mark.parametrize(("ticks", "age"), [(50, ""), (51, "1.0"), (150, "3.0")])
@@ -122,7 +122,7 @@ def test_a_reset_without_a_known_echo_is_refused() -> None:
     fixture = stopped()
     fixture.decide(reset=ResetRequest(echo=None, causes=fixture.latched()))
     assert (fixture.reply().done, fixture.answer()) == (False, NO_ECHO_TEXT)
-    assert "unknown heartbeat" in fixture.reset(echo=2**62)
+    assert "unknown state of safety" in fixture.reset(echo=2**62)
     assert latched(fixture.state.latches) == ("estop",)
 
 
@@ -133,9 +133,9 @@ def test_a_reset_clears_what_it_names_and_says_what_stays() -> None:
     fault = render(fixture.state.latches["driver_left"].phrases)
     assert fixture.reset(estop) == ""
     assert fixture.reply().cleared == (estop,)
-    assert fixture.answer() == f"Reset, but still latched: {fault}"
+    assert fixture.answer() == f"Reset, but these need another reset: {fault}"
     assert latched(fixture.state.latches) == ("driver_left",)
-    assert fixture.reset(estop, driver).startswith("A cause that the reset names")  # half of it
+    assert fixture.reset(estop, driver).startswith("The reset names a cause")  # half of it
     assert fixture.reset(driver) == ""
     assert fixture.reply().cleared == (driver,)
     assert fixture.answer() == "Reset. Let go of the controls, then drive."
@@ -229,10 +229,10 @@ def test_at_a_pressed_bumper_a_reset_clears_the_others_and_a_release_comes_next(
     fixture.tick(40)
     assert latched(fixture.state.latches) == ("contact", "driver_left")
     assert fixture.hold() == f"{render(fixture.state.latches['driver_left'].phrases)} Reset first."
-    assert fixture.reset() == "Motion is requested: let go of the controls first."
+    assert fixture.reset() == "A command to drive is given: let go of the controls first."
     fixture.let_go()
     assert fixture.reset() == ""
-    assert fixture.answer() == f"Reset, but still latched: {HOLD_TEXT}"
+    assert fixture.answer() == f"Reset, but these need another reset: {HOLD_TEXT}"
     assert latched(fixture.state.latches) == ("contact",)
     assert fixture.drive(0.5).command == "brake"
     assert fixture.drive(0.0).command == "brake"
@@ -256,7 +256,7 @@ def test_a_reset_on_a_pressed_bumper_wants_all_that_a_reset_wants() -> None:
     fixture.linear = None
     fixture.tick()
     fixture.request(0.5)
-    assert fixture.reset() == "Motion is requested: let go of the controls first."
+    assert fixture.reset() == "A command to drive is given: let go of the controls first."
     fixture.tick(40)
     fixture.pressed = False
     fixture.tick()
@@ -271,7 +271,7 @@ def test_a_reset_on_a_pressed_bumper_leaves_what_is_not_gone() -> None:
     fixture.tick(3)
     fault = render(fixture.state.latches["driver_left"].phrases)
     assert fixture.reset() == ""
-    assert fixture.answer() == f"Reset, but still latched: The bumper was hit. {fault}"
+    assert fixture.answer() == f"Reset, but these need another reset: The bumper was hit. {fault}"
     assert latched(fixture.state.latches) == ("contact", "driver_left")
     fixture.tick()
     assert fixture.hold() == fault

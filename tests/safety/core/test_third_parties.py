@@ -100,7 +100,7 @@ def test_two_limiting_publishers_stop_the_vehicle_until_one_is_left() -> None:
     fixture.limit(1.0)
     assert fixture.refused == "limit_second_publisher"
     assert fixture.verdict.command == "stop"
-    text = "Two publishers use limit lidar."
+    text = "Two programs send as limit lidar."
     assert render(fixture.state.latches["two_publishers"].phrases) == text
     fixture.drive(0.5, seconds=0.6)
     assert fixture.verdict.name == "inhibited"  # the stick is still pushed

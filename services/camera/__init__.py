@@ -1,0 +1,1 @@
+"""A camera on the bus: pictures that carry their age."""

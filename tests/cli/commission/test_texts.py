@@ -1,0 +1,41 @@
+"""The texts of the checkout, in both languages."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from cli.commission import steps, texts
+from cli.commission.link import judge_link
+from cli.commission.texts import TEXTS, Say
+from t2.words import PLACEHOLDER
+from tests.factories import link
+
+CHINESE = re.compile("[\u4e00-\u9fff]")
+NAME = re.compile(r"say\(\s*\"([\w.]+)\"")
+
+
+def test_every_text_is_complete_in_both_languages() -> None:
+    for name, (english, chinese) in TEXTS.items():
+        fields = [sorted(set(PLACEHOLDER.findall(text))) for text in (english, chinese)]
+        assert fields[0] == fields[1], name
+        is_figure = not re.search("[a-z]{2}", PLACEHOLDER.sub("", english))
+        assert is_figure or CHINESE.search(chinese), name
+    for step in steps.STEPS:
+        assert CHINESE.search(step.title[1]), step.name
+        assert CHINESE.search(step.what[1]), step.name
+
+
+def test_every_used_text_is_in_the_table() -> None:
+    folder = Path(texts.__file__).parent
+    used = {name for file in folder.glob("*.py") for name in NAME.findall(file.read_text("utf-8"))}
+    assert {"begin", "link.good", "sonar.now", "drive.warning"} <= used <= TEXTS.keys()
+    with pytest.raises(KeyError):
+        Say()("of_2030")
+
+
+def test_a_verdict_in_chinese() -> None:
+    links = [link(state="lost"), link(state="lost")]
+    verdict = judge_link(links, None, Say("zh"))
+    assert verdict.text.startswith("链路未能全程保持在线（当前：lost）")
+    assert "。帧数过少，无法判定：0。" in verdict.text
