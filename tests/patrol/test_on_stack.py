@@ -1,7 +1,9 @@
 """Rounds on real processes: what a killed or suspended service leaves."""
 
 import signal
+import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -64,6 +66,10 @@ def until(robot: t2.Robot, *states: m.RoundState, within: float = 20.0) -> None:
     wait_until(lambda: robot.patrol.latest(10.0).state in states, str(states), within)
 
 
+def announcing(robot: t2.Robot, _: RunningStack) -> None:
+    robot.patrol.start("yard")
+
+
 def driving(robot: t2.Robot, stack: RunningStack) -> None:
     robot.patrol.start("yard")
     wait_until(lambda: stack.speed() > 0.15, "a moving vehicle", 20.0)
@@ -80,6 +86,20 @@ def waiting(robot: t2.Robot, stack: RunningStack) -> None:
     until(robot, "waiting")
 
 
+def returning(robot: t2.Robot, stack: RunningStack) -> None:
+    driving(robot, stack)
+    robot.patrol.go_home()
+    until(robot, "returning")
+
+
+def paused(robot: t2.Robot, stack: RunningStack) -> None:
+    driving(robot, stack)
+    robot.patrol.pause()
+
+
+OTHERS = announcing, staying, waiting, returning, paused
+
+
 def stands(stack: RunningStack) -> None:
     """Wait until the vehicle stands, and see that it stays there."""
     wait_until(lambda: abs(stack.speed()) < 0.01, "a standing vehicle", 5.0)
@@ -89,7 +109,7 @@ def stands(stack: RunningStack) -> None:
 
 @pytest.mark.parametrize(
     "lead",
-    [driving, *(pytest.param(lead, marks=pytest.mark.campaign) for lead in (staying, waiting))],
+    [driving, *(pytest.param(lead, marks=pytest.mark.campaign) for lead in OTHERS)],
 )
 def test_a_killed_patrol_stops_and_resumes_by_a_call(
     stack: RunningStack, robot: t2.Robot, lead: Callable[[t2.Robot, RunningStack], None]
@@ -103,6 +123,37 @@ def test_a_killed_patrol_stops_and_resumes_by_a_call(
     until(robot, "stopped")
     assert robot.patrol.latest().round == before.round
     stands(stack)
+    robot.patrol.resume()
+    until(robot, "driving", "staying", "returning")
+
+
+@pytest.mark.campaign
+def test_a_suspended_patrol_stops_the_vehicle_and_wants_a_call(
+    stack: RunningStack, robot: t2.Robot
+) -> None:
+    driving(robot, stack)
+    stack.processes["patrol"].send_signal(signal.SIGSTOP)
+    stands(stack)
+    time.sleep(2.0)  # longer than a pause that it drives on after
+    stack.processes["patrol"].send_signal(signal.SIGCONT)
+    until(robot, "stopped")
+    stands(stack)
+
+
+@pytest.mark.campaign
+def test_a_second_patrol_service_stops_a_round(
+    stack: RunningStack, robot: t2.Robot, tmp_path: Path
+) -> None:
+    driving(robot, stack)
+    sets = set_options(f"patrol.folder={tmp_path}")
+    stack.commands["second"] = [*stack.commands["patrol"], *sets]
+    stack.start("second")
+    stands(stack)
+    with pytest.raises(t2.Refused, match="Another patrol service"):
+        robot.patrol.resume()
+    stack.kill("second")
+    until(robot, "stopped")
+    time.sleep(3.0)  # after 2 s its silence is its end
     robot.patrol.resume()
     until(robot, "driving", "staying")
 
@@ -133,7 +184,7 @@ def test_an_emergency_stop_wants_a_reset_and_a_call(stack: RunningStack, robot: 
     driving(robot, stack)
     robot.estop()
     until(robot, "stopped")
-    with pytest.raises(t2.Refused, match="latched"):
+    with pytest.raises(t2.Refused, match="A reset is needed"):
         robot.patrol.resume()
     robot.reset()
     stands(stack)

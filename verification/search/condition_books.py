@@ -206,7 +206,7 @@ class StandstillBook:
     def complaint(self, motion: Motion, moves: bool, now_ns: int) -> str:
         """Return what is wrong with a motion that does not brake; empty if nothing is."""
         if moves:
-            self.due_ns = None
+            self.due_ns, self.rolled = None, 0.0
             return ""
         if self.due_ns is None:
             self.stop_ns = self.due_ns = now_ns

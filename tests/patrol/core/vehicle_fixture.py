@@ -6,13 +6,14 @@ from typing import Any
 
 from common.freshness import NS_PER_S
 from common.pose import Pose
-from services.patrol.core.course import TICK_S
+from services.patrol.core.course import TICK_S, Note
 from services.patrol.core.patrol import Patrol
 from t2 import messages as m
 from tests.factories import map_pose, safety_state
 
 ANNOUNCE_S, PATIENCE_S = 1.0, 20.0
 TICK_NS = round(TICK_S * NS_PER_S)
+LONGEST_NS = 600 * NS_PER_S  # of a test: it fails, and does not wait for ever
 LINE = ((0.0, 0.0, "home"), (4.0, 0.0, "gate"))
 LOOP = ((0.0, 0.0, "home"), (4.0, 0.0, "gate"), (4.0, 3.0), (0.0, 3.0), (0.0, 0.0))
 HOME = Pose(0.0, 0.0, 0.0)
@@ -46,7 +47,7 @@ class Vehicle:
         self.map_state: m.MapState = "placed"
         self.silent: set[str] = set()
         self.requests: list[m.Drive] = []  # in the last call of ``run``
-        self.events: list[str] = []
+        self.notes: list[Note] = []  # events
 
     # --- its world --------------------------------------------------------------------------
 
@@ -54,12 +55,13 @@ class Vehicle:
         """Deliver what safety and localization publish, tick, and move."""
         self.now_ns += TICK_NS
         self.wall_ns += TICK_NS
+        assert self.now_ns < LONGEST_NS, self.message.text
         if "safety" not in self.silent:
             self.patrol.on_safety(self._state(), self.now_ns)
         if "localization" not in self.silent:
             self.patrol.on_pose(self._pose(), self.now_ns)
         request = self.patrol.tick(self.now_ns, self.wall_ns)
-        self.events += [note.name for note in self.patrol.notes]
+        self.notes += self.patrol.notes
         self.patrol.notes = []
         if request is not None:
             self.requests.append(request)
@@ -109,6 +111,11 @@ class Vehicle:
         """The names of the phrases of the state."""
         return tuple(phrase.name for phrase in self.message.phrases)
 
+    @property
+    def events(self) -> list[str]:
+        """The names of the events."""
+        return [note.name for note in self.notes]
+
     def run(self, seconds: float) -> None:
         """Let time pass."""
         self.requests = []
@@ -152,3 +159,37 @@ class Vehicle:
         """Move the vehicle by hand, m and rad."""
         heading = math.remainder(self.at.heading + turn, math.tau)
         self.at = Pose(self.at.x + x, self.at.y + y, heading)
+
+
+def vehicle_in(state: m.RoundState) -> Vehicle:
+    """Return a vehicle whose round is in a state, on the way to the gate at x = 4 m."""
+    vehicle = Vehicle()
+    if state == "idle":
+        vehicle.step()
+    elif state == "announcing":
+        assert vehicle.start() is None
+    elif state == "staying":
+        assert vehicle.start(route(LOOP, stay=5.0)) is None
+        vehicle.until("staying")
+    elif state == "done":
+        vehicle.driving()
+        vehicle.act("abort")
+    else:
+        vehicle.driving()
+        _lead(vehicle, state)
+    assert vehicle.state == state
+    return vehicle
+
+
+def _lead(vehicle: Vehicle, state: m.RoundState) -> None:
+    if state == "waiting":
+        vehicle.causes = ("blocked",)
+        vehicle.until("waiting")
+    elif state == "returning":
+        vehicle.act("return")
+    elif state == "paused":
+        vehicle.act("pause")
+    elif state == "stopped":
+        vehicle.latched = ("estop",)
+        vehicle.until("stopped")
+        vehicle.latched = ()
