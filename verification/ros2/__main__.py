@@ -17,7 +17,7 @@ from pathlib import Path
 from common.freshness import NS_PER_S
 from verification.harness.results import table
 from verification.harness.trace import moves
-from verification.ros2 import hiroz, plain_peer
+from verification.ros2 import hiroz, plain_peer, rclpy_oracle
 from verification.ros2.hiroz import Robot, robot_with_gateway
 
 OUT = Path(__file__).resolve().parents[2] / "out" / "ros2-peer"
@@ -53,12 +53,19 @@ def checks(pause_s: float) -> dict[str, Check]:
     """Return the checks by name."""
     found: dict[str, Check] = {f"hiroz {check.__name__}": check for check in hiroz.CHECKS}
     found["ROS tools"] = partial(exercised, python=Path(sys.executable), pause_s=pause_s)
+    found["rclpy of Jazzy"] = with_rclpy
     return found | {f"zenoh {version}": partial(older, version=version) for version in VERSIONS}
 
 
 def older(robot: Robot, version: str) -> str:
     """Run the plain peer with this version of Zenoh."""
-    return exercised(robot, build_environment(version))
+    packages = f"eclipse-zenoh=={version}", "xxhash==4.1.0"
+    return exercised(robot, build_environment(f"zenoh-{version}", *packages))
+
+
+def with_rclpy(robot: Robot) -> str:
+    """Compare types and payloads with rclpy."""
+    return rclpy_oracle.check(robot, build_environment("rclpy", *rclpy_oracle.PACKAGES))
 
 
 def exercised(robot: Robot, python: Path, pause_s: float = 2.0) -> str:
@@ -108,15 +115,15 @@ def build_crate() -> Path:
     return target / "debug" / "t2-ros2-peer"
 
 
-def build_environment(zenoh: str) -> Path:
-    """Make a Python environment with this version of Zenoh; return its Python."""
-    folder = OUT / f"zenoh-{zenoh}"
+def build_environment(name: str, *packages: str) -> Path:
+    """Make a Python environment with these packages; return its Python."""
+    folder = OUT / name
     python = folder / "bin" / "python"
     if not python.exists():
         subprocess.run([UV, "venv", "--quiet", "--python", sys.executable, folder], check=True)
     install = [
         str(UV), "pip", "install", "--quiet", "--system-certs", "--only-binary", ":all:",
-        "--python", str(python), f"eclipse-zenoh=={zenoh}", "xxhash==4.1.0",
+        "--python", str(python), *packages,
     ]  # fmt: skip
     subprocess.run(install, check=True)
     return python
