@@ -1,11 +1,13 @@
-"""``python -m bench.client ENDPOINT reset | drive ROBOT [SETTING]...``: a robot's clients.
+"""``python -m bench.client ENDPOINT reset | MODE ROBOT [SETTING]...``: a robot's clients.
 
 ``reset`` is an operator that resets every latch. ``drive`` requests motion like teleop, with a
 speed that identifies the frame at the board that answers. It is a child process that
-also executes ``estop``, repeated until ``go``, which requests again.
+also executes ``estop``, repeated until ``go``, which requests again. ``pictures`` turns on the
+spot, receives all pictures of the cameras and counts them.
 """
 
 import sys
+import time
 from collections.abc import Sequence
 from functools import partial
 
@@ -55,18 +57,29 @@ class Driver:
         self._source = DriveSource(bus, "teleop")
         self._state: m.SafetyState | None = None
         self._number = self._refusals = 0
-        self._stops = self._turns = False
+        self._stops = self._turns = self._always_turns = False
         self.begin()
         bus.subscribe(keys.SAFETY, self._on_safety)
         loop.every(PERIOD_S, self._request)
 
+    def receive_pictures(self) -> None:
+        """Turn on the spot, and receive the pictures of all cameras."""
+        self._always_turns = True
+        self._bus.subscribe(keys.PICTURE, self._on_picture, camera="*")
+
     def begin(self) -> None:
-        """Forget the requests."""
+        """Forget the requests and the pictures."""
+        self._began_s, self._sizes = time.monotonic(), list[int]()
         self.requests: list[tuple[int, float]] = []
+
+    def pictures(self) -> dict[str, list[float]]:
+        """Return the pictures a second and their sizes in bytes."""
+        rate = len(self._sizes) / (time.monotonic() - self._began_s)
+        return {"pictures": [rate], "size": [float(size) for size in self._sizes]}
 
     def execute(self, word: str) -> None:
         """Execute ``estop``, which is repeated, ``turn`` on the spot, or ``go``."""
-        self._stops, self._turns = word == "estop", word == "turn"
+        self._stops, self._turns = word == "estop", word == "turn" or self._always_turns
         if self._stops:
             self._bus.estop()
 
@@ -93,18 +106,23 @@ class Driver:
     def _on_safety(self, arrival: Arrival[m.SafetyState]) -> None:
         self._state = arrival.message
 
+    def _on_picture(self, arrival: Arrival[m.Picture]) -> None:
+        self._sizes.append(len(arrival.message.jpeg))
 
-def drive(endpoint: str, robot: str, sets: Sequence[str]) -> None:
+
+def drive(endpoint: str, mode: str, robot: str, sets: Sequence[str]) -> None:
     """Drive until standard input ends."""
     config = load(Shared, Sources(sets=[f"bus.connect={endpoint}", *sets])).config
     loop = Loop()
     bus = Bus(config.bus, robot, loop.post)
     driver = Driver(loop, bus)
+    if mode == "pictures":
+        driver.receive_pictures()
     bus.open()
 
     serve(
         driver.begin,
-        lambda: driver.requests,
+        driver.pictures if mode == "pictures" else lambda: driver.requests,
         loop.stop,
         lambda word: loop.post(partial(driver.execute, word)),
     )
@@ -125,5 +143,5 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case [endpoint, "reset"]:
             reset(endpoint)
-        case [endpoint, "drive", robot, *sets]:
-            drive(endpoint, robot, sets)
+        case [endpoint, ("drive" | "pictures") as mode, robot, *sets]:
+            drive(endpoint, mode, robot, sets)

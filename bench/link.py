@@ -9,9 +9,11 @@ import contextlib
 import io
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
@@ -33,8 +35,9 @@ from verification.faults.remote_host import Address, net
 from verification.faults.stack_fixture import QUICK, QUICK_MOTORS
 from verification.harness.bus import bus_on, running
 from verification.harness.certificates import Site
+from verification.harness.dashboard import dashboard
 from verification.harness.ports import free_port
-from verification.harness.stack import running_stack
+from verification.harness.stack import RunningStack, running_stack
 from verification.harness.trace import TraceFollower, moves
 from verification.harness.waiting import becomes_true, wait_until
 
@@ -48,9 +51,13 @@ CONDITIONS = {
     "1 Mbit/s": Wire(rate=1e6, delay=0.01),
     "256 kbit/s": Wire(rate=256e3, delay=0.01),
 }
+NARROW = "256 kbit/s"
 OUTAGES_S = {
     "down for 0.2 s": 0.2, "down for 1 s": 1.0, "down for 5 s": 5.0, "another address": 0.0,
 }  # fmt: skip
+PLAIN, ROOM = "empty", "office"  # worlds to drive straight on, and to turn on the spot
+FINE = "camera.quality=2"  # the largest pictures
+TOKEN = "bench-of-a-bad-link"
 ANOTHER = 3  # the last number of the laptop's address
 SETTLE_S, SECONDS, ESTOP_S, PATIENCE_S = 1.0, 4.0, 5.0, 60.0
 SURE_NS = NS_PER_S  # of driving without a stop
@@ -95,9 +102,9 @@ class Hosts:
 
 
 @contextlib.contextmanager
-def two_hosts(folder: Path) -> Iterator[Hosts]:
+def two_hosts(folder: Path, *, with_camera: bool = False) -> Iterator[Hosts]:
     """Run both hosts, with mutual TLS between them."""
-    port, bumper_ns = free_port(), list[int]()
+    port = free_port()
     with contextlib.redirect_stdout(io.StringIO()):  # instructions of `t2 keys`
         site = Site(folder / "keys")
         robot = site.member("robot", "001", "--address", f"{net(port)}.1")
@@ -108,17 +115,49 @@ def two_hosts(folder: Path) -> Iterator[Hosts]:
     listen = f'["unixsock-stream/{folder}/bus.sock", "tls/0.0.0.0:{port}"]'
     with (
         running_stack(
-            folder, sets=[*QUICK, *robots], profiles=[QUICK_MOTORS], shipped=True, listen=listen
+            folder, ROOM if with_camera else PLAIN, sets=[*QUICK, *robots, FINE],
+            profiles=[QUICK_MOTORS], shipped=True, listen=listen, with_camera=with_camera,
         ) as stack,
+        ChildProcess(
+            "verification.faults.remote_host", stack.config.bus.listen[-1],
+            "bench.client", "pictures" if with_camera else "drive", "001", *drivers,
+        ) as laptop,
+        connected(stack, laptop) as hosts,
+    ):  # fmt: skip
+        yield hosts
+
+
+@contextlib.contextmanager
+def page_hosts(folder: Path, *, with_camera: bool) -> Iterator[Hosts]:
+    """Run both hosts, with the dashboard on the robot's and a page of it on the laptop's."""
+    token_file = folder / "token"
+    token_file.write_text(f"{TOKEN}\n")
+    sets = ["dashboard.host=0.0.0.0", f"dashboard.token_file={token_file}"]
+    with (
+        running_stack(
+            folder, ROOM, sets=[*QUICK, FINE], profiles=[QUICK_MOTORS], shipped=True,
+            with_camera=with_camera,
+        ) as stack,
+        dashboard(stack.endpoint, folder, *sets) as server,
+        ChildProcess(
+            "verification.faults.remote_host", f"http/127.0.0.1:{server.port}",
+            "bench.page", TOKEN, "picture" if with_camera else "sight",
+        ) as laptop,
+        connected(stack, laptop) as hosts,
+    ):  # fmt: skip
+        yield hosts
+
+
+@contextlib.contextmanager
+def connected(stack: RunningStack, laptop: ChildProcess) -> Iterator[Hosts]:
+    """Count the bumper samples on board while the context lasts."""
+    bumper_ns: list[int] = []
+    with (
         running(Loop()) as loop,
         bus_on(
             stack.endpoint, loop,
             lambda bus: bus.subscribe(keys.BUMPER, lambda it: bumper_ns.append(it.received_ns)),
         ),
-        ChildProcess(
-            "verification.faults.remote_host", stack.config.bus.listen[-1],
-            "bench.client", "drive", "001", *drivers,
-        ) as laptop,
     ):  # fmt: skip
         yield Hosts(laptop, TraceFollower(stack.trace_file), bumper_ns)
 
@@ -138,6 +177,11 @@ def measure_here() -> Figures:
     with tempfile.TemporaryDirectory() as folder, two_hosts(Path(folder)) as hosts:
         made = {name: under(hosts, faults) for name, faults in CONDITIONS.items()}
         made |= {name: outage(hosts, seconds) for name, seconds in OUTAGES_S.items()}
+    for name, (program, conditions) in WITH_PICTURES.items():
+        with tempfile.TemporaryDirectory() as folder, program(Path(folder)) as hosts:
+            for condition in conditions:
+                made[f"{condition}, {name}"] = under(hosts, CONDITIONS[condition])
+                made[f"{condition}, {name}"] |= hosts.laptop.end()
     made["allowed"] = {
         "stop": [round(SHIPPED.leased["teleop"].lease * NS_PER_S) + NOTICE_NS],
         "gap": [round(SHIPPED.times.bumper_age * NS_PER_S)],
@@ -151,6 +195,7 @@ def under(hosts: Hosts, faults: Wire) -> dict[str, Sequence[float]]:
     hosts.disturb(faults)
     time.sleep(SETTLE_S)
     since_ns = clock.now_ns()
+    hosts.laptop.send("begin")
     time.sleep(SECONDS)
     commands, pressed_ns = hosts.commands(since_ns), clock.now_ns()
     hosts.laptop.send("estop")
@@ -186,11 +231,22 @@ def outage(hosts: Hosts, seconds: float) -> dict[str, Sequence[float]]:
     }
 
 
+Program = Callable[[Path], AbstractContextManager[Hosts]]
+# What is on the laptop, and its conditions.
+WITH_PICTURES: Mapping[str, tuple[Program, Sequence[str]]] = {
+    "pictures, too": (partial(two_hosts, with_camera=True), [NARROW]),
+    "page": (partial(page_hosts, with_camera=False), [NARROW]),
+    "page by picture": (
+        partial(page_hosts, with_camera=True), ["good", "1 Mbit/s", NARROW],
+    ),
+}  # fmt: skip
 COLUMNS = (
     Column("time in motion", "driven", Unit("%", 0.01)), Column("stops", "stops", ONE),
     Column("E-STOP to BRAKE", "brake", MS), Column("STOP after", "stop", MS),
     Column("drives again after", "again", MS),
     Column("bumper's longest gap on board", "gap", MS, "max"),
+    Column("pictures", "pictures", Unit("/s", 1, 1)), Column("each", "size", Unit("kB", 1e3, 1)),
+    Column("their age", "age", Unit("ms", 1e-3)),
 )  # fmt: skip
 LIMITS: Limits = [
     ((name,), ("allowed",), column, 1.0)
