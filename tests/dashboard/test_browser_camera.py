@@ -109,8 +109,7 @@ def test_a_driver_sees_the_picture_and_its_age(page: Page, stack: RunningStack) 
     before = int(page.get_attribute("#picture", "data-seq") or 0)
     turn(page, stack)
     assert int(page.get_attribute("#picture", "data-seq") or 0) > before
-    # A busy host may be late with a single one.
-    wait_until(lambda: NOT_POSSIBLE not in text(page, "#picture-age"), "a young picture")
+    assert "s old" in text(page, "#picture-age")  # young when it turned; a busy host is late
 
 
 def freeze(camera: ScriptedCamera) -> None:
