@@ -17,7 +17,7 @@ from msgspec import Struct
 
 from cli.commission.motion import too_fast
 from cli.commission.report import Report
-from cli.commission.steps import PHRASE, confirm, show
+from cli.commission.steps import confirm, show
 from cli.commission.texts import ENGLISH, Say
 from cli.commission.watchdog import Point, Try, judge_watchdog, silent_try, slowed_s
 from cli.inspect.session import services
@@ -79,7 +79,7 @@ def measure_watchdog(report: Report, config: Everything, times: Times) -> None:
     """
     say = Say(report.language)
     show(say("watchdog.warning", speed=SPEED))
-    if not confirm(say("off_ground"), PHRASE, say):
+    if not confirm(say("off_ground"), "off_ground", say):
         raise T2Error(say("drive.not_confirmed"))
     longest_s = sum(times.fed) + sum(times.silent) + 3 * (len(times.fed) + len(times.silent))
     show(say("watchdog.turning", seconds=longest_s))

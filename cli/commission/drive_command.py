@@ -24,14 +24,15 @@ from cli.commission.manoeuvres import (
 from cli.commission.report import Report, Verdict
 from cli.commission.session import SOURCE, CheckoutSession
 from cli.commission.steps import (
-    GROUND_PHRASE,
     choice,
     confirm,
+    is_phrase,
     prompt,
     reported,
     show,
     unlatch,
 )
+from cli.commission.texts import Say
 from common.config import build
 from common.motion import Twist
 from common.standstill import stopping_s
@@ -40,7 +41,6 @@ from t2 import keys
 from t2.errors import T2Error
 from t2.messages import Mileage
 
-UNRECORDED = "without a recording"
 RECORDER_S = 3.0  # of health messages, one a second
 SWITCHES_S = 3.0
 COUNTERS_S = 2.0
@@ -71,7 +71,7 @@ class GuidedDrive:
         self._check_recorder()
         if problem := unlatch(self.session):
             raise T2Error(problem)
-        if not confirm(say("drive.ground"), GROUND_PHRASE, say):
+        if not confirm(say("drive.ground"), "ground", say):
             raise T2Error(say("drive.not_confirmed"))
 
     def run(self, manoeuvres: Sequence[Manoeuvre], *, returns: bool) -> None:
@@ -108,7 +108,7 @@ class GuidedDrive:
         if returns and (back := self._way_back(start)):
             self._step(back, f"[{total}/{total}]")
         self._check_recorder()
-        if missing := missing_stops(done, manoeuvres):
+        if missing := missing_stops(done, manoeuvres, self.session.say):
             show(f"\n{self.session.say('drive.missing', stops='; '.join(missing))}")
         show(self.session.say("drive.over"))
 
@@ -143,7 +143,7 @@ class GuidedDrive:
             result = self._attempt(it)
             outcome = say(f"verdict.{result.verdict.outcome}")
             text = say("found", outcome=outcome, text=result.verdict.text)
-            show(f"{text}{_figures(result.verdict)}")
+            show(f"{text}{_figures(result.verdict, say)}")
             if result.verdict.outcome == "passed" or result.then != "again":
                 return result
             if choice(say("any_word")):
@@ -193,7 +193,7 @@ class GuidedDrive:
             return None
         travelled = end.distance - start.distance
         turned = abs(math.remainder(end.heading - start.heading, math.tau))
-        back = homing(travelled, self.settings)
+        back = homing(travelled, self.settings, say)
         reason = ""
         if back is None:
             show(f"\n{say('drive.where', distance=abs(travelled))}")
@@ -204,7 +204,7 @@ class GuidedDrive:
         if not reason:
             return back
         show(f"\n{say('drive.no_return', distance=abs(travelled), reason=reason)}")
-        self.report.left_out = [*self.report.left_out, f"the return ({reason})"]
+        self.report.left_out = [*self.report.left_out, say("drive.return", reason=reason)]
         return None
 
     # --- conditions to begin --------------------------------------------------------------------
@@ -235,9 +235,10 @@ class GuidedDrive:
                 return
             say = self.session.say
             show(say("drive.unrecorded", problem=problem))
-            typed = prompt(say("drive.unrecorded_ask", phrase=UNRECORDED))
-            if typed.casefold() == UNRECORDED:
-                self.report.facts.append(("recording", f"none: {problem}"))
+            typed = prompt(say("drive.unrecorded_ask", phrase=say("phrase.unrecorded")))
+            if is_phrase(typed, "unrecorded"):
+                about = say("drive.no_recording", problem=problem)
+                self.report.facts.append((say.figure("recording"), about))
                 self.unrecorded, self.recorders = True, frozenset()
             elif typed:
                 raise T2Error(problem)
@@ -264,16 +265,17 @@ def guided_drive(
 ) -> None:
     """Carry out the manoeuvres of these groups that need at most this space straight on."""
     settings = build(SafetyConfig, session.settings("safety"))
-    wanted = [it for it in plan(settings) if not only or it.group in only]
+    planned = plan(settings, session.say)
+    wanted = [it for it in planned if not only or it.group in only]
     manoeuvres = [it for it in wanted if it.ahead <= space_m]
-    if left_out := len(plan(settings)) - len(manoeuvres):
-        report.left_out = [f"{left_out} manoeuvres by --only or --space"]
+    if left_out := len(planned) - len(manoeuvres):
+        report.left_out = [session.say("drive.excluded", count=left_out)]
     drive = GuidedDrive(session, report, settings, space_m=space_m)
     drive.begin()
     drive.run(manoeuvres, returns=not only or "return" in only)
 
 
-def _figures(verdict: Verdict) -> str:
+def _figures(verdict: Verdict, say: Say) -> str:
     """Return the figures of a verdict as lines below it: of the motion, and of its stop."""
-    texts = [f"{name} {text}" for name, text in verdict.data]
+    texts = [f"{say.figure(name)} {text}" for name, text in verdict.data]
     return "".join(f"\n  {', '.join(part)}" for part in (texts[:MOTION], texts[MOTION:]) if part)

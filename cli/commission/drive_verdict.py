@@ -68,7 +68,7 @@ class Result:
 def judge_drive(drive: Drive, settings: SafetyConfig) -> Result:
     """Return the verdict on one manoeuvre."""
     stops, reason = _stops(drive)
-    data = (*_speeds(drive), *_stop_data(stops, settings))
+    data = (*_speeds(drive), *_stop_data(stops, settings, drive.say))
     problem = drive.problem or next(_problems(drive, stops, reason, settings), None)
     if problem:
         return Result(Verdict("failed", problem.text, data), problem.then)
@@ -79,7 +79,7 @@ def judge_standstill(drive: Drive) -> Result:
     """Return the verdict on a standstill without requests: bias, noise and drift."""
     velocities, mileages = _values(drive.velocities), _values(drive.mileages)
     if len(velocities) < 2 or len(mileages) < 2:
-        return Result(Verdict("failed", "No velocities or no counters are received."), "end")
+        return Result(Verdict("failed", drive.say("judge.no_data")), "end")
     linear, angular = [v.linear for v in velocities], [v.angular for v in velocities]
     moved = abs(mileages[-1].distance - mileages[0].distance)
     turned = abs(math.remainder(mileages[-1].heading - mileages[0].heading, math.tau))
@@ -313,14 +313,14 @@ def _speeds(drive: Drive) -> Iterator[Row]:
         yield "counted", _signed(travel.counted.scaled(1 / span_s), drive.manoeuvre.twist)
 
 
-def _stop_data(stops: Sequence[Stop], settings: SafetyConfig) -> Iterator[Row]:
+def _stop_data(stops: Sequence[Stop], settings: SafetyConfig, say: Say) -> Iterator[Row]:
     """Yield the figures of a stop; one in a curve has those of both axes."""
     figures: dict[str, list[str]] = {}
     for stop in stops:
         unit = stop.axis.unit
         for name, text in (
-            ("reaction", _known(f"{stop.reaction:z.3f} s")),
-            ("deceleration", _known(f"{stop.deceleration:.2f} {unit}/s2")),
+            ("reaction", _known(f"{stop.reaction:z.3f} s", say)),
+            ("deceleration", _known(f"{stop.deceleration:.2f} {unit}/s2", say)),
             ("stop distance", f"{stop.distance:.3f} {unit}"),
             ("needed", f"{needed(stop):.3f} {unit}"),
             ("reckoned", f"{reckoned(stop, settings):.3f} {unit}"),
@@ -382,8 +382,8 @@ def _at_standstill(drive: Drive, bias: Twist) -> str:
     return ""
 
 
-def _known(text: str) -> str:
-    return "unknown" if "nan" in text else text
+def _known(text: str, say: Say) -> str:
+    return say("unknown") if "nan" in text else text
 
 
 def _signed(twist: Twist, axes: Twist | None = None) -> str:

@@ -47,7 +47,7 @@ def judge_latch(test: LatchTest, problem: str = "", say: Say = ENGLISH) -> Verdi
     for action, times_ns in ((latch, latches), (say("latch.brake"), brakes)):
         # A state may overtake the sample that caused it on the bus: that counts as zero.
         took_s = max(0, times_ns[0] - test.at_ns) / NS_PER_S if times_ns else None
-        data.append((f"{action} after", seconds(took_s, 3)))
+        data.append((say("figure.after", action=action), seconds(took_s, 3, say)))
         if took_s is None:
             problems.append(say("latch.not", action=action))
         elif took_s > LIMIT_S:

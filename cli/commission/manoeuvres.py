@@ -43,7 +43,6 @@ FIRST_MPS, FIRST_RADPS = 0.1, 0.2  # of the first motion, if the vehicle may be 
 RETURN_MPS = 0.2
 NEAR_M = 0.05  # from the beginning: no return is needed
 LAG_S = 0.1  # until a request of zero slows the vehicle down
-WORDS: dict[Ending, str] = {"stop": "STOP", "brake": "BRAKE", "slow": "Slow down"}
 
 
 class Manoeuvre(Struct, frozen=True):
@@ -112,21 +111,21 @@ def speed(twist: Twist) -> str:
     """Return the magnitudes of a twist as text."""
     parts = [f"{abs(twist.linear):.2f} m/s"] if twist.linear else []
     parts += [f"{abs(twist.angular):.2f} rad/s"] if twist.angular else []
-    return " and ".join(parts) or "0 m/s"
+    return ", ".join(parts) or "0 m/s"
 
 
-def plan(settings: SafetyConfig) -> tuple[Manoeuvre, ...]:
+def plan(settings: SafetyConfig, say: Say = ENGLISH) -> tuple[Manoeuvre, ...]:
     """Return the manoeuvres in their order, without the return to the beginning."""
-    return (standstill(), *_straight(settings), *_spot(settings), *_curve(settings),
-            full_turn(settings))  # fmt: skip
+    return (standstill(say), *_straight(settings, say), *_spot(settings, say),
+            *_curve(settings, say), full_turn(settings, say))  # fmt: skip
 
 
-def standstill() -> Manoeuvre:
+def standstill(say: Say = ENGLISH) -> Manoeuvre:
     """Return the standstill that shows bias and noise."""
-    return Manoeuvre("standstill", "Standstill", STILL, STILL, STANDSTILL_S)
+    return Manoeuvre("standstill", say("manoeuvre.standstill"), STILL, STILL, STANDSTILL_S)
 
 
-def full_turn(settings: SafetyConfig) -> Manoeuvre:
+def full_turn(settings: SafetyConfig, say: Say = ENGLISH) -> Manoeuvre:
     """Return a turn of 360 degrees: zero is requested so much earlier as the ramp takes."""
     rate = FULL_TURN * settings.vehicle.max_angular
     ramp = rate**2 / settings.vehicle.angular_deceleration / 2 + rate * LAG_S
@@ -134,12 +133,12 @@ def full_turn(settings: SafetyConfig) -> Manoeuvre:
     twist = Twist(angular=rate)
     seconds = math.tau / rate + rate / settings.safety.angular_acceleration + STANDING_RESERVE_S
     return Manoeuvre(
-        "full-turn", f"Full turn left at {speed(twist)}", twist, limit, seconds,
+        "full-turn", say("manoeuvre.full_turn", speed=speed(twist)), twist, limit, seconds,
         steady_s=math.inf, around=_around(settings),
     )  # fmt: skip
 
 
-def homing(travelled: float, settings: SafetyConfig) -> Manoeuvre | None:
+def homing(travelled: float, settings: SafetyConfig, say: Say = ENGLISH) -> Manoeuvre | None:
     """Return the motion back after a travel (m, forward positive); None if it is near."""
     if abs(travelled) < NEAR_M:
         return None
@@ -150,63 +149,73 @@ def homing(travelled: float, settings: SafetyConfig) -> Manoeuvre | None:
     limit = abs(travelled) - rate**2 / down / 2 - rate * LAG_S
     twist = Twist(linear=-math.copysign(rate, travelled))
     return Manoeuvre(
-        "return", f"Return {direction(twist)} by {abs(travelled):.2f} m", twist,
+        "return", say("manoeuvre.return", way=direction(twist), distance=abs(travelled)), twist,
         Twist(max(limit, NEAR_M / 2), 0.0), limit / rate + rate / up + STANDING_RESERVE_S,
         steady_s=math.inf, ahead=abs(travelled) + settings.safety.margin,
     )  # fmt: skip
 
 
-def missing_stops(done: Iterable[Manoeuvre], planned: Iterable[Manoeuvre]) -> tuple[str, ...]:
+def missing_stops(
+    done: Iterable[Manoeuvre], planned: Iterable[Manoeuvre], say: Say = ENGLISH
+) -> tuple[str, ...]:
     """Return the planned kinds of stops of which a fit needs more than were done, as texts."""
     counts = Counter((it.ending, direction(it.twist)) for it in done)
     kinds = {(it.ending, direction(it.twist)) for it in planned}
     wanted: dict[Ending, int] = {"stop": len(STOPS), "brake": len(BRAKES)}
     return tuple(
-        f"{WORDS[ending]} {each}: {counts[ending, each]} of {number}"
+        say(
+            "manoeuvre.missing",
+            ending=ending.upper(),
+            way=_way(each, say),
+            count=counts[ending, each],
+            number=number,
+        )
         for ending, number in wanted.items()
         for each in ("forward", "backward", "left", "right")
         if (ending, each) in kinds and counts[ending, each] < number
     )
 
 
-def _straight(settings: SafetyConfig) -> Iterator[Manoeuvre]:
+def _straight(settings: SafetyConfig, say: Say) -> Iterator[Manoeuvre]:
     top = settings.vehicle.max_linear
     first = min(FIRST_MPS, STOPS[0] * top)
-    yield from _pairs("straight", ((Twist(first), "slow"),), settings)
-    yield from _pairs("straight", ((Twist(each * top), "stop") for each in STOPS), settings)
-    yield from _pairs("straight", ((Twist(MIDDLE * top), "slow"),), settings)
-    yield from _pairs("straight", ((Twist(each * top), "brake") for each in BRAKES), settings)
+    yield from _pairs("straight", ((Twist(first), "slow"),), settings, say)
+    yield from _pairs("straight", ((Twist(each * top), "stop") for each in STOPS), settings, say)
+    yield from _pairs("straight", ((Twist(MIDDLE * top), "slow"),), settings, say)
+    yield from _pairs("straight", ((Twist(each * top), "brake") for each in BRAKES), settings, say)
 
 
-def _spot(settings: SafetyConfig) -> Iterator[Manoeuvre]:
+def _spot(settings: SafetyConfig, say: Say) -> Iterator[Manoeuvre]:
     top = settings.vehicle.max_angular
     first = min(FIRST_RADPS, TURN_STOPS[0] * top)
     turns = (Twist(0.0, each * top) for each in TURN_STOPS)
     brakes = (Twist(0.0, each * top) for each in BRAKES)
-    yield from _pairs("spot", ((Twist(0.0, first), "slow"),), settings)
-    yield from _pairs("spot", ((twist, "stop") for twist in turns), settings)
-    yield from _pairs("spot", ((Twist(0.0, MIDDLE * top), "slow"),), settings)
-    yield from _pairs("spot", ((twist, "brake") for twist in brakes), settings)
+    yield from _pairs("spot", ((Twist(0.0, first), "slow"),), settings, say)
+    yield from _pairs("spot", ((twist, "stop") for twist in turns), settings, say)
+    yield from _pairs("spot", ((Twist(0.0, MIDDLE * top), "slow"),), settings, say)
+    yield from _pairs("spot", ((twist, "brake") for twist in brakes), settings, say)
 
 
-def _curve(settings: SafetyConfig) -> Iterator[Manoeuvre]:
+def _curve(settings: SafetyConfig, say: Say) -> Iterator[Manoeuvre]:
     body = settings.vehicle
     curves = (Twist(CURVE * body.max_linear, side * CURVE * body.max_angular) for side in (1, -1))
-    yield from _pairs("curve", ((twist, "stop") for twist in curves), settings)
+    yield from _pairs("curve", ((twist, "stop") for twist in curves), settings, say)
 
 
 def _pairs(
-    group: Group, motions: Iterable[tuple[Twist, Ending]], settings: SafetyConfig
+    group: Group, motions: Iterable[tuple[Twist, Ending]], settings: SafetyConfig, say: Say
 ) -> Iterator[Manoeuvre]:
     """Yield each motion, and then the one back on the same curve."""
     return chain.from_iterable(
-        (_manoeuvre(group, twist, ending, settings),
-         _manoeuvre(group, twist.scaled(-1), ending, settings))
+        (_manoeuvre(group, twist, ending, settings, say),
+         _manoeuvre(group, twist.scaled(-1), ending, settings, say))
         for twist, ending in motions
     )  # fmt: skip
 
 
-def _manoeuvre(group: Group, twist: Twist, ending: Ending, settings: SafetyConfig) -> Manoeuvre:
+def _manoeuvre(
+    group: Group, twist: Twist, ending: Ending, settings: SafetyConfig, say: Say
+) -> Manoeuvre:
     own, body = settings.safety, settings.vehicle
     steady_s = STEADY_S + RESERVE_S
     linear, angular = abs(twist.linear), abs(twist.angular)
@@ -226,7 +235,8 @@ def _manoeuvre(group: Group, twist: Twist, ending: Ending, settings: SafetyConfi
     aside = radius * (1 - math.cos(min(turned, math.pi))) if linear and angular else 0.0
     ahead = radius if angular and turned > math.pi / 2 else driven
     return Manoeuvre(
-        group, f"{WORDS[ending]} {direction(twist)} from {speed(twist)}", twist, limit,
+        group, say(f"manoeuvre.{ending}", way=_way(direction(twist), say), speed=speed(twist)),
+        twist, limit,
         RESERVE * rising_s + steady_s + STANDING_RESERVE_S, ending,
         ahead=min(ahead, driven) + own.margin if linear else 0.0,
         aside=aside + own.margin if linear and angular else 0.0,
@@ -244,3 +254,12 @@ def direction(twist: Twist) -> str:
     driving = ("forward" if twist.linear > 0 else "backward") if twist.linear else ""
     turning = ("left" if twist.angular > 0 else "right") if twist.angular else ""
     return f"{driving} turning {turning}" if driving and turning else driving or turning
+
+
+def _way(direction: str, say: Say) -> str:
+    """Return a direction as text."""
+    driving, is_curve, side = direction.partition(" turning ")
+    if is_curve:
+        return say("manoeuvre.curve", way=driving, side=side)
+    is_turn = driving in ("left", "right")
+    return say("manoeuvre.turning" if is_turn else "manoeuvre.driving", way=driving)

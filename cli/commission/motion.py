@@ -92,7 +92,9 @@ def judge_motion(run: Run) -> Verdict:
     """Return the verdict on one motion."""
     measured, stood_s, say = measure(run), stood_after_s(run), run.say
     if measured is None:
-        return judged([_not_granted(run)], "", [("standstill after", seconds(stood_s))])
+        return judged(
+            [_not_granted(run)], "", [("standstill after", seconds(stood_s, say=run.say))]
+        )
     problems = list(_problems(run, measured))
     if stood_s is None or stood_s > STOP_S:
         problems.append(say("motion.not_stood", limit=STOP_S))
@@ -197,5 +199,5 @@ def _data(run: Run, it: Measured, stood_s: float | None) -> list[Row]:
         (f"counted, {unit}", f"{it.counted:.3f}"),
         (f"measured velocity, {unit}", f"{it.velocity:.3f}"),
         ("counted / commanded", f"{it.counted / it.commanded:.3f}"),
-        ("standstill after", seconds(stood_s)),
+        ("standstill after", seconds(stood_s, say=run.say)),
     ]

@@ -47,9 +47,9 @@ def failed(problem: str) -> Verdict:
     return Verdict("failed", problem)
 
 
-def seconds(value: float | None, digits: int = 2) -> str:
+def seconds(value: float | None, digits: int = 2, say: Say = ENGLISH) -> str:
     """Return a time as text; None means that the event did not occur."""
-    return "never" if value is None else f"{value:.{digits}f} s"
+    return say("never") if value is None else f"{value:.{digits}f} s"
 
 
 @dataclass(slots=True)
@@ -138,7 +138,7 @@ def _steps(steps: Sequence[tuple[str, Verdict]], say: Say) -> Iterator[list[str]
             yield [
                 f"### {_cell(title)}",
                 "",
-                *_table(_head(say, "measured", "value"), verdict.data),
+                *_table(_head(say, "measured", "value"), _named(verdict.data, say)),
             ]
 
 
@@ -150,7 +150,12 @@ def _manoeuvres(done: Sequence[tuple[str, Verdict]], say: Say) -> Iterator[list[
         data = dict(verdict.data)
         figures = (data.get(name, "") for name in COLUMNS)
         rows.append((title, *figures, say(f"verdict.{verdict.outcome}"), verdict.text))
-    yield _table([*_head(say, "manoeuvre"), *COLUMNS, *_head(say, "result", "finding")], rows)
+    columns = map(say.figure, COLUMNS)
+    yield _table([*_head(say, "manoeuvre"), *columns, *_head(say, "result", "finding")], rows)
+
+
+def _named(data: Iterable[Row], say: Say) -> list[Row]:
+    return [(say.figure(name), value) for name, value in data]
 
 
 def _headline(report: Report, say: Say) -> str:

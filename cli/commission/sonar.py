@@ -61,11 +61,6 @@ def near(sample: Ultrasonic, rest: Rest) -> frozenset[str]:
     )
 
 
-def words(name: str) -> str:
-    """Return the name of a sonar as words."""
-    return name.replace("_", " ")
-
-
 def obstructions(rest: Rest, say: Say = ENGLISH) -> str:
     """Return a text that names sonars without free space; empty if all have it."""
     tight = [
@@ -86,10 +81,11 @@ def judge_sonars(
     problems, data = [], []
     for name, resting, detected_by in zip(SONAR_NAMES, rest, found, strict=False):
         problems.append(_problem(name, resting, detected_by, say))
-        at_rest = "no reading" if resting is None else f"{resting:.2f} m"
-        shown = at_rest.replace("inf m", "no echo")
-        names = ", ".join(map(words, detected_by)) or "none"
-        data.append((f"hand in front of {words(name)}", f"detected by {names}; at rest {shown}"))
+        at_rest = say("no_reading") if resting is None else f"{resting:.2f} m"
+        shown = at_rest.replace("inf m", say("no_echo"))
+        names = tuple(detected_by) or say("nothing")
+        detected = say("figure.detected", sonars=names, rest=shown)
+        data.append((say("figure.hand", sonar=name), detected))
     if left:
         count = {"done": len(found), "all": len(SONAR_NAMES)}
         problems.append(say("sonar.left", **count, reason=left))

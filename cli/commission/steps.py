@@ -21,7 +21,7 @@ from cli.commission.sonar import (
     obstructions,
     resting_ranges,
 )
-from cli.commission.texts import ENGLISH, Say
+from cli.commission.texts import ENGLISH, TEXTS, Say
 from common import clock
 from common.motion import Twist
 from common.text import printable
@@ -39,8 +39,6 @@ LATCH_S = 2.0
 CLEAR_S = 0.3  # the bridge needs three clear samples, and safety three samples of these
 DRIVE_S = 2.0
 FORWARD, TURN = Twist(linear=0.1), Twist(angular=0.2)
-RESET_PHRASE, PHRASE = "reset", "wheels off the ground"
-GROUND_PHRASE = "on the ground, free space"  # of the guided drive
 
 
 # --- dialogue ----------------------------------------------------------------------------------
@@ -80,15 +78,23 @@ def prompt(question: str) -> str:
     return line.removeprefix("\ufeff").strip()  # a file of answers may begin with a mark
 
 
+def is_phrase(typed: str, name: str) -> bool:
+    """Return whether a line is this phrase of the texts, in either language."""
+    return typed.casefold() in TEXTS[f"phrase.{name}"]
+
+
 def confirm(fact: str, phrase: str, say: Say = ENGLISH) -> bool:
-    """Return whether the operator types the phrase."""
-    return prompt(say("confirm", fact=fact, phrase=phrase)).lower() == phrase
+    """Return whether the operator types the phrase with this name."""
+    typed = prompt(say("confirm", fact=fact, phrase=say(f"phrase.{phrase}")))
+    return is_phrase(typed, phrase)
 
 
 def choice(question: str) -> str:
     """Return one line; a phrase that was typed too early or too late counts as Enter."""
     typed = prompt(question)
-    return "" if typed.casefold() in (PHRASE, RESET_PHRASE, GROUND_PHRASE) else typed
+    return (
+        "" if any(is_phrase(typed, each) for each in ("reset", "off_ground", "ground")) else typed
+    )
 
 
 # --- steps --------------------------------------------------------------------------------------
@@ -198,7 +204,7 @@ def unlatch(session: CheckoutSession) -> str:
     if not latched:
         return ""
     say = session.say
-    if not confirm(say("latch.before", causes=latched), RESET_PHRASE, say):
+    if not confirm(say("latch.before", causes=latched), "reset", say):
         return say("latch.not_reset")
     return session.reset().problem(say)
 
@@ -214,7 +220,7 @@ def move(requested: Twist, session: CheckoutSession) -> Verdict:
     if problem := unlatch(session):
         return failed(problem)
     say = session.say
-    if not confirm(say("off_ground"), PHRASE, say):
+    if not confirm(say("off_ground"), "off_ground", say):
         return failed(say("not_confirmed"))
     settings = session.settings("bridge")
     session.mark()

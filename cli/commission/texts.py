@@ -1,6 +1,6 @@
-"""Texts of ``t2 checkout``, in English and Chinese. What the operator types stays as it is shown.
+"""Texts of ``t2 checkout``, in English and Chinese.
 
-Names of measured figures and titles of manoeuvres are in English only.
+The operator types the phrases that confirm an action in either language.
 """
 
 from collections.abc import Iterable
@@ -30,6 +30,10 @@ TEXTS: dict[str, Words] = {
     ),
     "remark": ("{text} Remark: {remark}", "{text}备注：{remark}"),
     "confirm": ('{fact}\nType "{phrase}" to confirm:', "{fact}\n请输入“{phrase}”确认："),
+    "phrase.reset": ("reset", "复位"),
+    "phrase.off_ground": ("wheels off the ground", "车轮离地"),
+    "phrase.ground": ("on the ground, free space", "车轮着地，空间已清空"),
+    "phrase.unrecorded": ("without a recording", "不录制"),
     "done": ("{done} of {all} passed.", "{all} 项中有 {done} 项合格。"),
     "missing": ("Still missing: {titles}.", "尚未合格：{titles}。"),
     "sign": ("To sign this off, type your name ({name}):", "签名确认：请输入您的姓名（{name}）："),
@@ -71,6 +75,34 @@ TEXTS: dict[str, Words] = {
     "report.partial": (
         "Partial checkout, left out: {names}.", "部分验收，略去：{names}。",
     ),
+    "figure.recording": ("recording", "录制"),
+    "figure.commanded": ("commanded", "指令"),
+    "figure.measured": ("measured", "实测"),
+    "figure.counted": ("counted", "计数"),
+    "figure.noise": ("noise", "噪声"),
+    "figure.reaction": ("reaction", "反应时间"),
+    "figure.deceleration": ("deceleration", "减速度"),
+    "figure.stop distance": ("stop distance", "停车距离"),
+    "figure.needed": ("needed", "实际所需"),
+    "figure.reckoned": ("reckoned", "按设置预计"),
+    "figure.measured over": ("measured over", "测量时长"),
+    "figure.measured velocity": ("measured velocity", "实测速度"),
+    "figure.counted / commanded": ("counted / commanded", "计数 / 指令"),
+    "figure.standstill after": ("standstill after", "停稳用时"),
+    "figure.switches confirmed on": ("switches confirmed on", "已确认开启的开关"),
+    "figure.received at port": ("received at port", "接收端口"),
+    "figure.relay": ("relay", "中继器"),
+    "figure.rejected": ("rejected", "拒收"),
+    "figure.reset": ("reset", "复位"),
+    "figure.BRAKE commands received": ("BRAKE commands received", "收到的 BRAKE 指令数"),
+    "figure.after": ("{action} after", "{action}用时"),
+    "figure.hand": ("hand in front of {sonar:word}", "手在{sonar:word}传感器前方"),
+    "figure.detected": (
+        "detected by {sonars:word}; at rest {rest}", "检测到的传感器：{sonars:word}；静止时 {rest}",
+    ),
+    "no_reading": ("no reading", "无读数"),
+    "no_echo": ("no echo", "无回波"),
+    "unknown": ("unknown", "未知"),
     "never": ("never", "从未"),
     "nothing": ("nothing", "无"),
     # the link
@@ -251,6 +283,23 @@ TEXTS: dict[str, Words] = {
     ),
     "motion.reports": ("Safety reports: {text}", "安全服务的原因：{text}"),
     # the guided drive and the watchdog
+    "manoeuvre.standstill": ("Standstill", "静止"),
+    "manoeuvre.full_turn": ("Full turn left at {speed}", "向左转一整圈，{speed}"),
+    "manoeuvre.return": ("Return {way:word} by {distance:.2f} m", "{way:word}返回 {distance:.2f} m"),
+    "manoeuvre.stop": ("STOP {way} from {speed}", "{way}，{speed} 时 STOP"),
+    "manoeuvre.brake": ("BRAKE {way} from {speed}", "{way}，{speed} 时 BRAKE"),
+    "manoeuvre.slow": ("Slow down {way} from {speed}", "{way}，从 {speed} 减速"),
+    "manoeuvre.driving": ("{way:word}", "{way:word}"),
+    "manoeuvre.turning": ("{way:word}", "原地{way:word}转"),
+    "manoeuvre.curve": ("{way:word} turning {side:word}", "{way:word}并{side:word}转"),
+    "manoeuvre.missing": (
+        "{ending} {way}: {count} of {number}", "{way} {ending}：{number} 次中的 {count} 次",
+    ),
+    "drive.return": ("the return ({reason})", "返回（{reason}）"),
+    "drive.excluded": (
+        "{count} manoeuvres by --only or --space", "{count} 个动作（--only 或 --space）",
+    ),
+    "drive.no_recording": ("none: {problem}", "无：{problem}"),
     "drive.warning": (
         "The vehicle drives on the ground. Hold the vehicle's own stop switch, and keep everybody "
         "away from it.\nMark its place on the ground. Each motion is announced with the free space "
@@ -260,7 +309,7 @@ TEXTS: dict[str, Words] = {
         "车辆将在地面上行驶。请手握车身上的急停开关，任何人不得靠近车辆。\n"
         "请在地面上标记车辆位置。每个动作开始前会说明所需的空间。\n"
         "STOP：验收程序停止发送，指令失效。BRAKE：验收程序触发急停，然后复位。\n"
-        "Slow down：验收程序要求零速。按 Ctrl-C 即急停，并结束行驶。",
+        "减速：验收程序要求零速。按 Ctrl-C 即急停，并结束行驶。",
     ),
     "drive.ground": (
         "All wheels stand on the ground, and the space is free.", "所有车轮均已着地，周围空间已清空。",
@@ -647,6 +696,12 @@ class Say:
         if name not in TEXTS:
             raise KeyError(name)
         return render((Phrase(name, fields),), self.language, texts=TEXTS)
+
+    def figure(self, name: str) -> str:
+        """Return the name of a measured figure, of which a unit may follow a comma."""
+        what, comma, unit = name.partition(", ")
+        words = TEXTS.get(f"figure.{what}")
+        return f"{self.of(words)}{comma}{unit}" if words else name
 
     def of(self, words: Words) -> str:
         """Return a pair of texts in the language."""

@@ -9,18 +9,19 @@ import pytest
 from cli.__main__ import main
 from cli.commission import command, steps
 from cli.commission.report import Report, Verdict, failed, render
-from cli.commission.steps import PHRASE, RESET_PHRASE, Step, confirm
+from cli.commission.steps import Step, confirm
 from common.cli_args import EXIT_CONFIG
 from common.errors import ConfigError
 from t2.errors import LinkError
 
+PHRASE = "wheels off the ground"
 SESSION: Any = None
 NOT_CONFIRMED = failed("Not confirmed: no motion was requested.")
 DRIVEN = Verdict("passed", "The wheels turned.")
 
 
 def drive(_: object) -> Verdict:
-    return DRIVEN if confirm("The wheels will turn.", PHRASE) else NOT_CONFIRMED
+    return DRIVEN if confirm("The wheels will turn.", "off_ground") else NOT_CONFIRMED
 
 
 @pytest.mark.parametrize(
@@ -28,7 +29,9 @@ def drive(_: object) -> Verdict:
     [
         (["no room"], Verdict("skipped", "no room")),
         ([PHRASE.upper(), PHRASE], DRIVEN),  # too early: it begins, and is asked for
-        ([RESET_PHRASE, PHRASE], DRIVEN),
+        (["reset", PHRASE], DRIVEN),
+        (["复位", "车轮离地"], DRIVEN),
+        (["", "车轮离地"], DRIVEN),
         (["", "wheel", "", PHRASE], DRIVEN),
         (["", "", PHRASE, PHRASE], DRIVEN),  # too late: it tries again
         (["", "", "no key"], failed(f"{NOT_CONFIRMED.text} Remark: no key")),

@@ -14,7 +14,6 @@ from cli.commission.drive_command import GuidedDrive, guided_drive
 from cli.commission.manoeuvres import Group, Manoeuvre, plan
 from cli.commission.report import Report, render
 from cli.commission.session import CheckoutSession
-from cli.commission.steps import GROUND_PHRASE, RESET_PHRASE
 from cli.fit.stops import find_stops
 from cli.fit.streams import Streams
 from common.config import build
@@ -213,7 +212,7 @@ def unnamed(it: Fixture) -> None:
 def test_its_own_latch_stays_when_an_operator_has_pressed_too(
     after_ms: int, stop: Callable[[Fixture], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    answers = iter(["", "go on", "", RESET_PHRASE])
+    answers = iter(["", "go on", "", "reset"])
     with driving(monkeypatch, answers=lambda _: next(answers)) as it:
         waited_ms = 0
 
@@ -530,7 +529,7 @@ def test_it_refuses_to_begin(
 
 
 def test_groups_and_the_free_space_choose(monkeypatch: pytest.MonkeyPatch) -> None:
-    answers = {"recording": "without a recording", "confirm": GROUND_PHRASE}
+    answers = {"recording": "without a recording", "confirm": "on the ground, free space"}
 
     def answer(question: str) -> str:
         return next((text for word, text in answers.items() if word in question), "")

@@ -183,7 +183,7 @@ def test_standstill() -> None:
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"velocities": []}, "No velocities or no counters are received."),
+        ({"velocities": []}, "No velocities or no counters:"),
         ({"motions": Vehicle().drive(STOP).motions}, "Another program drives: end it first."),
         ({"velocities": Vehicle().drive(STOP).velocities}, "At standstill the board measures +0.2"),
         ({"velocities": Vehicle().drive(standstill()).velocities[::5]}, "A velocity arrives each "),

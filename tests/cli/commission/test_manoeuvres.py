@@ -79,7 +79,7 @@ def test_what_was_not_planned_is_not_missing() -> None:
         (DEFAULT, "STOP right from 0.80 rad/s", "0.9 m around the vehicle's middle"),
         (
             DEFAULT,
-            "STOP backward turning right from 0.40 m/s and 0.40 rad/s",
+            "STOP backward turning right from 0.40 m/s, 0.40 rad/s",
             "1.3 m behind and 0.9 m to the left",
         ),
     ],

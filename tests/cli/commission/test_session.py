@@ -6,12 +6,14 @@ import pytest
 
 from cli.commission import steps
 from cli.commission.session import CheckoutSession, checkout_session
-from cli.commission.steps import FORWARD, PHRASE, RESET_PHRASE
+from cli.commission.steps import FORWARD
 from common.bus import inspector
 from sim.requests import Bumper
 from tests.cli.processes import PATIENCE_S
 from verification.harness.stack import RunningStack, running_stack
 from verification.harness.waiting import wait_until
+
+PHRASE = "wheels off the ground"
 
 
 def nobody_reads(session: CheckoutSession) -> None:
@@ -58,7 +60,7 @@ def test_a_hit_during_a_question_is_seen_and_reset_and_ends_a_motion(
             asked.append(question)
             nobody_reads(session)
             if PHRASE not in question:
-                return RESET_PHRASE
+                return "reset"
             hit(stack)
             nobody_reads(session)
             return PHRASE

@@ -87,7 +87,7 @@ def test_faulty_blind_wrong_and_double_detection() -> None:
         "rear: the hand was detected by rear, rear left."
     )
     assert [row[1] for row in verdict.data[:2]] == [
-        "detected by none; at rest no reading", "detected by front right; at rest 1.50 m",
+        "detected by nothing; at rest no reading", "detected by front right; at rest 1.50 m",
     ]  # fmt: skip
 
 

@@ -7,7 +7,10 @@ import pytest
 
 from cli.commission import steps, texts
 from cli.commission.link import judge_link
+from cli.commission.manoeuvres import homing, missing_stops, plan
+from cli.commission.report import COLUMNS
 from cli.commission.texts import TEXTS, Say
+from services.safety.config import SafetyConfig
 from t2.words import PLACEHOLDER
 from tests.factories import link
 
@@ -39,3 +42,25 @@ def test_a_verdict_in_chinese() -> None:
     verdict = judge_link(links, None, Say("zh"))
     assert verdict.text.startswith("链路未能全程保持在线（当前：lost）")
     assert "。帧数过少，无法判定：0。" in verdict.text
+
+
+def test_titles_of_manoeuvres_in_chinese() -> None:
+    settings, say = SafetyConfig(), Say("zh")
+    titles = [each.title for each in plan(settings, say)]
+    titles += [back.title for back in [homing(1.0, settings, say)] if back]
+    assert len(set(titles)) == len(plan(settings)) + 1
+    assert "左转，0.30 rad/s 时 STOP" in "\n".join(titles)
+    assert "后退返回 1.00 m" in titles
+    assert [title for title in titles if not CHINESE.search(title)] == []
+    (missing, *_) = missing_stops([], plan(settings, say), say)
+    assert missing == "前进 STOP：6 次中的 0 次"
+
+
+def test_figures_have_names_in_both_languages() -> None:
+    verdict = judge_link([link(), link()], None, Say("zh"))
+    names = [Say("zh").figure(name) for name, _ in verdict.data]
+    assert names[-4:] == ["已确认开启的开关", "接收端口", "中继器", "拒收"]
+    assert Say("zh").figure("counted, m/s") == "计数, m/s"
+    assert Say().figure("counted, m/s") == "counted, m/s"
+    missing = [name for name in COLUMNS if not CHINESE.search(Say("zh").figure(name))]
+    assert missing == []
