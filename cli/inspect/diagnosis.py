@@ -37,6 +37,7 @@ FROM_STREAM = {
 }
 ONCE = (*keys.ON_BOARD, "localization", "patrol")  # for a robot; any number of others may run
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
+OPTIONAL = ("recorder", "localization", "patrol", "camera")  # the robot may do without
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
 FIX_S = 10.0  # age of the newest fix that is reported
@@ -133,6 +134,9 @@ def services(seen: Observation) -> Iterator[Finding]:
             yield found("services", "note", "services.stalls", "stalls", **about)
         elif health:
             yield found("services", "ok", "services.up", uptime=health.uptime, **about)
+    # One that hangs leaves the bus after some seconds: its line is here then.
+    if seen.listed and (absent := tuple(name for name in OPTIONAL if name not in seen.instances)):
+        yield found("services", "ok", "services.optional", names=absent)
 
 
 def versions(seen: Observation) -> Iterator[Finding]:

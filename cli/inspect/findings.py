@@ -57,6 +57,10 @@ FINDINGS: dict[str, Words] = {
     ),
     "services.absent_one": ("{names:service} is not running", "{names:service}未运行"),
     "services.absent": ("{names:service} are not running", "{names:service}未运行"),
+    "services.optional": (
+        "not running, and needed only where they are used: {names:service}",
+        "未运行（仅在使用时需要）：{names:service}",
+    ),
     "services.unlisted_one": (
         "{names:service} is perhaps running: the router did not list the services in time",
         "{names:service}可能在运行：路由器未及时列出服务",
