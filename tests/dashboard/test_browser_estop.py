@@ -76,6 +76,11 @@ def test_a_page_whose_scripts_do_not_run_stops_and_says_so(
     page.keyboard.press("e")
     wait_until(lambda: peer.estops, "the emergency stop")
     wait_for_text(page, "#unsent", "was sent to the dashboard")
+    peer.latched = ("estop",)
+    page.unroute(f"**/{script}")
+    page.reload()
+    wait_for_text(page, "#delay-value", " s")
+    page.wait_for_function("() => !document.querySelector('#unsent').textContent")
 
 
 def test_a_stop_without_a_network_is_sent_once_it_is_back(

@@ -8,7 +8,7 @@
 // state      leads to                                             shown
 // pending    confirmed: removed; KEPT_MS: late                    not sent yet; not confirmed
 // late       acknowledged: removed; pressed again: pending        was not sent; was not confirmed
-// handed     acknowledged: removed                                sent for a robot of another page
+// handed     confirmed, acknowledged: removed                     sent where no snapshot shows it
 (function () {
   "use strict";
   var REPEAT_MS = 400;
@@ -173,8 +173,8 @@
 
   function update(safety) {
     var it = stops[robotShown()];
-    var isEarly = !it || it.state !== "pending" || now() - it.since < MIN_AGE_MS;
-    if (!isEarly && safety && safety.latched.indexOf("estop") >= 0) remove(robotShown());
+    var isOpen = it && it.state !== "late" && now() - it.since >= MIN_AGE_MS;
+    if (isOpen && safety && safety.latched.indexOf("estop") >= 0) remove(robotShown());
   }
 
   // --- what the screen shows ----------------------------------------------------------------------
