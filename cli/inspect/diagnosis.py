@@ -96,7 +96,7 @@ def diagnose(seen: Observation, robot: str) -> Iterator[Finding]:
         others = tuple(seen.others)
         yield found("robot", "wrong", "robot.wrong", "robot", robot=robot, others=others)
         return
-    for check in (services, versions, rights, clock):
+    for check in (services, optional, versions, rights, clock):
         yield from check(seen)
     yield from board(seen)
     yield from localization(seen)
@@ -134,8 +134,12 @@ def services(seen: Observation) -> Iterator[Finding]:
             yield found("services", "note", "services.stalls", "stalls", **about)
         elif health:
             yield found("services", "ok", "services.up", uptime=health.uptime, **about)
-    # One that hangs leaves the bus after some seconds: its line is here then.
-    if seen.listed and (absent := tuple(name for name in OPTIONAL if name not in seen.instances)):
+
+
+def optional(seen: Observation) -> Iterator[Finding]:
+    """Name the optional services that do not run; one that hangs leaves the bus after seconds."""
+    absent = tuple(name for name in OPTIONAL if name not in seen.instances)
+    if seen.listed and absent and not seen.is_absent("safety"):
         yield found("services", "ok", "services.optional", names=absent)
 
 

@@ -248,10 +248,10 @@ PHRASES: dict[str, Words] = {
     "two_publishers.of": ("Two programs send as {sources}.", "两个程序都以 {sources} 的名称发送。"),
     "limit_stop.by": ("Stopped by {sources}.", "{sources} 要求停车。"),
     "limit_silent.of": ("No speed limit arrives from {sources}.", "收不到 {sources} 的限速消息。"),
-    "limit.by": ("Slowed by {source}.", "被 {source} 限速。"),
+    "limit.by": ("Slowed by {source:source}.", "被{source:source}限速。"),
     "neutral.overruled": (
-        "{other} was in control: {source} must let go of the controls, then drive.",
-        "{other} 曾取得控制权：{source} 须先松开操纵装置，再驾驶。",
+        "{other:source} was in control: {source:source} must let go of the controls, then drive.",
+        "{other:source}曾取得控制权：{source:source}须先松开操纵装置，再驾驶。",
     ),
     "blocked.near": (
         "No room toward the {sonar:word}: {distance:.2f} m.",
@@ -284,10 +284,11 @@ PHRASES: dict[str, Words] = {
         "超声波传感器不可信：{sonar:word}（{fault:word}）。",
     ),
     # control
-    "control.of": ("{source} is in control.", "由 {source} 控制。"),
+    "control.of": ("{source:source} is in control.", "由{source:source}控制。"),
     "control.you": ("You are in control.", "由您控制。"),  # to the operator of that source
     "control.asked": (
-        "{by} begins to drive while {other} is in control.", "{other} 控制期间，{by} 开始驾驶。",
+        "{by:source} begins to drive while {other:source} is in control.",
+        "{other:source}控制期间，{by:source}开始驾驶。",
     ),
     "control.none": ("No operator and no program is in control.", "当前没有操作员或程序在控制车辆。"),
     # the next step at a latch
@@ -964,8 +965,8 @@ EVENTS: tuple[EventRow, ...] = (
     EventRow(
         "teleop", "overruled", "warning",
         (
-            "{other} has taken over: the controls count as let go.",
-            "{other} 取得控制权：操纵装置视为已松开。",
+            "{other:source} has taken over: the controls count as let go.",
+            "{other:source}取得控制权：操纵装置视为已松开。",
         ),
         (
             "let go of the keyboard and the gamepad, then drive again",
@@ -1151,6 +1152,14 @@ SERVICES: dict[str, Words] = {
     "recorder": ("recorder", "记录器"),
     "metrics": ("metrics", "监控指标"),
     "ros2": ("ROS 2", "ROS 2"),
+}
+
+# Sources of requests in the default settings, as an operator knows them.
+SOURCES: dict[str, Words] = {
+    "web": ("web (page)", "网页（web）"),
+    "teleop": ("teleop (terminal)", "驾驶终端（teleop）"),
+    "patrol": ("patrol", "巡逻（patrol）"),
+    "checkout": ("checkout", "验收程序（checkout）"),
 }
 
 # Words inside a phrase, such as names of inputs. A word without a row is shown as it is, with spaces.

@@ -27,8 +27,8 @@ PHRASES: dict[str, Words] = {
         "Paused: resume the round to go on.", "已暂停：请选择“继续”。",
     ),
     "patrol.overruled": (
-        "Paused: {source} has taken control. Resume the round to go on.",
-        "已暂停：{source} 取得控制权。如需继续巡逻，请选择“继续”。",
+        "Paused: {source:source} has taken control. Resume the round to go on.",
+        "已暂停：{source:source}取得控制权。如需继续巡逻，请选择“继续”。",
     ),
     "patrol.home": ("The round is complete, and the vehicle is at home.", "巡逻完成，车辆已回到起点。"),
     "patrol.returned": (
@@ -131,7 +131,8 @@ PHRASES: dict[str, Words] = {
         "车辆距路线 {route} 的起点（第一站）{distance:.2f} m，允许 {corridor:.2f} m：请将其驾驶到起点。",
     ),
     "patrol.other_drives": (
-        "{source} is in control: let go of the controls.", "由 {source} 控制：请松开操纵装置。",
+        "{source:source} is in control: let go of the controls.",
+        "由{source:source}控制：请松开操纵装置。",
     ),
     "patrol.disk": (
         "{folder} cannot be written ({reason}): free disk space, or check its permissions.",

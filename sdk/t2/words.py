@@ -4,6 +4,7 @@ A cause, an event or a refusal is a name with fields, so that each screen shows 
 of its reader. A template has a placeholder for each field: ``{name}``, with an optional format of
 Python's, as in ``{age:.1f}``. ``{name:word}`` is a word of the catalogue, or several.
 ``{name:service}`` is the name of a service, for its commands too: ``里程计（odom）`` in Chinese.
+``{name:source}`` is that of a source of requests: ``web (page)``.
 ``{name:operator}`` is the name of an operator, or ``viewer 3`` for one without a name.
 """
 
@@ -11,7 +12,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
-from t2.catalogue import SERVICES, TEXTS, WORDS
+from t2.catalogue import SERVICES, SOURCES, TEXTS, WORDS
 from t2.messages import Done, Field, Phrase, Refusal
 from t2.patrol_texts import Words
 
@@ -75,6 +76,9 @@ def _value(value: Field, form: str, language: Language) -> str:
     if form == "service":
         is_known = language == "zh" and value in SERVICES
         return f"{SERVICES[str(value)][1]}（{value}）" if is_known else str(value)
+    if form == "source":
+        words = SOURCES.get(str(value))
+        return in_language(words, language) if words else str(value)
     if form == "operator":
         found = VIEWER.fullmatch(str(value))
         return f"{in_language(WORDS['viewer'], language)} {found[1]}" if found else str(value)

@@ -203,7 +203,10 @@ LABELS: dict[str, Words] = {
         "VIEW ONLY: this certificate may not drive, and perhaps not stop.",
         "仅限观看：此证书无权驾驶，可能也无权急停。",
     ),
-    "overruled": ("OVERRULED by {by}: let go of the controls.", "{by} 已取得控制权：请松开操纵装置。"),
+    "overruled": (
+        "OVERRULED by {by:source}: let go of the controls.",
+        "{by:source}已取得控制权：请松开操纵装置。",
+    ),
     # lines of this terminal's own events panel
     "reset.not_sent": (
         "Reset not sent: no fresh state of safety.", "复位未发送：没有安全服务的最新状态。",

@@ -171,7 +171,7 @@ def test_the_texts_of_safety_in_both_languages() -> None:
         )
     )
     assert view.text == Texts(
-        "The bumper was hit. web is in control.", "防撞条已触发。由 web 控制。"
+        "The bumper was hit. web (page) is in control.", "防撞条已触发。由网页（web）控制。"
     )
     assert view.own_text == Texts(
         "The bumper was hit. You are in control.", "防撞条已触发。由您控制。"

@@ -48,12 +48,12 @@ def test_one_sentence_says_why() -> None:
     fixture.drive(0.5)
     assert sentence_of(fixture.state).startswith("Let go of the controls")
     fixture.drive()
-    assert sentence_of(fixture.state) == "teleop is in control."
+    assert sentence_of(fixture.state) == "teleop (terminal) is in control."
     fixture.sonar(front=0.5)
     fixture.drive(0.5)
     assert (
         sentence_of(fixture.state)
-        == "Slowed by an obstacle at 0.50 m (front). teleop is in control."
+        == "Slowed by an obstacle at 0.50 m (front). teleop (terminal) is in control."
     )
     fixture.pressed = True
     fixture.tick()

@@ -192,7 +192,7 @@ SITUATIONS: dict[str, tuple[dict[str, Any], tuple[Phrase, ...], list[str]]] = {
     "unconfirmed": (
         {"text": "-", "phrases": (Phrase("control.of", {"source": "web"}),)},
         (Phrase("event.estop_unconfirmed"), Phrase("estop.repeated", {"seconds": 27.0})),
-        ["急停未被确认：请使用车身上的急停开关。将继续发送 27 秒。", " 运行  由 web 控制。"],
+        ["急停未被确认：请使用车身上的急停开关。将继续发送 27 秒。", " 运行  由网页（web）控制。"],
     ),
     "contact": (
         {

@@ -290,9 +290,9 @@ def test_an_overruled_operator_has_to_release_the_controls(operator: Operator) -
     operator.ticks(1)
     assert operator.alarm == ""
     assert hold(2 * OVERRULED_TICKS, "web")[-1] is None
-    assert operator.alarm == "OVERRULED by web: let go of the controls."
+    assert operator.alarm == "OVERRULED by web (page): let go of the controls."
     assert set(hold(20, None)) == {None}
-    assert operator.alarm == "OVERRULED by web: let go of the controls."
+    assert operator.alarm == "OVERRULED by web (page): let go of the controls."
     for _ in range(20):
         operator.tell_safety()
         operator.ticks(1)

@@ -130,7 +130,7 @@ def test_the_operator_in_control_is_you() -> None:
     why = (Phrase("control.of", {"source": "teleop"}),)
     state = safety_state(text="teleop is in control.", phrases=why)
     assert (
-        panels.safety(view(safety=state), SAY, 2).plain == " RUN  teleop is in control."
+        panels.safety(view(safety=state), SAY, 2).plain == " RUN  teleop (terminal) is in control."
     )  # another
     ours = view(safety=state, requested=Drive(linear=0.0, angular=0.0, echo=0))
     assert panels.safety(ours, SAY, 2).plain == " RUN  You are in control."

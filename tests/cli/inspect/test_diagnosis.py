@@ -86,24 +86,26 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
     assert {name: each.level for name, each in found.items()} == {
         "bridge": "wrong", "safety": "wrong", "odom": "note", "mine": "wrong", "patrol": "wrong",
         "teleop": "ok",  # any number of a tool may run
-        "not": "ok",
     }  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("running", "named"),
     [
-        ((), "recorder, localization, patrol, camera"),
-        (("recorder", "camera"), "localization, patrol"),
+        ((), ["recorder, localization, patrol, camera"]),
+        (("recorder", "camera"), ["localization, patrol"]),
+        (d.OPTIONAL, []),
     ],
 )
-def test_optional_services_that_do_not_run_are_named(running: tuple[str, ...], named: str) -> None:
+def test_optional_services_that_do_not_run_are_named(
+    running: tuple[str, ...], named: list[str]
+) -> None:
     """One that hangs leaves the bus, and its own line with it."""
     names = (*keys.ON_BOARD, *running)
     observed = seen(instances=dict.fromkeys(names, 1), healths={it: health(it) for it in names})
-    assert [each.text() for each in d.services(observed)][-1].endswith(f": {named}")
+    assert [each.text().partition(": ")[2] for each in d.optional(observed)] == named
     observed.listed = False
-    assert "not running" not in [each.text() for each in d.services(observed)][-1]
+    assert list(d.optional(observed)) == []
 
 
 @pytest.mark.parametrize(

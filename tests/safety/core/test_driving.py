@@ -104,7 +104,7 @@ def test_the_higher_priority_drives_and_letting_go_hands_over_after_a_neutral_re
     fixture.drive(0.2, source="nav", seconds=3.0)
     assert fixture.verdict.source == "nav"
     assert fixture.verdict.name == "inhibited"
-    text = "teleop was in control: nav must let go of the controls, then drive."
+    text = "teleop (terminal) was in control: nav must let go of the controls, then drive."
     assert fixture.text("neutral") == text
     fixture.request(0.0, source="nav")
     assert fixture.drive(0.2, source="nav").command == "run"
