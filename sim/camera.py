@@ -8,6 +8,7 @@ like any other one. A process of its own: drawing must not delay the simulated b
 import argparse
 import math
 import os
+import random
 import socket
 import sys
 import time
@@ -39,6 +40,8 @@ EYE = 0.6  # m, above the floor
 TILE = 0.5  # m, of the floor's pattern
 REPLY_S, SEND_S, LATE_S = 0.5, 0.5, 0.5
 NICENESS = 15
+LUMA = WIDTH * HEIGHT  # bytes
+NOISE = int.from_bytes(b"\x03" * LUMA)  # the greatest value of each pixel
 HEADER = f"YUV4MPEG2 W{WIDTH} H{HEIGHT} F{RATE}:1 Ip A1:1 C420jpeg\n".encode()
 
 
@@ -90,7 +93,7 @@ class View:
             surfaces += [(side, PERSON) for side in box.shape.outline(box.pose)]
         seen = in_cone(eye.x, eye.y, eye.heading, VIEW / 2, [segment for segment, _ in surfaces])
         near = [surface for surface in surfaces if surface[0] in seen]
-        luma = bytearray(WIDTH * HEIGHT)
+        luma = bytearray(LUMA)
         u, v = bytearray(WIDTH * HEIGHT // 4), bytearray(WIDTH * HEIGHT // 4)
         for left in range(0, WIDTH, COLUMN):
             column = self._column(eye, left, near)
@@ -144,6 +147,13 @@ def _paint(column: Column, depth: float, look: Look) -> None:
     column.v[top:bottom] = bytes((look.colour[1],)) * count
 
 
+def noisy(picture: bytes) -> bytes:
+    """Return the picture with noise, as a sensor has it: no two pictures are equal."""
+    noise = int.from_bytes(random.randbytes(LUMA)) & NOISE
+    luma = int.from_bytes(picture[:LUMA]) + noise  # the brightest surface leaves room for it
+    return luma.to_bytes(LUMA) + picture[LUMA:]
+
+
 def truth(port: int) -> Truth:
     """Return the true state from the simulator; raise ``OSError`` when it does not answer."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
@@ -167,7 +177,7 @@ def stream(client: socket.socket, view: View, port: int) -> None:
     while True:
         it = truth(port)
         picture = view.picture(Pose(it.x, it.y, it.heading), it.person)
-        client.sendall(b"FRAME\n" + picture)
+        client.sendall(b"FRAME\n" + noisy(picture))
         due += 1 / RATE
         left = due - time.monotonic()
         if left < -LATE_S:

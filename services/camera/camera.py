@@ -27,7 +27,7 @@ ECHOES = 64  # queued safety states
 WAITING_MAX = 16  # callers that wait for the next picture
 CALL_S = 1.0  # until such a caller has given up
 LOST_S = 1.0  # without a picture
-VELOCITY_S = 0.5
+GAP_S = 0.3  # a longer one between two velocities is no known motion
 START_S = 5.0  # for the first picture
 EVENTS: dict[m.CameraState, m.EventName] = {
     "up": "camera_up",
@@ -52,6 +52,7 @@ class CameraService:
         self._encoder = JpegEncoder(self._settings.quality)
         self._echoes = Echoes()
         self._velocity: Latest[m.Velocity] | None = None
+        self._moved = 0.0  # since the last picture
         self._lateness, self._watch = Lateness(), Watch()
         self._frame: Frame | None = None  # of the last picture
         self._picture: m.Picture | None = None
@@ -97,10 +98,8 @@ class CameraService:
             return
         jpeg, width, height = self._encoder.encode(frame.image, self._settings.width)
         now_ns = clock.now_ns()
-        velocity = self._velocity if fresh(self._velocity, now_ns, VELOCITY_S) else None
-        since_s = (now_ns - self._taken_ns) / NS_PER_S
-        motion = moved(velocity.value if velocity else None, since_s)
-        self._watch = self._watch.seen(jpeg, self._heartbeat(frame), motion)
+        self._watch = self._watch.seen(jpeg, self._heartbeat(frame), self._moved)
+        self._moved = 0.0
         self._frame, self._error, self._taken_ns = frame, "", now_ns
         self._taken += 1
         self._node.counters["pictures"] += 1
@@ -209,4 +208,7 @@ class CameraService:
         self._echoes = self._echoes.received(arrival.message, arrival.received_ns)
 
     def _on_velocity(self, arrival: Arrival[m.Velocity]) -> None:
-        self._velocity = Latest(arrival.message, arrival.received_ns)
+        before, now_ns = self._velocity, arrival.received_ns
+        self._velocity = Latest(arrival.message, now_ns)
+        if before is not None and fresh(before, now_ns, GAP_S):
+            self._moved += moved(before.value, before.age_s(now_ns))

@@ -26,10 +26,8 @@ MOVING_MPS, MOVING_RADPS = 0.05, 0.1
 CHANGED_M, CHANGED_RAD = 0.02, 0.02
 
 
-def moved(velocity: Velocity | None, seconds: float) -> float:
+def moved(velocity: Velocity, seconds: float) -> float:
     """Return the motion of some seconds as a share of that over which pictures must differ."""
-    if velocity is None:
-        return 0.0
     linear, angular = abs(velocity.linear), abs(velocity.angular)
     if linear <= MOVING_MPS and angular <= MOVING_RADPS:  # noise, or the last bit of a stop
         return 0.0

@@ -33,6 +33,7 @@ CALL_S = 1.0  # for a camera's next picture
 CAMERAS_MAX = 8
 STATE_S = 3.0  # without a state a camera counts as lost
 ANSWERABLE = 16  # pictures of a browser that its holds may answer
+AHEAD = 25  # heartbeats: a picture may overtake the state of safety, but not by more
 START, END = b"\xff\xd8", b"\xff\xd9"  # of a whole JPEG
 
 Group = tuple[str, int]  # browsers with the same camera and width share a picture
@@ -133,7 +134,8 @@ class Pictures:
     def _view(self, name: str, now_ns: int) -> CameraView:
         latest = self._cameras[name]
         if not fresh(latest, now_ns, STATE_S):
-            return CameraView(name, "lost", label("camera_gone"))
+            has_robot = self._telemetry.newest(keys.SAFETY, now_ns) is not None
+            return CameraView(name, "lost", label("camera_gone" if has_robot else "camera_unknown"))
         it = latest.value
         return CameraView(name, it.state, rendered(it.phrases, it.text))
 
@@ -183,10 +185,19 @@ class Pictures:
 
     def _encoded(self, camera: str, picture: Picture, now_ns: int) -> bytes:
         """Return the JPEG, its header, and the header's length in two bytes."""
-        heartbeat = picture.heartbeat
-        shown = self._telemetry.shown(heartbeat) if heartbeat is not None else None
-        age_s = shown.age_s(now_ns) if shown else None
+        age_s = self._age_s(picture, now_ns)
         header = msgspec.json.encode(
-            Header(camera, str(picture.boot), picture.seq, heartbeat, age_s)
+            Header(camera, str(picture.boot), picture.seq, picture.heartbeat, age_s)
         )
         return picture.jpeg + header + len(header).to_bytes(2, "big")
+
+    def _age_s(self, picture: Picture, now_ns: int) -> float | None:
+        """Return for how long the picture's heartbeat has been known; None without a known one."""
+        if picture.heartbeat is None:
+            return None
+        if shown := self._telemetry.shown(picture.heartbeat):
+            return shown.age_s(now_ns)
+        newest = self._telemetry.newest(keys.SAFETY, now_ns)
+        if newest is None or newest.boot != picture.safety_boot:
+            return None
+        return 0.0 if 0 < picture.heartbeat - newest.heartbeat <= AHEAD else None

@@ -160,6 +160,18 @@ def test_the_same_picture_in_motion_is_frozen(service: Service, stream: StreamSe
     assert service.picture().heartbeat != heartbeat
 
 
+def test_a_velocity_without_a_next_one_is_no_motion(service: Service, stream: StreamServer) -> None:
+    """The router may end in a motion: the vehicle then stops unseen."""
+    stream.is_still = True
+    service.run_until(lambda: service.count > 5)
+    velocity = m.Velocity(linear=0.3, angular=0.0)
+    service.node.fake.deliver(keys.VELOCITY, velocity, clock.now_ns())
+    service.run_for(0.5)
+    heartbeat = service.picture().heartbeat
+    service.run_for(0.5)
+    assert service.picture().heartbeat != heartbeat
+
+
 def test_a_stream_that_ends_is_lost_and_comes_back(service: Service, stream: StreamServer) -> None:
     service.run_until(lambda: service.count > 5)
     stream.stall_s = 6.0  # longer than the reader waits, and two reports

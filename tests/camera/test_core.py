@@ -21,10 +21,6 @@ def test_motion_above_the_noise(linear: float, angular: float, expected: float) 
     assert moved(Velocity(linear=linear, angular=angular), 2.0) == pytest.approx(expected)
 
 
-def test_without_a_velocity_nothing_moves() -> None:
-    assert moved(None, 2.0) == 0.0
-
-
 def test_a_picture_carries_the_newest_heartbeat_of_its_time() -> None:
     heartbeat = Heartbeat(3, ((1, 100), (2, 200), (3, 300)))
     found = [heartbeat_before(heartbeat, at) for at in (99, 100, 199, 200, 1000)]

@@ -147,3 +147,27 @@ def test_a_driver_sees_everything(
     page.set_viewport_size({"width": 1440, "height": 900})
     reset_all(page)
     assert found == {}, f"{found}; see {tmp_path}"
+
+
+def test_a_press_that_was_meant_for_the_gears_does_not_reset(
+    page: Page, stack: RunningStack
+) -> None:
+    """On this screen Reset appears where the gears were."""
+    page.set_viewport_size({"width": 1366, "height": 768})
+    page.click("[data-gear='2']")
+    gears = page.evaluate(BOX, "#gears")
+    page.keyboard.press("e")
+    page.wait_for_selector("#reset.due")
+    page.wait_for_timeout(1000)  # the cause is gone
+    reset = page.evaluate(BOX, "#reset")
+    top, bottom = max(gears[1], reset[1]), min(gears[3], reset[3])
+    assert top < bottom  # Reset is where the gears were
+    point = (max(gears[0], reset[0]) + 20, (top + bottom) / 2)
+    for _ in range(3):
+        page.mouse.click(*point)
+        wait_for_text(page, "#toasts", "The buttons have moved.")
+        page.wait_for_timeout(500)
+    assert page.locator("#reset.due").count() == 1
+    page.wait_for_timeout(1600)
+    page.mouse.click(*point)
+    page.wait_for_selector("#reset.due", state="detached")

@@ -42,11 +42,16 @@ class Fixture:
         self.now_ns += round(after_s * NS_PER_S)
         self.pictures.watch(viewer, camera, self.now_ns)
 
-    def answer(self, jpeg: bytes = JPEG, seq: int = 1, heartbeat: int | None = 5) -> None:
+    def answer(
+        self, jpeg: bytes = JPEG, seq: int = 1, heartbeat: int | None = 5, safety_boot: int = 0
+    ) -> None:
         """Answer the last call of a camera."""
         self.bus.answers[-1][0](
-            m.Picture(boot=2**62, seq=seq, heartbeat=heartbeat, width=1, height=1, jpeg=jpeg)
-        )
+            m.Picture(
+                boot=2**62, seq=seq, heartbeat=heartbeat, safety_boot=safety_boot,
+                width=1, height=1, jpeg=jpeg,
+            )
+        )  # fmt: skip
 
     @property
     def request(self) -> Any:
@@ -89,7 +94,7 @@ def test_the_header_has_the_age_of_its_heartbeat(it: Fixture) -> None:
     it.answer()
     expected = {"camera": "front", "boot": str(2**62), "seq": 1, "heartbeat": 5, "age": 0.25}
     assert it.header() == expected
-    for heartbeat in (6, None):  # not known here; a file
+    for heartbeat in (4, None):  # not known here; a file
         it.watch()
         it.answer(seq=2, heartbeat=heartbeat)
         assert (it.header()["heartbeat"], it.header()["age"]) == (heartbeat, None)
@@ -147,6 +152,22 @@ def test_a_slow_link_gets_smaller_pictures_and_a_quick_one_larger(it: Fixture) -
     assert it.request.width == WIDTHS[1]
 
 
+@pytest.mark.parametrize(
+    ("heartbeat", "safety_boot", "age_s"),
+    [(None, 7, None), (100, 7, 0.5), (101, 7, 0.0), (125, 7, 0.0), (126, 7, None), (99, 7, None),
+     (101, 8, None)],
+)  # fmt: skip
+def test_the_age_of_a_picture(
+    it: Fixture, heartbeat: int | None, safety_boot: int, age_s: float | None
+) -> None:
+    """A picture may overtake the state of safety that it carries."""
+    state = safety_state(heartbeat=100, boot=7)
+    it.telemetry.update(keys.SAFETY.path, state, it.now_ns - NS_PER_S // 2)
+    it.watch()
+    it.answer(heartbeat=heartbeat, safety_boot=safety_boot)
+    assert it.header()["age"] == age_s
+
+
 def test_a_change_of_the_camera(it: Fixture) -> None:
     it.watch()
     it.camera("rear")
@@ -163,9 +184,11 @@ def test_the_list_of_cameras(it: Fixture) -> None:
     it.now_ns += 2 * NS_PER_S
     found = [(one.name, one.state, one.text.en) for one in it.pictures.views(it.now_ns)]
     assert found == [
-        ("front", "lost", "The camera's service is not running."),
+        ("front", "lost", "No message of the robot arrives."),
         ("rear", "frozen", "text"),
     ]
+    it.telemetry.update(keys.SAFETY.path, safety_state(), it.now_ns)
+    assert it.pictures.views(it.now_ns)[0].text.en == "The camera's service is not running."
     for n in range(20):
         it.camera(f"more{n}")
     assert len(it.pictures.views(it.now_ns)) == 8

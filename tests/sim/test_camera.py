@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from common.settings import Vehicle
-from sim.camera import HEADER, HEIGHT, WIDTH, View, stream
+from sim.camera import HEADER, HEIGHT, WIDTH, View, noisy, stream
 from sim.config import load_plan
 from sim.geometry import Pose
 from sim.simulation import Reply
@@ -35,6 +35,14 @@ def height_of_wall(pose: Pose) -> int:
 
 def test_a_picture_has_three_planes() -> None:
     assert len(ROOM.picture(Pose(0.0, 0.0, 0.0), None)) == WIDTH * HEIGHT * 3 // 2
+
+
+def test_no_two_pictures_are_equal_and_noise_is_small() -> None:
+    plain = ROOM.picture(Pose(0.0, 0.0, 0.0), None)
+    one, other = noisy(plain), noisy(plain)
+    assert one != other
+    assert {now - before for now, before in zip(one, plain, strict=True)} == {0, 1, 2, 3}
+    assert one[WIDTH * HEIGHT :] == plain[WIDTH * HEIGHT :]
 
 
 def test_a_wall_grows_as_the_vehicle_approaches_it() -> None:

@@ -8,7 +8,7 @@ const HEADER_LENGTH = 2; // bytes, at the end: the length of the header before i
 let page = null; // what dashboard.js offers
 let cameras = []; // { name, state, text }
 let chosen = ""; // the name of the camera that is shown
-let shown = null; // { camera, boot, seq, heartbeat, age, at }: the picture on the screen
+let shown = null; // { camera, boot, seq, heartbeat, age, at, delay }: the picture on the screen
 let decoding = false;
 let broken = 0; // pictures in a row that this browser cannot decode
 let inSight = false; // the driver sees the vehicle
@@ -64,6 +64,7 @@ export async function receive(buffer) {
   const start = end - (bytes[end] * 256 + bytes[end + 1]);
   const header = JSON.parse(new TextDecoder().decode(bytes.subarray(start, end)));
   const at = performance.now();
+  const { delay } = page.delay();
   asked = false;
   if (header.camera !== chosen || isOlder(header)) return ask();
   decoding = true;
@@ -72,7 +73,7 @@ export async function receive(buffer) {
   if (!image) return done();
   // What is drawn here is on the screen: a page that is not painted has no new picture.
   requestAnimationFrame(() => {
-    if (header.camera === chosen) draw(image, { ...header, at });
+    if (header.camera === chosen) draw(image, { ...header, at, delay });
     image.close();
     done();
   });
@@ -99,29 +100,30 @@ const isRemote = () => cameras.length > 0 && !inSight;
 /** Return the heartbeat that a hold answers: that of the picture on the screen, or of the snapshot. */
 export const echo = (snapshots) => (isRemote() ? shown?.heartbeat ?? 0 : snapshots);
 
-// The age of the picture in s: when its heartbeat arrived at the dashboard, the delay of the link, and the
-// time on the screen. Infinity without a heartbeat.
-function age(now, delay) {
+// The age of the picture in s: when its heartbeat arrived at the dashboard, the delay of the link then, and
+// the time on the screen. Infinity without a heartbeat.
+function age(now) {
   if (!shown || shown.heartbeat === null || shown.age === null) return Infinity;
-  return shown.age + delay + (now - shown.at) / 1000;
+  return shown.age + shown.delay + (now - shown.at) / 1000;
 }
 
 /** Return why the picture cannot drive; empty if it can, or if the driver sees the vehicle. */
 export function refusal() {
   if (!isRemote()) return "";
   const { delay, limit } = page.delay();
-  const old = age(performance.now(), delay);
+  const old = age(performance.now());
   if (old <= limit) return "";
-  return Number.isFinite(old) ? t("picture_late", (Math.ceil(old * 10) / 10).toFixed(1)) : t("picture_none");
+  if (!Number.isFinite(old)) return t("picture_none");
+  const figure = (Math.ceil(old * 10) / 10).toFixed(1);
+  return delay > limit / 2 ? t("picture_late_link", figure, delay.toFixed(1)) : t("picture_late", figure);
 }
 
 /** Show age, state and mode; `isDriver` may change the mode. */
 export function show(isDriver, driver) {
   inSight = !!driver?.in_sight;
   if (!cameras.length) return;
-  const { delay, limit } = page.delay();
-  const old = age(performance.now(), delay);
-  const late = old > limit;
+  const old = age(performance.now());
+  const late = old > page.delay().limit;
   $("camera").dataset.late = late;
   $("camera").dataset.sight = inSight;
   // Rounded away from the limit: one figure is not both fine and too old.

@@ -6,6 +6,7 @@ import * as delay from "./delay.js";
 import * as driving from "./driving.js";
 import * as i18n from "./i18n.js";
 import { t } from "./i18n.js";
+import * as movedButtons from "./moved_buttons.js";
 import * as notices from "./notices.js";
 import * as panels from "./panels.js";
 import * as patrol from "./patrol.js";
@@ -222,6 +223,7 @@ function begin() {
   notices.begin();
   alarm.begin($("sound"), stored("sound", "on"), (value) => store("sound", value));
   setInterval(alarmed, ALARM_MS);
+  movedButtons.begin(() => toast("buttons_moved", "warning"));
   driving.begin({ send, reset, toast, isStopKeystroke: estop.isKeystroke, delay: delayNow, picture: camera.refusal, gears: () => hello?.gears ?? [] });
   const stopToast = (text) => toast(text, text === "estop_asked" ? "warning" : "error");
   estop.begin({ send, off, cut, toast: stopToast, name: who, t, pressed: driving.letGo, barred: () => driving.viewOnly(fast) });
