@@ -287,8 +287,8 @@ PHRASES: dict[str, Words] = {
     "control.of": ("{source:source} is in control.", "由{source:source}控制。"),
     "control.you": ("You are in control.", "由您控制。"),  # to the operator of that source
     "control.asked": (
-        "{by:source} begins to drive while {other:source} is in control.",
-        "{other:source}控制期间，{by:source}开始驾驶。",
+        "{by} begins to drive while {other:source} is in control.",
+        "{other:source}控制期间，{by} 开始驾驶。",
     ),
     "control.none": ("No operator and no program is in control.", "当前没有操作员或程序在控制车辆。"),
     # the next step at a latch
@@ -963,6 +963,10 @@ EVENTS: tuple[EventRow, ...] = (
         NOTHING,
     ),
     EventRow(
+        "dashboard", "take", "info",
+        ("{by:operator} takes control.", "{by:operator} 取得控制权。"), NOTHING,
+    ),
+    EventRow(
         "teleop", "overruled", "warning",
         (
             "{other:source} has taken over: the controls count as let go.",
@@ -1149,6 +1153,7 @@ SERVICES: dict[str, Words] = {
     "camera": ("camera", "摄像头"),
     "teleop": ("teleop", "驾驶终端"),
     "dashboard": ("dashboard", "仪表板"),
+    "estop": ("E-STOP command", "急停命令"),
     "recorder": ("recorder", "记录器"),
     "metrics": ("metrics", "监控指标"),
     "ros2": ("ROS 2", "ROS 2"),

@@ -78,8 +78,8 @@ if TYPE_CHECKING:
         "round_resumed", "round_return", "round_skipped", "round_start", "round_stopped",
         "round_unwritten", "round_waiting", "route_changed", "runaway", "second_authority",
         "silent", "slip", "slip_over", "source", "station", "stop", "switches_unverified",
-        "take_over", "teaching", "terminal_slow", "uncommanded_motion", "unheard", "unplaced",
-        "velocity_back",
+        "take", "take_over", "teaching", "terminal_slow", "uncommanded_motion", "unheard",
+        "unplaced", "velocity_back",
     ]  # fmt: skip
 else:
     EventName = Name

@@ -127,12 +127,14 @@ class RobotPage:
     def _take(self, viewer: str, message: client.Take) -> None:
         lock = self.robot.driver_lock
         before, other = lock.driver, lock.name or f"viewer {lock.driver}"
+        who = message.name or f"viewer {viewer}"
         if not self.robot.may_drive:
             self._notify(viewer, "error", phrase("event.barred"))
         elif not lock.take(viewer, message.force, message.name):
             self._send([viewer], {"k": "taken"})
-        elif before not in (None, viewer):
-            who = message.name or f"viewer {viewer}"
+        elif before is None:
+            self.robot.event("take", "info", by=who)
+        elif before != viewer:
             self._notify(str(before), "warning", phrase("driver.taken", who=who))
             self.robot.event("take_over", "info", by=who, other=other)
 

@@ -1,14 +1,12 @@
 """The recorder's shell: subscribes to every key, writes files, stops before the disk is full."""
 
-import contextlib
-import re
 import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from common import clock
-from common.bus.bus import Caller
+from common.bus.bus import Arrival, Caller
 from common.freshness import NS_PER_S
 from common.service import Node
 from services.recorder import shift
@@ -29,6 +27,7 @@ EVERYTHING = ("**", "@cmd/**")
 # unit's MemoryMax alone.
 DEPTH = 10_000
 SLICE_S, FLUSH_S, CHECK_S = 0.05, 0.5, 1.0
+EVENTS_DEPTH = keys.EVENT.history * (len(keys.SERVICES) + 2)  # the history of all, at once
 LOG_S, LOG_RETRY_S = 1.0, 10  # of the shift log: between two writes, and after an error
 
 
@@ -51,7 +50,6 @@ class Recorder:
         self._log_file = file_of(self._storage.folder, robot)
         self._log = ShiftLog(self._log_file, robot, node.bus.host)
         self._log_due_ns, self._keeps_log = 0, keeps_log
-        self._event_key = re.compile(keys.EVENTS.on(re.escape(node.bus.robot), service="([^/]+)"))
         node.counters.update(recorded=0, not_recorded=0, removed=0, log_unwritten=0)
         self._check_storage(clock.now_ns())
         for each in EVERYTHING:
@@ -62,6 +60,8 @@ class Recorder:
         node.loop.every(FLUSH_S, self._flush)
         node.loop.every(CHECK_S, self._check_storage)
         if keeps_log:
+            # With their history: a name may be in an event of somebody who was cut off.
+            node.bus.subscribe(keys.EVENTS, self._on_event, depth=EVENTS_DEPTH, service="*")
             node.bus.serve(keys.LOG, self._on_log)
             node.loop.every(LOG_S, self._write_log)
             node.loop.every(60.0, self._report_dropped)
@@ -75,13 +75,11 @@ class Recorder:
             self._on_disk(lambda: self._record(sample))
         if sample.key == self._safety_key:
             self._on_safety(sample)
-        elif self._keeps_log and (match := self._event_key.fullmatch(sample.key)):
-            self._on_event(match[1], sample)
 
-    def _on_event(self, service: str, sample: Sample) -> None:
-        with contextlib.suppress(MessageError):
-            event = codec.decode(sample.payload, Event)
-            self._log.note(service, event, sample.received_ns, sample.wall_ns)
+    def _on_event(self, arrival: Arrival[Event]) -> None:
+        service = arrival.key.rpartition("/")[2]
+        wall_ns = time.time_ns() - (clock.now_ns() - arrival.received_ns)
+        self._log.note(service, arrival.message, arrival.received_ns, wall_ns)
 
     def _record(self, sample: Sample) -> None:
         if not self._storage.has_room:

@@ -4,7 +4,7 @@
 row          begins with an event of                    and ends with
 ============ ========================================== ============================================
 ``stop``     safety: a latch, or a stop with a warning  the reset that leaves nothing latched
-``takeover`` a page or terminal: ``take_over``          –
+``takeover`` a page or terminal: takes control          –
 ``reset``    safety, if no stop before it is known      –
 ``round``    patrol: ``round_start``                    ``round_end``; other events have own rows
 ``note``     ``NOTES``                                  –
@@ -45,8 +45,8 @@ LATCHES = (*LATCHED, "driver_fault")  # events of safety
 ROUTINE = ("blocked", "limit_stop")  # stops for an obstacle or a person in the way
 ASKED = ("estop", "reset_request")  # events that name who asked
 NOTES = (
-    "in_sight", "black_box_lost", "disk_full", "log_dropped", "estop_denied", "estop_unconfirmed",
-    "reset_unconfirmed",
+    "in_sight", "by_picture", "black_box_lost", "disk_full", "log_dropped", "estop_denied",
+    "estop_unconfirmed", "reset_unconfirmed",
 )  # fmt: skip
 ROUNDS = (
     "round_start", "round_end", "round_stopped", "round_blocked", "round_skipped", "round_return",
@@ -54,11 +54,15 @@ ROUNDS = (
 )  # fmt: skip
 OPERATED = ("dashboard", "teleop", "estop")  # services whose events name an operator
 OF_SERVICE: dict[str, tuple[str, ...]] = {
+    "bridge": ("link_lost", "board_restarted", "relay_lost"),
     "safety": (*LATCHES, "stop", "reset", "reset_refused"),
     "patrol": ROUNDS,
     "recorder": (*NOTES, "black_box"),
-    **dict.fromkeys(OPERATED, (*ASKED, *NOTES, "take_over", "round_request")),
+    **dict.fromkeys(OPERATED, (*ASKED, *NOTES, "take", "take_over", "round_request")),
 }
+
+
+Identity = tuple[str, str, int, int, int]
 
 
 class Seen(NamedTuple):
@@ -148,7 +152,7 @@ def rows(
     """
     events: dict[tuple[object, ...], Seen] = {}
     for one in seen:
-        events.setdefault(_identity(one), one)
+        events.setdefault(identity(one.service, one.event) or (one.service, one.at_ns), one)
     ordered = sorted(events.values(), key=lambda one: one.at_ns)
     found = [*_gaps(spans, since_ns, until_ns), *_Builder(ordered).rows]
     found.sort(key=lambda row: row.at_ns, reverse=True)
@@ -161,10 +165,9 @@ def rows(
     return [row.message(robot) for row in wanted[:most]]
 
 
-def _identity(one: Seen) -> tuple[object, ...]:
-    event = one.event
-    at_ns = 0 if event.boot else one.at_ns  # a foreign publisher may send no header
-    return one.service, event.name, event.boot, event.seq, event.t_ns, at_ns
+def identity(service: str, event: Event) -> Identity | None:
+    """Return what an event has in common with itself only; None without a header."""
+    return (service, event.name, event.boot, event.seq, event.t_ns) if event.boot else None
 
 
 def _gaps(spans: Iterable[Span], since_ns: int | None, until_ns: int | None) -> Iterator[Row]:
@@ -288,7 +291,9 @@ class _Builder:
                 return
 
     def _add_person(self, one: Seen) -> None:
-        kinds: dict[str, LogKind] = {"take_over": "takeover", "round_request": "round"}
+        kinds: dict[str, LogKind] = {
+            "take": "takeover", "take_over": "takeover", "round_request": "round",
+        }  # fmt: skip
         action = str(one.event.about.get("action", ""))
         if not action.startswith("teach_"):
             self._add(kinds.get(one.event.name, "note"), one, by=by_of(one.event))

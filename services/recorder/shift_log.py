@@ -21,7 +21,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from services.recorder import shift
-from services.recorder.shift import Seen, Span
+from services.recorder.shift import Identity, Seen, Span
 from t2.messages import Event, LogReply, LogRequest
 
 SUFFIX = "-log.jsonl"
@@ -99,6 +99,7 @@ class ShiftLog:
         self._file, self._robot, self._host = file, robot, host
         self._lines: list[Line] | None = None  # of the file, once it is read
         self._waiting: list[Line] = []  # for the disk
+        self._known: set[Identity] | None = None  # events of the file, once it is read
         self._since_ns: int | None = None  # of the run
         self._state_ns = (0, 0)  # the newest state: since boot, and on the wall clock
         self._marked_ns = 0
@@ -128,15 +129,25 @@ class ShiftLog:
         return dropped
 
     def note(self, service: str, event: Event, up_ns: int, wall_ns: int) -> None:
-        """Note an event if the log needs it."""
-        if not shift.is_logged(service, event):
+        """Note an event if the log needs it, and does not have it.
+
+        It is received again, and late, after the bus was cut. Its own time counts if it is of this
+        computer's clock.
+        """
+        identity = shift.identity(service, event)
+        if not shift.is_logged(service, event) or identity in self._known_events():
             return
         if not shift.is_always_logged(service, event):
             self._counts[service] += 1
             if self._counts[service] > RATE_MAX:
                 return
-        is_run = self._since_ns is not None and up_ns - self._state_ns[0] <= SILENT_NS
-        since_ns = self._since_ns if is_run and self._since_ns is not None else up_ns
+        if event.host == self._host and 0 < event.mono_ns < up_ns:
+            up_ns, wall_ns = event.mono_ns, wall_ns - (up_ns - event.mono_ns)
+        since_ns = self._since_ns
+        if since_ns is None or not since_ns <= up_ns <= self._state_ns[0] + SILENT_NS:
+            since_ns = up_ns
+        if identity is not None:
+            self._known_events().add(identity)
         self._add(Line(self._host, since_ns, up_ns, wall_ns, service, _short(event)))
 
     def write(self) -> None:
@@ -177,6 +188,15 @@ class ShiftLog:
             self._lines = list(read_lines(self._file)) if self._file.exists() else []
         return self._lines
 
+    def _known_events(self) -> "set[Identity]":
+        if self._known is None:
+            with contextlib.suppress(OSError):
+                self._read()
+            lines = self._lines or []
+            found = (shift.identity(line.service, line.event) for line in lines if line.event)
+            self._known = {each for each in found if each is not None}
+        return self._known
+
     def _add(self, line: Line) -> None:
         if line.event is None:  # the newest mark of a run is enough
             self._waiting = [it for it in self._waiting if it.event or it.since_ns != line.since_ns]
@@ -204,7 +224,7 @@ class ShiftLog:
             file.flush()
             os.fsync(file.fileno())
         new.replace(self._file)
-        self._lines = kept
+        self._lines, self._known = kept, None
 
 
 def _encoded(lines: Iterable[Line]) -> bytes:

@@ -229,6 +229,19 @@ def test_the_shift_log_is_answered_and_survives_a_restart(
     assert shown.splitlines()[-1] == offline.splitlines()[-1]
 
 
+def test_the_shift_log_has_events_from_before_the_recorder_was_on_the_bus(
+    buses: BusFixture, tool: Tool, tmp_path: Path
+) -> None:
+    """After a cut, too: who pressed the emergency stop then is in such an event."""
+    page = buses.bus(lambda bus: None)
+    phrase = m.Phrase("event.estop", {"by": "Ann"})
+    page.publisher(keys.EVENTS, service="dashboard").put(
+        Event(name="estop", level="error", text="", phrases=(phrase,), about={"by": "Ann"})
+    )
+    with recorder(buses, tmp_path):
+        wait_until(lambda: "Ann" in str(tool("log").lines), "the earlier event")
+
+
 def test_t2_log_without_a_recorder_names_it(buses: BusFixture, tool: Tool) -> None:
     result = tool("log")
     assert result.code == 1

@@ -114,9 +114,23 @@ def test_take_overs_of_page_and_terminal() -> None:
     found = log(
         seen(1, "dashboard", "take_over", phrase, by="Ann", other="Bob"),
         seen(2, "teleop", "take_over", Phrase("control.asked", {"by": "Cy", "other": "web"})),
+        seen(3, "dashboard", "take", Phrase("event.take", {"by": "Dee"}), by="Dee"),
     )
-    assert [(row.kind, row.by) for row in found] == [("takeover", "Ann"), ("takeover", "Cy")]
+    assert [(row.kind, row.by) for row in found] == [
+        ("takeover", "Ann"), ("takeover", "Cy"), ("takeover", "Dee")
+    ]  # fmt: skip
     assert found[0].text == "Ann takes control from Bob."
+
+
+def test_a_silent_board_and_the_end_of_driving_in_sight_are_notes() -> None:
+    found = log(
+        seen(1, "bridge", "link_lost", Phrase("event.link_lost")),
+        seen(2, "dashboard", "by_picture", Phrase("event.by_picture", {"by": "Ann"}), by="Ann"),
+    )
+    assert texts(found) == [
+        "note: The board is silent: STOP is being sent.",
+        "note: Ann drives by the picture.",
+    ]
 
 
 def test_a_round_is_one_row_with_its_route_and_result() -> None:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from services.recorder import shift, shift_log
@@ -66,6 +67,33 @@ def test_rows_are_read_from_the_file_and_from_what_is_not_written_yet(file: Path
     assert clock.rows() == [("stop", 105.0, 0.0)]
     assert shift_log.robot_of(file) == "001"
     assert clock.log.reply(LogRequest(), *clock.now).rows[0].robot == "001"
+
+
+def test_an_event_that_is_received_again_is_known_and_has_its_own_time(file: Path) -> None:
+    """Publishers keep events: they come once more after a restart, and late after a cut."""
+    clock = Clock(log_of(file))
+    clock.hear(10)
+    own = Event(
+        name="contact", level="error", text="Hit.", boot=1, seq=1, host=BOOT,
+        mono_ns=104 * NS_PER_S,
+    )  # fmt: skip
+    clock.log.note("safety", own, *clock.now)
+    before = replace(own, seq=2, mono_ns=20 * NS_PER_S)  # not in this run of safety
+    other = replace(own, seq=3, host=99, mono_ns=1)  # another computer's clock
+    clock.log.note("safety", before, *clock.now)
+    clock.log.note("safety", other, *clock.now)
+    assert [row for row in clock.rows() if row[0] == "stop"] == [
+        ("stop", 20.0, 0.0), ("stop", 104.0, 0.0), ("stop", 110.0, 0.0)
+    ]  # fmt: skip
+    clock.log.write()
+    size = file.stat().st_size
+    again = log_of(file)
+    for event in (own, before, other):
+        clock.log.note("safety", event, *clock.now)
+        again.note("safety", event, *clock.now)
+    for log in (clock.log, again):
+        log.write()
+    assert file.stat().st_size == size
 
 
 def test_a_reply_is_a_page_of_the_newest_rows(file: Path) -> None:
