@@ -53,8 +53,8 @@ PHRASES: dict[str, Words] = {
     "patrol.safety_silent": ("Safety is silent.", "收不到安全服务的消息。"),
     "patrol.safety_restarted": ("Safety has restarted.", "安全服务已重启。"),
     "patrol.map_silent": (
-        "The pose in the map is not received: is localization running?",
-        "收不到地图中的位姿：定位服务是否在运行？",
+        "The pose in the map is not received: is the board connected, and localization running?",
+        "收不到地图中的位姿：主控板是否已连接？定位服务是否在运行？",
     ),
     "patrol.map_restarted": (
         "Localization has restarted: place the vehicle.", "定位服务已重启：请设定车辆位置。",

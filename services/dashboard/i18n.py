@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from common.text import line
-from t2.catalogue import LATCHED, SERVICES
+from t2.catalogue import LATCHED, SERVICES, SOURCES
 from t2.messages import Direction, Event, Field, Phrase, Phrases
 from t2.words import LANGUAGES, Language, render
 
@@ -58,6 +58,7 @@ def table() -> dict[Language, dict[str, str]]:
         language: {
             **{name: words[at] for name, words in LABELS.items()},
             **{name: render(phrases, language) for name, phrases in SENTENCES.items()},
+            **{f"source.{name}": words[at] for name, words in SOURCES.items()},
         }
         for at, language in enumerate(LANGUAGES)
     }

@@ -77,14 +77,21 @@ def center_of(page: Page, where: str) -> tuple[float, float, float]:
 
 
 def reset_all(page: Page) -> None:
-    """Reset until nothing is latched; safety requires that each cause is gone first."""
+    """Reset until nothing is latched; safety requires that each cause is gone first.
+
+    Where the stick was, the page refuses presses until none came for a while.
+    """
+    is_due = page.locator("#reset.due").count
 
     def over() -> bool:
         page.wait_for_timeout(300)
-        if page.locator("#reset.due").count():
-            page.click("#reset")
-            return False
-        return True
+        if not is_due():
+            return True
+        page.click("#reset")
+        page.wait_for_timeout(300)
+        if is_due():
+            page.wait_for_timeout(1600)
+        return False
 
     wait_until(over, "a reset")
 

@@ -104,7 +104,7 @@ export function show(isDriver, fast) {
   $("estop").classList.toggle("unable", barred === "view_only_stop");
   panel.dataset.hold = hold;
   panel.dataset.pad = isDriver ? pad.state : "";
-  write("hold", holdText(isDriver, driver));
+  write("hold", holdText(isDriver, driver, !!fast?.safety?.latched.length || !!fast?.root.part));
   disable($("leave"), !isDriver);
   const off = !fast || !!fast.root.part; // nothing can drive
   disable($("take"), isDriver || off);
@@ -116,13 +116,14 @@ export function show(isDriver, fast) {
   showRelease(isDriver, releasing ? fast?.safety?.release_refusal : null);
 }
 
-function holdText(isDriver, driver) {
+function holdText(isDriver, driver, isStopped) {
   if (isDriver && driver.overruled) return t("hold.overruled");
   if (refused) return t(refused.reason);
   if (!isDriver) return "";
   const late = lateText(driver);
   if (late) return late;
   if (pad.state) return t(`hold.${pad.state}`);
+  if (driver.hold === "held" && isStopped) return t("hold.stopped");
   return t(driver.hold === "free" && isHeld ? "hold.waiting" : `hold.${driver.hold}`);
 }
 

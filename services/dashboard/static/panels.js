@@ -111,7 +111,7 @@ function showDrivers(slow) {
     cell.append(create("b", t(side)), driver ? (driver.bits ? "" : t("no_fault")) : t("unknown"));
     const faults = driver ? bits(driver.bits) : [];
     return [cell, ...faults.map((bit) => create("div",
-      t("bit", t(side), bit, t(`fault.${BITS[bit] ?? "reserved"}`)), { class: "bad", "data-bit": bit }))];
+      t("bit", bit, t(`fault.${BITS[bit] ?? "reserved"}`)), { class: "bad", "data-bit": bit }))];
   }));
 }
 

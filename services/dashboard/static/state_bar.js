@@ -97,16 +97,22 @@ function showHead(view) {
 /** The viewer that has control, by its name or its number. */
 export const driverName = (fast) => fast?.driver.name || t("viewer", fast?.driver.id ?? "");
 
+// The name of a source of requests for people; one that the page does not know is shown as it is.
+function sourceName(source) {
+  const name = t(`source.${source}`);
+  return name.startsWith("source.") ? source : name;
+}
+
 function driver(view) {
   const { fast, isDriver } = view;
   const { id, may, other, overruled } = fast.driver;
   if (!may) return t("view_only");
-  if (isDriver && overruled) return t("taken_over", other);
-  if (other) return t("drives", other);
+  if (isDriver && overruled) return t("taken_over", sourceName(other));
+  if (other) return t("drives", sourceName(other));
   if (isDriver) return t("you_drive");
   if (id) return t("drives", driverName(fast));
   const source = fast.safety?.source;
-  return source ? t("drives", source) : t("nobody_drives");
+  return source ? t("drives", sourceName(source)) : t("nobody_drives");
 }
 
 function chip(id, text, tone = "") {
