@@ -78,6 +78,7 @@ def measure_watchdog(report: Report, config: Everything, times: Times) -> None:
     Raise ``T2Error`` when nothing can be measured; the wheels are braked then, too.
     """
     say = Say(report.language)
+    report.planned, report.left_out = [say("watchdog.title")], [say("watchdog.alone")]
     show(say("watchdog.warning", speed=SPEED))
     if not confirm(say("off_ground"), "off_ground", say):
         raise T2Error(say("drive.not_confirmed"))

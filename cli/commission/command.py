@@ -189,8 +189,13 @@ def run_steps(
             show(say("found", outcome=say("verdict.passed"), text=known[title].finding))
         else:
             show(say.of(step.what))
-        found = known.get(title) or verdict(step, session, say)
-        report.steps.append((title, found))
+        note = partial(_note, report.steps, number, title)
+        note(known.get(title) or verdict(step, session, note, say))
+
+
+def _note(steps: list[tuple[str, Verdict]], number: int, title: str, found: Verdict) -> None:
+    """Set the verdict of the step with this number; the report has it after an early end, too."""
+    steps[number - 1 :] = [(title, found)]
 
 
 def earlier(file: Path, robot: str) -> Report:
@@ -201,7 +206,10 @@ def earlier(file: Path, robot: str) -> Report:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise ConfigError(f"--resume {file}: cannot be read: {reason}") from None
     if found is None or not found.steps:
-        raise ConfigError(f"--resume {file}: is no report of the steps, of this version of T2")
+        raise ConfigError(
+            f"--resume {file}: is no whole report of the steps, of this version of T2: its last "
+            "line has what is taken over; without --resume all steps are run"
+        )
     if found.robot != robot:
         raise ConfigError(f"--resume {file}: is of robot {found.robot}, not of {robot}")
     if found.language != reader_language():
@@ -233,12 +241,19 @@ def taken_over(before: Report, now: Report, steps: Sequence[Step]) -> dict[str, 
     }
 
 
-def verdict(step: Step, session: CheckoutSession, say: Say = ENGLISH) -> Verdict:
-    """Run a step until the operator accepts its verdict, or skip it with a reason."""
+def verdict(
+    step: Step, session: CheckoutSession, note: Callable[[Verdict], None], say: Say = ENGLISH
+) -> Verdict:
+    """Run a step until the operator accepts its verdict, or skip it with a reason.
+
+    ``note`` gets the verdict of each attempt.
+    """
     if reason := choice(say("begin")):
         return Verdict("skipped", reason)
+    note(Verdict("failed", say("incomplete")))
     while True:
         found = step.run(session)
+        note(found)
         show(say("found", outcome=say(f"verdict.{found.outcome}"), text=found.text))
         if found.outcome == "passed":
             return found
@@ -252,10 +267,12 @@ def now() -> str:
 
 
 def versions(session: CheckoutSession) -> list[Row]:
-    """Return the version of each service that publishes health."""
+    """Return the version of each service that every robot has."""
     health = session.of(keys.HEALTH)
     session.until(lambda: {one.value.service for one in health} >= set(keys.ON_BOARD), HEALTH_S)
-    found = {one.value.service: one.value.version for one in health}
+    found = {
+        one.value.service: one.value.version for one in health if one.value.service in keys.ON_BOARD
+    }
     return [(f"T2 of {service}", version) for service, version in sorted(found.items())]
 
 

@@ -41,6 +41,7 @@ from t2 import keys
 from t2.errors import T2Error
 from t2.messages import Mileage
 
+CONFIRMS = 2  # attempts to type the phrase
 RECORDER_S = 3.0  # of health messages, one a second
 SWITCHES_S = 3.0
 COUNTERS_S = 2.0
@@ -71,7 +72,7 @@ class GuidedDrive:
         self._check_recorder()
         if problem := unlatch(self.session):
             raise T2Error(problem)
-        if not confirm(say("drive.ground"), "ground", say):
+        if not any(confirm(say("drive.ground"), "ground", say) for _ in range(CONFIRMS)):
             raise T2Error(say("drive.not_confirmed"))
 
     def run(self, manoeuvres: Sequence[Manoeuvre], *, returns: bool) -> None:
@@ -152,8 +153,12 @@ class GuidedDrive:
     def _attempt(self, it: Manoeuvre) -> Result:
         if not self._is_recorded():
             self._check_recorder()
+        was_latched = bool(self.session.fresh_state().latched)
         if problem := unlatch(self.session):
             return Result(Verdict("failed", problem))
+        # The operator has confirmed the reset, not the motion.
+        if was_latched and (reason := choice(self.session.say("begin"))):
+            return Result(Verdict("skipped", reason), "slower")
         if it.twist.is_zero:
             return judge_standstill(self.session.observe(it))
         source = self.settings.leased.get(SOURCE)
@@ -270,6 +275,7 @@ def guided_drive(
     manoeuvres = [it for it in wanted if it.ahead <= space_m]
     if left_out := len(planned) - len(manoeuvres):
         report.left_out = [session.say("drive.excluded", count=left_out)]
+    report.planned = [it.title for it in manoeuvres]
     drive = GuidedDrive(session, report, settings, space_m=space_m)
     drive.begin()
     drive.run(manoeuvres, returns=not only or "return" in only)

@@ -167,7 +167,7 @@ def missing_stops(
             "manoeuvre.missing",
             ending=ending.upper(),
             way=_way(each, say),
-            count=counts[ending, each],
+            count=number - counts[ending, each],
             number=number,
         )
         for ending, number in wanted.items()

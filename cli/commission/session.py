@@ -410,7 +410,8 @@ def checkout_session(config: Shared, language: Language = "en") -> Iterator[Chec
         session = CheckoutSession(opened, config.robot.id, language)
         if not session.until(lambda: session.of(keys.LINK) and session.state, STACK_S):
             raise LinkError(
-                f"no message of bridge and safety on {', '.join(config.bus.endpoints)}; "
-                "start `t2 up --no-sim --config config/vehicle.toml` first"
+                f"no message of bridge and safety of robot {config.robot.id} on "
+                f"{', '.join(config.bus.endpoints)}; run {opened.doctor}, or start "
+                "`t2 up --no-sim --config config/vehicle.toml` first"
             )
         yield session

@@ -37,6 +37,7 @@ HAND_S = 60.0  # to walk around the vehicle and hold a hand there
 AWAY_S = 20.0
 LATCH_S = 2.0
 CLEAR_S = 0.3  # the bridge needs three clear samples, and safety three samples of these
+SETTLE_S = 0.5  # a repetition of the emergency stop may be on its way
 DRIVE_S = 2.0
 FORWARD, TURN = Twist(linear=0.1), Twist(angular=0.2)
 
@@ -80,7 +81,7 @@ def prompt(question: str) -> str:
 
 def is_phrase(typed: str, name: str) -> bool:
     """Return whether a line is this phrase of the texts, in either language."""
-    return typed.casefold() in TEXTS[f"phrase.{name}"]
+    return typed.casefold().rstrip(" .!。！") in TEXTS[f"phrase.{name}"]
 
 
 def confirm(fact: str, phrase: str, say: Say = ENGLISH) -> bool:
@@ -137,17 +138,22 @@ def _find(session: CheckoutSession, rest: Rest, name: str) -> Sequence[str]:
         show(session.say("sonar.is_faulty", sonar=name))
         return ()
     show(session.say("sonar.now", sonar=name, seconds=HAND_S))
-    seen = _wait(session, rest, True, HAND_S)
+    seen = _wait(session, rest, True, HAND_S) or ()
     if seen:
         show(session.say("sonar.seen", sonars=tuple(seen)))
-        _wait(session, rest, False, AWAY_S)
+        while _wait(session, rest, False, AWAY_S) is None and not choice(
+            session.say("sonar.still")
+        ):
+            pass
     else:
         show(session.say("sonar.unseen"))
     return seen
 
 
-def _wait(session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float) -> Sequence[str]:
-    """Wait for a hand, or for none; return the detecting sonars."""
+def _wait(
+    session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float
+) -> Sequence[str] | None:
+    """Wait for a hand, or for none; return the detecting sonars, or None at the timeout."""
     detector = HandDetector(rest, session.mark())
 
     def is_so() -> bool:
@@ -158,7 +164,7 @@ def _wait(session: CheckoutSession, rest: Rest, hand: bool, timeout_s: float) ->
         return bool(detector.seen) == hand and detector.settled(clock.now_ns())
 
     found = session.until(is_so, timeout_s)
-    return sorted(detector.seen, key=SONAR_NAMES.index) if found else ()
+    return sorted(detector.seen, key=SONAR_NAMES.index) if found else None
 
 
 def bumper(session: CheckoutSession) -> Verdict:
@@ -195,6 +201,7 @@ def estop(session: CheckoutSession) -> Verdict:
     session.until(
         lambda: any(one.value.command is Command.BRAKE for one in session.of(keys.MOTION)), LATCH_S
     )
+    session.listen(SETTLE_S)
     return judge_latch(_latch_test(session, "estop", at_ns), say=session.say)
 
 
@@ -281,9 +288,9 @@ STEPS = (
         ("Sonars", "超声波传感器"),
         (
             "First stand aside, with 0.8 m free all around. Then hold a hand 0.2 to 0.4 m in front "
-            "of the named sonar, until the next one is named.",
+            "of the named sonar until it is detected, and take it away.",
             "请先站到一旁，四周留出 0.8 m 空间。然后将手放在所指传感器前方 0.2 至 0.4 m 处，"
-            "直到指定下一个传感器。",
+            "检测到后请移开。",
         ),
         sonars,
     ),

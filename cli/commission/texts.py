@@ -95,7 +95,7 @@ TEXTS: dict[str, Words] = {
     "figure.rejected": ("rejected", "拒收"),
     "figure.reset": ("reset", "复位"),
     "figure.BRAKE commands received": ("BRAKE commands received", "收到的 BRAKE 指令数"),
-    "figure.after": ("{action} after", "{action}用时"),
+    "figure.after": ("{action} after", "{action} 用时"),
     "figure.hand": ("hand in front of {sonar:word}", "手在{sonar:word}传感器前方"),
     "figure.detected": (
         "detected by {sonars:word}; at rest {rest}", "检测到的传感器：{sonars:word}；静止时 {rest}",
@@ -161,6 +161,10 @@ TEXTS: dict[str, Words] = {
     ),
     "sonar.seen": (
         "  detected by: {sonars:word}. Take the hand away.", "  检测到的传感器：{sonars:word}。请把手移开。",
+    ),
+    "sonar.still": (
+        "A sonar still detects it: take it away and press Enter, or type any word to go on:",
+        "仍检测到物体：请移开后按回车，或输入任意文字继续：",
     ),
     "sonar.unseen": ("  no sonar has detected it.", "  没有传感器检测到。"),
     "sonar.next": (
@@ -293,8 +297,10 @@ TEXTS: dict[str, Words] = {
     "manoeuvre.turning": ("{way:word}", "原地{way:word}转"),
     "manoeuvre.curve": ("{way:word} turning {side:word}", "{way:word}并{side:word}转"),
     "manoeuvre.missing": (
-        "{ending} {way}: {count} of {number}", "{way} {ending}：{number} 次中的 {count} 次",
+        "{ending} {way}: {count} of {number}", "{way} {ending}：{number} 次中还缺 {count} 次",
     ),
+    "incomplete": ("Not completed.", "未完成。"),
+    "watchdog.alone": ("all but the watchdog", "看门狗以外的全部项目"),
     "drive.return": ("the return ({reason})", "返回（{reason}）"),
     "drive.excluded": (
         "{count} manoeuvres by --only or --space", "{count} 个动作（--only 或 --space）",

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,7 +13,10 @@ from cli.commission.report import Report, Verdict, failed, render
 from cli.commission.steps import Step, confirm
 from common.cli_args import EXIT_CONFIG
 from common.errors import ConfigError
+from common.freshness import Latest
+from t2 import keys
 from t2.errors import LinkError
+from tests.factories import health
 
 PHRASE = "wheels off the ground"
 SESSION: Any = None
@@ -43,7 +47,11 @@ def test_the_phrase_neither_skips_nor_continues(
     answers = iter(typed)
     for module in (command, steps):
         monkeypatch.setattr(module, "prompt", lambda _: next(answers))
-    assert command.verdict(Step("forward", ("Forward", "前进"), ("", ""), drive), SESSION) == found
+    noted: list[Verdict] = []
+    step = Step("forward", ("Forward", "前进"), ("", ""), drive)
+    assert command.verdict(step, SESSION, noted.append) == found
+    is_begun = found.outcome != "skipped"
+    assert bool(noted) == is_begun
     assert list(answers) == []
 
 
@@ -121,6 +129,48 @@ def test_a_resumed_checkout_repeats_what_has_not_passed_or_may_have_changed(
     assert third.steps[0][1].finding.count("[") == 1
 
 
+@pytest.mark.parametrize(
+    ("answers", "findings"),
+    [
+        ([], []),  # Ctrl-C at the first question: the step has not begun
+        ([""], ["Not completed."]),  # Ctrl-C in the step
+        (["", "again"], ["no echo"]),  # Ctrl-C at the question after it failed
+    ],
+)
+def test_an_interrupted_step_stays_in_the_report(
+    answers: list[str], findings: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = iter(answers)
+
+    def prompt(_: str) -> str:
+        if (typed := next(left, None)) in (None, "again"):
+            raise KeyboardInterrupt
+        return str(typed)
+
+    def run(_: object) -> Verdict:
+        if len(answers) == 1:
+            raise KeyboardInterrupt
+        return failed("no echo")
+
+    for module in (command, steps):
+        monkeypatch.setattr(module, "prompt", prompt)
+    monkeypatch.setattr(command, "STEPS", (Step("link", ("Link", "链路"), ("", ""), run),))
+    it = report([])
+    with pytest.raises(KeyboardInterrupt):
+        command.run_steps(it, SESSION, [])
+    assert [found.finding for _, found in it.steps] == findings
+    assert it.missing == ["Link"]
+
+
+def test_only_the_services_of_every_robot_count_as_its_version() -> None:
+    """Others are in the report or not by chance: a resumed checkout would begin anew."""
+    found = [Latest(health(name), 0) for name in (*keys.ON_BOARD, "camera")]
+    session: Any = SimpleNamespace(of=lambda _: found, until=lambda *_: True)
+    assert [name for name, _ in command.versions(session)] == [
+        "T2 of bridge", "T2 of odom", "T2 of safety"
+    ]  # fmt: skip
+
+
 def test_steps_that_were_not_reached_are_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     it, outcomes = report([]), iter([LINK[1], failed("no hand")])
     monkeypatch.setattr(command, "verdict", lambda *_: next(outcomes))
@@ -132,8 +182,8 @@ def test_steps_that_were_not_reached_are_missing(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("# A page", "is no report of the steps, of this version of T2"),
-        (render(report([])), "is no report of the steps, of this version of T2"),
+        ("# A page", "is no whole report of the steps, of this version of T2"),
+        (render(report([])), "is no whole report of the steps, of this version of T2"),
         (render(report([LINK], robot="7")), "is of robot 7, not of 001"),
         (render(replace(report([LINK]), language="zh")), "has another language; use T2_LANG=zh"),
         (None, "cannot be read: No such file"),

@@ -148,7 +148,7 @@ def test_a_stop_that_is_too_long_ends_the_rising_series(monkeypatch: pytest.Monk
         text = it.drive.report.manoeuvres[0][1].text
         assert text.startswith("The stop was too long: from 0.20 m/s it needs 0.09")
         assert "Do not drive faster: set vehicle.deceleration to at most 0.30 m/s2" in text
-        assert "Stops that are still missing for a fit: STOP forward: 0 of 6; " in it.operator.text
+        assert "Stops that are still missing for a fit: STOP forward: 6 of 6; " in it.operator.text
 
 
 def negated(message: m.Message) -> m.Message:
@@ -212,7 +212,7 @@ def unnamed(it: Fixture) -> None:
 def test_its_own_latch_stays_when_an_operator_has_pressed_too(
     after_ms: int, stop: Callable[[Fixture], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    answers = iter(["", "go on", "", "reset"])
+    answers = iter(["", "go on", "", "reset", ""])  # the reset confirms no motion
     with driving(monkeypatch, answers=lambda _: next(answers)) as it:
         waited_ms = 0
 
@@ -228,8 +228,9 @@ def test_its_own_latch_stays_when_an_operator_has_pressed_too(
         assert it.run("BRAKE forward from 0.50 m/s") == ["failed"]
         assert "The emergency stop stays latched. Another emergency stop has" in it.finding
         assert it.session.fresh_state().latched == ("estop",)
-        # The next manoeuvre asks for the reset.
+        # The next manoeuvre asks for the reset, and then for the motion.
         assert it.run("BRAKE backward from 0.50 m/s")[-1] == "passed"
+        assert list(answers) == []
 
 
 @pytest.mark.parametrize("stop", [press, unnamed])
@@ -514,7 +515,7 @@ def chosen(*groups: Group) -> Callable[[Report, CheckoutSession], None]:
     [
         (["hm"], "No recorder is running"),
         (["", "hm"], "No recorder is running"),
-        (["without a recording", "wheels off the ground"], "not confirmed"),
+        (["without a recording", "wheels off the ground", "no"], "not confirmed"),
     ],
 )
 def test_it_refuses_to_begin(

@@ -56,15 +56,15 @@ def test_each_motion_is_followed_by_the_one_back() -> None:
 def test_missing_stops_are_counted() -> None:
     some = [it for it in PLAN if it.title != "STOP left from 0.30 rad/s" and it.ending != "brake"]
     assert missing_stops(some, PLAN) == (
-        "STOP left: 5 of 6", "BRAKE forward: 0 of 3", "BRAKE backward: 0 of 3",
-        "BRAKE left: 0 of 3", "BRAKE right: 0 of 3",
+        "STOP left: 1 of 6", "BRAKE forward: 3 of 3", "BRAKE backward: 3 of 3",
+        "BRAKE left: 3 of 3", "BRAKE right: 3 of 3",
     )  # fmt: skip
 
 
 def test_what_was_not_planned_is_not_missing() -> None:
     turns = [it for it in PLAN if it.group == "spot"]
     assert missing_stops((), turns) == (
-        "STOP left: 0 of 6", "STOP right: 0 of 6", "BRAKE left: 0 of 3", "BRAKE right: 0 of 3",
+        "STOP left: 6 of 6", "STOP right: 6 of 6", "BRAKE left: 3 of 3", "BRAKE right: 3 of 3",
     )  # fmt: skip
 
 

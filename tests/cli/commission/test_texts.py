@@ -53,7 +53,7 @@ def test_titles_of_manoeuvres_in_chinese() -> None:
     assert "后退返回 1.00 m" in titles
     assert [title for title in titles if not CHINESE.search(title)] == []
     (missing, *_) = missing_stops([], plan(settings, say), say)
-    assert missing == "前进 STOP：6 次中的 0 次"
+    assert missing == "前进 STOP：6 次中还缺 6 次"
 
 
 def test_figures_have_names_in_both_languages() -> None:
