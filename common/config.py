@@ -41,7 +41,9 @@ PATHS = (
 )  # fmt: skip
 ENDPOINTS = ("bus.listen", "bus.connect", "bus.uplink", "bus.drive")
 SOCKET = "unixsock-stream/"  # before the path in an endpoint
-PASSWORD = re.compile(r"//[^/\s]*@")  # in a URL: origins are printed and published
+# Passwords in an address: origins are printed and published.
+USER = re.compile(r"(?<=//)[^/\s]*@|(?<==)[^/\s:]+:[^/\s]*@")
+QUERY = re.compile(r"([?&;][^=&;\s]*(?:pass|pwd|token|secret)[^=&;\s]*=)[^&;\s]*", re.IGNORECASE)
 QUOTES = tuple("\"'\u2018\u2019\u201c\u201d\u201e\u00ab")
 
 # Sections allowed in a file; a service reads its own and the shared ones.
@@ -183,6 +185,11 @@ def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> Given:
     return given
 
 
+def masked(text: str) -> str:
+    """Return a text without the passwords of addresses in it."""
+    return QUERY.sub(r"\1...", USER.sub("...@", text))
+
+
 def from_sets(root: type[Struct], sets: Sequence[str]) -> Given:
     """Return the settings of options ``--set PATH=VALUE``; raise ``ConfigError``."""
     given: Given = {}
@@ -190,7 +197,7 @@ def from_sets(root: type[Struct], sets: Sequence[str]) -> Given:
         path, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not path:
             raise ConfigError(f"--set {text}: should look like board.port=4002")
-        given |= _from_text(root, path, value, f"--set {PASSWORD.sub('//...@', text)}")
+        given |= _from_text(root, path, value, f"--set {masked(text)}")
     return given
 
 

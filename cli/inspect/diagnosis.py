@@ -37,7 +37,7 @@ FROM_STREAM = {
 }
 ONCE = (*keys.ON_BOARD, "localization", "patrol")  # for a robot; any number of others may run
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
-OPTIONAL = ("recorder", "localization", "patrol", "camera")  # the robot may do without
+OPTIONAL = ("localization", "patrol", "camera")  # the robot may do without
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
 FIX_S = 10.0  # age of the newest fix that is reported
@@ -68,6 +68,7 @@ class Observation:
     pose: MapPose | None = None  # the newest
     patrol: PatrolState | None = None  # the newest
     cameras: dict[str, Camera] = field(default_factory=dict)  # the newest state of each
+    camera_boots: dict[str, set[int]] = field(default_factory=dict)  # of the programs with a name
     obeys_patrol: bool | None = None  # whether safety has the source; None if unknown
     state: SafetyState | None = None  # the newest
 
@@ -138,6 +139,8 @@ def services(seen: Observation) -> Iterator[Finding]:
 
 def optional(seen: Observation) -> Iterator[Finding]:
     """Name the optional services that do not run; one that hangs leaves the bus after seconds."""
+    if seen.listed and not seen.is_absent("safety") and "recorder" not in seen.instances:
+        yield found("services", "note", "services.no_recorder", "no_recorder")
     absent = tuple(name for name in OPTIONAL if name not in seen.instances)
     if seen.listed and absent and not seen.is_absent("safety"):
         yield found("services", "ok", "services.optional", names=absent)
@@ -335,7 +338,10 @@ def patrol(seen: Observation) -> Iterator[Finding]:
 
 def cameras(seen: Observation) -> Iterator[Finding]:
     """Report each camera, and why it has no picture."""
-    for _, it in sorted(seen.cameras.items()):
+    for camera, it in sorted(seen.cameras.items()):
+        if len(seen.camera_boots.get(camera, ())) > 1:
+            yield found("camera", "wrong", "camera.twice", "camera_twice", name=camera)
+            continue
         text, name = said(it.phrases, it.text), f"camera.{it.state}"
         if it.state == "up":
             yield Finding("camera", "ok", name, text)

@@ -258,6 +258,7 @@ def add_sample(sample: Sample, seen: Observation) -> None:
             seen.links.append(message)
         case Camera():
             seen.cameras[message.camera] = message
+            seen.camera_boots.setdefault(message.camera, set()).add(message.boot)
         case MapPose() | PatrolState() | SafetyState():
             setattr(seen, NEWEST[type(message)], message)
 

@@ -57,6 +57,14 @@ FINDINGS: dict[str, Words] = {
     ),
     "services.absent_one": ("{names:service} is not running", "{names:service}未运行"),
     "services.absent": ("{names:service} are not running", "{names:service}未运行"),
+    "camera.twice": (
+        "camera {name}: two programs publish pictures under this name",
+        "摄像头 {name}：两个程序以此名称发布图像",
+    ),
+    "services.no_recorder": (
+        "the recorder is not running, or hangs: nothing is recorded, and the shift log has a gap",
+        "记录器未运行或无响应：没有录制，值班日志将出现空白",
+    ),
     "services.optional": (
         "not running, and needed only where they are used: {names:service}",
         "未运行（仅在使用时需要）：{names:service}",
@@ -214,6 +222,14 @@ REMEDIES: dict[str, Words] = {
     "duplicate": (
         "stop one of them: a robot has one of each; look for a second `t2 up`",
         "请停止其中一个：每台机器人每种服务只能有一个；请查找第二个 `t2 up`",
+    ),
+    "no_recorder": (
+        "if the robot should record, start it again: `systemctl restart t2-recorder`, or `t2 up`",
+        "如需录制，请重新启动：`systemctl restart t2-recorder` 或 `t2 up`",
+    ),
+    "camera_twice": (
+        "stop one of them, or give it another name: `t2 camera SOURCE --name NAME`",
+        "请停止其中一个，或另行命名：`t2 camera SOURCE --name NAME`",
     ),
     "hangs": (
         "kill its process; its supervisor restarts it", "请终止其进程；监管程序会将其重启",

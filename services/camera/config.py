@@ -4,6 +4,7 @@ from typing import Annotated
 from urllib.parse import urlsplit
 
 from common import settings
+from common.config import masked
 from common.settings import allowed
 from t2.messages import CameraName
 
@@ -26,15 +27,15 @@ class Camera(settings.Section, frozen=True, kw_only=True):
     latency: Annotated[float, allowed("s", ge=0.0, le=1.0)] = 0.05
 
     def __post_init__(self) -> None:
+        if masked(f"={self.source}") != f"={self.source}":
+            raise ValueError(
+                "source contains a user name or password, and settings are published on the bus; "
+                "write USER:PASSWORD into a file, and set credentials_file to its path"
+            )
         scheme = urlsplit(self.source).scheme
         if scheme not in SCHEMES:
             raise ValueError(
                 f"source begins with {scheme}://, allowed are a path and {', '.join(SCHEMES[1:])}"
-            )
-        if urlsplit(self.source).username is not None:
-            raise ValueError(
-                "source contains a user name or password, and settings are published on the bus; "
-                "write USER:PASSWORD into a file, and set credentials_file to its path"
             )
 
 

@@ -250,6 +250,9 @@ def test_a_password_is_not_in_the_settings(tmp_path: Path) -> None:
     [
         ("ftp://10.0.0.5/a", "begins with ftp://, allowed are a path and rtsp, "),
         ("rtsp://anna:secret@10.0.0.5/a", "contains a user name or password"),
+        ("rtsp://10.0.0.5/a?user=anna&Password=secret", "contains a user name or password"),
+        ("http://10.0.0.5/a?channel=1&access_token=secret", "contains a user name or password"),
+        ("anna:secret@10.0.0.5/a", "contains a user name or password"),
     ],
 )
 def test_a_source_that_no_camera_has(
@@ -259,6 +262,11 @@ def test_a_source_that_no_camera_has(
     shown = capsys.readouterr().err
     assert reason in shown
     assert "secret" not in shown
+
+
+@pytest.mark.parametrize("source", ["clips/gate@night.mp4", "http://10.0.0.5/a?keyframe=1&size=2"])
+def test_not_each_at_sign_is_a_password(source: str) -> None:
+    assert Camera(source=source).source == source
 
 
 def test_a_folder_is_no_source(tmp_path: Path) -> None:

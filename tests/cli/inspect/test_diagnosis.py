@@ -48,9 +48,9 @@ def state(*names: Any, latched: tuple[Any, ...] = (), **given: Any) -> m.SafetyS
 def seen(**given: Any) -> Observation:
     """Return the observation of a healthy robot, with the given differences."""
     healthy: dict[str, Any] = {
-        "t2": "0.1.0", "instances": dict.fromkeys(keys.ON_BOARD, 1),
+        "t2": "0.1.0", "instances": dict.fromkeys((*keys.ON_BOARD, "recorder"), 1),
         "sources": ["teleop", "web"], "calls": ["safety/reset"],
-        "healths": {name: health(name) for name in keys.ON_BOARD}, "links": [link()],
+        "healths": {name: health(name) for name in (*keys.ON_BOARD, "recorder")}, "links": [link()],
         "state": state("no_request"), "delays_s": [0.01, 0.02], "rates": RATES,
         "pose": factories.map_pose(),
     }  # fmt: skip
@@ -92,9 +92,9 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
 @pytest.mark.parametrize(
     ("running", "named"),
     [
-        ((), ["recorder, localization, patrol, camera"]),
+        ((), ["nothing is recorded, and the shift log has a gap", "localization, patrol, camera"]),
         (("recorder", "camera"), ["localization, patrol"]),
-        (d.OPTIONAL, []),
+        (("recorder", *d.OPTIONAL), []),
     ],
 )
 def test_optional_services_that_do_not_run_are_named(
@@ -230,7 +230,7 @@ def test_a_localization_without_a_pose_is_no_second_problem() -> None:
 
 def without(*services: str) -> dict[str, Any]:
     """Return instances and healths without these services."""
-    names = [name for name in keys.ON_BOARD if name not in services]
+    names = [name for name in (*keys.ON_BOARD, "recorder") if name not in services]
     return {"instances": dict.fromkeys(names, 1), "healths": {n: health(n) for n in names}}
 
 
@@ -341,3 +341,9 @@ def test_cameras() -> None:
     ]
     ok = [it.text() for it in diagnose(seen(cameras=cameras), "001") if it.where == "camera"]
     assert ok == ["Pictures arrive.", "Camera rear: no picture. refused"]
+    boots = {"rear": {1}, "front": {1, 2}}
+    (twice, _) = problems(seen(cameras=cameras, camera_boots=boots))
+    assert twice == (
+        "wrong", "camera front: two programs publish pictures under this name",
+        remedy("camera_twice"),
+    )  # fmt: skip
