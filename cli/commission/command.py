@@ -143,7 +143,7 @@ def guide(report: Report, work: Callable[[], None]) -> None:
             pass
         report.operator = name
         firmware = prompt(say("firmware"))
-        report.facts.append(("firmware", firmware or "unknown"))
+        report.facts.append(("firmware", firmware or say("unknown")))
         work()
         show("")
         others = [each for each in report.manoeuvres if each[1].outcome != "passed"]
@@ -229,7 +229,7 @@ def taken_over(before: Report, now: Report, steps: Sequence[Step]) -> dict[str, 
     settings = {row[:2] for row in before.settings} ^ {row[:2] for row in now.settings}
     changed = [*facts, *sorted({path for path, _ in settings})]
     if changed:
-        now.facts.append(("changed since the report before", ", ".join(changed)))
+        now.facts.append((Say(now.language)("figure.changed"), ", ".join(changed)))
         show(Say(now.language)("changed", what=tuple(changed)))
     titles = [Say(now.language).of(it.title) for it in steps if not changed or it.name in UNSET]
     counting = [] if facts else titles

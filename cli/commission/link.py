@@ -31,13 +31,13 @@ def judge_link(links: Sequence[Link], switches: Switches | None, say: Say = ENGL
     frames = round(seconds * mean(sum(link.rates.values()) for link in links))
     data = [
         *(
-            (f"{name}, Hz", f"{rate:.0f} of {EXPECTED_HZ[name]:.0f}")
+            (f"{name}, Hz", say("rate_of", rate=rate, expected=EXPECTED_HZ[name]))
             for name, rate in rates.items()
         ),
-        ("switches confirmed on", _switches(switches)),
-        ("received at port", _listed(links[-1].ports)),
-        ("relay", _relay(links[-1].relay)),
-        ("rejected", _listed(rejected(links))),
+        ("switches confirmed on", _switches(switches, say)),
+        ("received at port", _listed(links[-1].ports) or say("nothing")),
+        ("relay", _relay(links[-1].relay, say)),
+        ("rejected", _listed(rejected(links)) or say("nothing")),
     ]
     problems = [
         *_link_problems(links, switches, rates, say),
@@ -60,7 +60,7 @@ def _link_problems(
         yield say("link.down", state=links[-1].state)
         return
     if any(link.relay and (link.relay.state != "up" or link.relay.braking) for link in links):
-        yield say("link.relay", relay=_relay(links[-1].relay))
+        yield say("link.relay", relay=_relay(links[-1].relay, say))
     if links[0].epoch != links[-1].epoch:
         yield say("link.restarted")
     for name, rate in rates.items():
@@ -84,19 +84,22 @@ def _rejections(counts: Mapping[str, int], frames: int, say: Say) -> Iterator[st
             yield say("link.rejected", count=count, reason=reason)
 
 
-def _switches(switches: Switches | None) -> str:
+def _switches(switches: Switches | None, say: Say) -> str:
     if switches is None:
-        return "not received"
-    return f"ultrasonic {switches.ultrasonic_brake}, bumper {switches.bumper_brake}"
+        return say("not_received")
+    names = {True: "on", False: "off", None: "unknown"}
+    ultrasonic, bumper = names[switches.ultrasonic_brake], names[switches.bumper_brake]
+    return say("switches", ultrasonic=ultrasonic, bumper=bumper)
 
 
-def _relay(relay: Relay | None) -> str:
+def _relay(relay: Relay | None, say: Say) -> str:
     if relay is None:
-        return "not configured"
+        return say("relay.none")
     if relay.state != "up":
-        return "silent"
-    return f"{relay.version}, {f'braking: {relay.braking}' if relay.braking else 'passing'}"
+        return say("relay.silent")
+    name = "relay.braking" if relay.braking else "relay.passing"
+    return say(name, version=relay.version, braking=relay.braking)
 
 
 def _listed(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{reason} {count}" for reason, count in sorted(counts.items())) or "nothing"
+    return ", ".join(f"{reason} {count}" for reason, count in sorted(counts.items()))

@@ -90,7 +90,7 @@ def render(report: Report) -> str:
     say = Say(report.language)
     about = [
         (say("report.date"), report.date), (say("report.operator"), report.operator),
-        *report.facts,
+        *_named(report.facts, say),
     ]  # fmt: skip
     unsigned = say("report.unsigned")
     signature = f"{_cell(report.signed)}, {report.ended}" if report.signed else unsigned

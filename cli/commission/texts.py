@@ -75,6 +75,13 @@ TEXTS: dict[str, Words] = {
     "report.partial": (
         "Partial checkout, left out: {names}.", "部分验收，略去：{names}。",
     ),
+    "figure.board": ("board", "主控板"),
+    "figure.firmware": ("firmware", "固件"),
+    "figure.T2 of this tool": ("T2 of this tool", "本工具的 T2 版本"),
+    "figure.T2 of bridge": ("T2 of bridge", "桥接服务的 T2 版本"),
+    "figure.T2 of safety": ("T2 of safety", "安全服务的 T2 版本"),
+    "figure.T2 of odom": ("T2 of odom", "里程计的 T2 版本"),
+    "figure.changed": ("changed since the report before", "自上一份报告以来有变化"),
     "figure.recording": ("recording", "录制"),
     "figure.commanded": ("commanded", "指令"),
     "figure.measured": ("measured", "实测"),
@@ -99,6 +106,24 @@ TEXTS: dict[str, Words] = {
     "figure.hand": ("hand in front of {sonar:word}", "手在{sonar:word}传感器前方"),
     "figure.detected": (
         "detected by {sonars:word}; at rest {rest}", "检测到的传感器：{sonars:word}；静止时 {rest}",
+    ),
+    "rate_of": ("{rate:.0f} of {expected:.0f}", "{rate:.0f}（应为 {expected:.0f}）"),
+    "not_received": ("not received", "未收到"),
+    "switches": (
+        "ultrasonic {ultrasonic:word}, bumper {bumper:word}",
+        "超声波 {ultrasonic:word}、防撞条 {bumper:word}",
+    ),
+    "relay.none": ("not configured", "未配置"),
+    "relay.silent": ("silent", "无应答"),
+    "relay.passing": ("{version}, passing", "{version}，正在转发"),
+    "relay.braking": ("{version}, braking: {braking}", "{version}，正在制动：{braking}"),
+    "try.fed": ("queries go on", "查询继续"),
+    "try.silent": ("silence of {waited:g} s", "静默 {waited:g} s"),
+    "try.drives_on": (
+        "drives on for {waited:g} s, {travelled:.3f} m", "继续行驶 {waited:g} s，{travelled:.3f} m",
+    ),
+    "try.slows": (
+        "slows at {slowed:.2f} s, {travelled:.3f} m", "{slowed:.2f} s 时减速，{travelled:.3f} m",
     ),
     "no_reading": ("no reading", "无读数"),
     "no_echo": ("no echo", "无回波"),

@@ -62,7 +62,7 @@ def silent_try(points: Sequence[Point], speed: float, waited: float, travelled: 
 
 def judge_watchdog(fed: Sequence[Try], silent: Sequence[Try], say: Say = ENGLISH) -> Verdict:
     """Return what the tries show; ``failed`` if they contradict each other."""
-    data = list(map(_row, (*fed, *silent)))
+    data = [_row(each, say) for each in (*fed, *silent)]
     problems = [
         *_contradictions(fed, "watchdog.fed", say),
         *_contradictions(silent, "watchdog.silence", say),
@@ -111,7 +111,8 @@ def _after(stops: Sequence[float], say: Say) -> str:
     return say(name, mean=mean(stops), least=min(stops), most=max(stops), count=len(stops))
 
 
-def _row(it: Try) -> Row:
-    how = "queries go on" if it.fed else f"silence of {it.waited:g} s"
-    seen = f"drives on for {it.waited:g} s" if it.slowed is None else f"slows at {it.slowed:.2f} s"
-    return how, f"{seen}, {it.travelled:.3f} m"
+def _row(it: Try, say: Say) -> Row:
+    how = say("try.fed") if it.fed else say("try.silent", waited=it.waited)
+    if it.slowed is None:
+        return how, say("try.drives_on", waited=it.waited, travelled=it.travelled)
+    return how, say("try.slows", slowed=it.slowed, travelled=it.travelled)

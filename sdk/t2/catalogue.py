@@ -1169,6 +1169,9 @@ SOURCES: dict[str, Words] = {
 
 # Words inside a phrase, such as names of inputs. A word without a row is shown as it is, with spaces.
 WORDS: dict[str, Words] = {
+    "on": ("on", "开"),
+    "off": ("off", "关"),
+    "unknown": ("unknown", "未知"),
     "forward": ("forward", "前进"),
     "backward": ("backward", "后退"),
     "left": ("left", "左"),
