@@ -1153,7 +1153,7 @@ SERVICES: dict[str, Words] = {
     "camera": ("camera", "摄像头"),
     "teleop": ("teleop", "驾驶终端"),
     "dashboard": ("dashboard", "仪表板"),
-    "estop": ("E-STOP command", "急停命令"),
+    "estop": ("emergency stop", "急停"),
     "recorder": ("recorder", "记录器"),
     "metrics": ("metrics", "监控指标"),
     "ros2": ("ROS 2", "ROS 2"),
