@@ -41,9 +41,10 @@ PATHS = (
 )  # fmt: skip
 ENDPOINTS = ("bus.listen", "bus.connect", "bus.uplink", "bus.drive")
 SOCKET = "unixsock-stream/"  # before the path in an endpoint
-# Passwords in an address: origins are printed and published.
-USER = re.compile(r"(?<=//)[^/\s]*@|(?<==)[^/\s:]+:[^/\s]*@")
-QUERY = re.compile(r"([?&;][^=&;\s]*(?:pass|pwd|token|secret)[^=&;\s]*=)[^&;\s]*", re.IGNORECASE)
+# Addresses with a password, before the host or in what follows: origins are printed and published.
+SECRET = re.compile(
+    r"://(?=\S*@|\S*(?:pas|pwd|secret|token|auth)\w*=)\S*|(?<==)[^/\s:]+:\S*@\S*", re.IGNORECASE
+)
 QUOTES = tuple("\"'\u2018\u2019\u201c\u201d\u201e\u00ab")
 
 # Sections allowed in a file; a service reads its own and the shared ones.
@@ -186,8 +187,8 @@ def _from_environ(root: type[Struct], environ: Mapping[str, str]) -> Given:
 
 
 def masked(text: str) -> str:
-    """Return a text without the passwords of addresses in it."""
-    return QUERY.sub(r"\1...", USER.sub("...@", text))
+    """Return a text without the addresses in it that have a password."""
+    return SECRET.sub("...", text)
 
 
 def from_sets(root: type[Struct], sets: Sequence[str]) -> Given:

@@ -13,7 +13,7 @@ from pathlib import Path
 from cli.commission.board_link import Times, check_alone, measure_watchdog
 from cli.commission.drive_command import guided_drive
 from cli.commission.manoeuvres import GROUPS
-from cli.commission.report import Report, Row, Verdict, parse, render
+from cli.commission.report import Report, Row, Verdict, after, parse, render
 from cli.commission.session import CheckoutSession, checkout_session
 from cli.commission.steps import STEPS, Step, choice, prompt, show
 from cli.commission.texts import ENGLISH, Say
@@ -177,9 +177,9 @@ def run_steps(
     report: Report, session: CheckoutSession, only: Sequence[str], before: Report | None = None
 ) -> None:
     """Run the steps with the wheels off the ground, or only these; not those passed ``before``."""
-    report.left_out = [name for name in NAMES if only and name not in only]
-    steps = [step for step in STEPS if step.name not in report.left_out]
     say = Say(report.language)
+    steps = [step for step in STEPS if not only or step.name in only]
+    report.left_out = [say.of(step.title) for step in STEPS if step not in steps]
     report.planned = [say.of(step.title) for step in steps]
     known = taken_over(before, report, steps) if before else {}
     for number, step in enumerate(steps, 1):
@@ -251,14 +251,22 @@ def verdict(
     if reason := choice(say("begin")):
         return Verdict("skipped", reason)
     note(Verdict("failed", say("incomplete")))
+    earlier: list[Verdict] = []
     while True:
-        found = step.run(session)
+        try:
+            found = step.run(session)
+        except KeyboardInterrupt:
+            note(session.so_far or Verdict("failed", say("incomplete")))
+            raise
+        session.so_far = None
         note(found)
         show(say("found", outcome=say(f"verdict.{found.outcome}"), text=found.text))
+        whole = after(found, earlier, say)
         if found.outcome == "passed":
-            return found
+            return whole
         if remark := choice(say("again")):
-            return replace(found, text=say("remark", text=found.text, remark=remark))
+            return replace(whole, text=say("remark", text=whole.text, remark=remark))
+        earlier.append(found)
 
 
 def now() -> str:

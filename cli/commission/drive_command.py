@@ -21,7 +21,7 @@ from cli.commission.manoeuvres import (
     missing_stops,
     plan,
 )
-from cli.commission.report import Report, Verdict
+from cli.commission.report import Report, Verdict, after
 from cli.commission.session import SOURCE, CheckoutSession
 from cli.commission.steps import (
     choice,
@@ -140,15 +140,16 @@ class GuidedDrive:
         say = self.session.say
         if reason := choice(say("begin")):
             return Result(Verdict("skipped", reason))
+        earlier: list[Verdict] = []
         while True:
             result = self._attempt(it)
             outcome = say(f"verdict.{result.verdict.outcome}")
             text = say("found", outcome=outcome, text=result.verdict.text)
             show(f"{text}{_figures(result.verdict, say)}")
-            if result.verdict.outcome == "passed" or result.then != "again":
-                return result
-            if choice(say("any_word")):
-                return result
+            is_over = result.verdict.outcome == "passed" or result.then != "again"
+            if is_over or choice(say("any_word")):
+                return Result(after(result.verdict, earlier, say), result.then)
+            earlier.append(result.verdict)
 
     def _attempt(self, it: Manoeuvre) -> Result:
         if not self._is_recorded():
@@ -157,6 +158,8 @@ class GuidedDrive:
         if problem := unlatch(self.session):
             return Result(Verdict("failed", problem))
         # The operator has confirmed the reset, not the motion.
+        if was_latched:
+            show(f"\n{it.title}\n{announcement(it, self.session.say)}")
         if was_latched and (reason := choice(self.session.say("begin"))):
             return Result(Verdict("skipped", reason), "slower")
         if it.twist.is_zero:

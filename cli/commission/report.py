@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import msgspec
@@ -40,6 +40,14 @@ def judged(
     """Return ``failed`` with all problems; without problems ``passed`` with the given text."""
     found = [problem for problem in problems if problem]
     return Verdict("failed" if found else "passed", say.sentences(found) or passed, tuple(data))
+
+
+def after(found: Verdict, earlier: Sequence[Verdict], say: Say) -> Verdict:
+    """Return a verdict that names the different reasons of earlier attempts that failed."""
+    texts = dict.fromkeys(each.text for each in earlier if each.text != found.text)
+    if not texts:
+        return found
+    return replace(found, text=say("earlier", text=found.text, earlier=say.sentences(texts)))
 
 
 def failed(problem: str) -> Verdict:

@@ -12,6 +12,7 @@ from cli.commission.drive_verdict import Drive
 from cli.commission.latches import Reset
 from cli.commission.manoeuvres import Ending, Manoeuvre
 from cli.commission.motion import too_fast
+from cli.commission.report import Verdict
 from cli.commission.supervision import Problem, Supervision
 from cli.commission.texts import Say
 from cli.inspect.addressing import chunks, decode, topic_of
@@ -57,6 +58,7 @@ class CheckoutSession(SafetyClient):
         """Listen to the robot; ``language`` is that of safety's texts."""
         super().__init__(opened, robot, SOURCE, language)
         self.say = Say(language)
+        self.so_far: Verdict | None = None  # of a step that is not over
         self._marked_ns = 0
         self._braked_ns = 0  # when this manoeuvre's emergency stop was published; 0 without one
         self._ordered = self._seen = 0  # emergency stops published here, and received from anybody

@@ -126,6 +126,7 @@ def sonars(session: CheckoutSession) -> Verdict:
     found: list[Sequence[str]] = []
     for name, resting in zip(SONAR_NAMES, rest, strict=True):
         found.append(_find(session, rest, name))
+        session.so_far = judge_sonars(rest, found, say("incomplete"), say)
         is_missed = resting is not None and not found[-1]
         if is_missed and len(found) < len(rest) and (left := choice(say("sonar.next"))):
             return judge_sonars(rest, found, left, say)

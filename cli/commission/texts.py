@@ -324,6 +324,7 @@ TEXTS: dict[str, Words] = {
     "manoeuvre.missing": (
         "{ending} {way}: {count} of {number}", "{way} {ending}：{number} 次中还缺 {count} 次",
     ),
+    "earlier": ("{text} Before that: {earlier}", "{text}此前：{earlier}"),
     "incomplete": ("Not completed.", "未完成。"),
     "watchdog.alone": ("all but the watchdog", "看门狗以外的全部项目"),
     "drive.return": ("the return ({reason})", "返回（{reason}）"),

@@ -37,7 +37,7 @@ FROM_STREAM = {
 }
 ONCE = (*keys.ON_BOARD, "localization", "patrol")  # for a robot; any number of others may run
 ENOUGH = 0.5  # of a stream's rate; below that, safety stops the vehicle
-OPTIONAL = ("localization", "patrol", "camera")  # the robot may do without
+OPTIONAL = ("patrol", "camera")  # the robot may do without
 LATE_S = 0.1  # loop lateness that is reported
 CLOCK_S = 1.0  # clock offset that is reported
 FIX_S = 10.0  # age of the newest fix that is reported
@@ -143,7 +143,7 @@ def optional(seen: Observation) -> Iterator[Finding]:
         yield found("services", "note", "services.no_recorder", "no_recorder")
     absent = tuple(name for name in OPTIONAL if name not in seen.instances)
     if seen.listed and absent and not seen.is_absent("safety"):
-        yield found("services", "ok", "services.optional", names=absent)
+        yield found("services", "note", "services.optional", names=absent)
 
 
 def versions(seen: Observation) -> Iterator[Finding]:

@@ -441,6 +441,9 @@ PHRASES: dict[str, Words] = {
     "relay.lost": ("The relay is silent.", "收不到中继器的数据。"),
     "relay.brakes": ("The relay brakes ({reason:word}).", "中继器正在制动（{reason:word}）。"),
     # the first part of the path that is missing
+    "camera.silent": (
+        "Camera {camera}: no picture arrives from {source}.", "摄像头 {camera}：收不到 {source} 的图像。",
+    ),
     "camera.ended": (
         "Camera {camera}: no picture. The stream has ended.", "摄像头 {camera}：没有图像。视频流已结束。",
     ),

@@ -18,7 +18,7 @@ from common.service import Node
 from services.camera.config import CameraConfig
 from services.camera.core import WAITED_NS, Lateness, Watch, heartbeat_before, moved
 from services.camera.jpeg import JpegEncoder
-from services.camera.source import ENDED, Frame, Source
+from services.camera.source import ENDED, SILENT, Frame, Source
 from t2 import keys
 from t2 import messages as m
 from t2.words import render
@@ -197,8 +197,11 @@ class CameraService:
         if state == "lost":
             if self._error == ENDED:
                 return m.Phrase("camera.ended", {"camera": camera})
-            reason = self._error or f"{self._settings.source}: no picture arrives"
-            return m.Phrase("event.camera_lost", {"camera": camera, "reason": reason})
+            if self._error in ("", SILENT):
+                return m.Phrase(
+                    "camera.silent", {"camera": camera, "source": self._settings.source}
+                )
+            return m.Phrase("event.camera_lost", {"camera": camera, "reason": self._error})
         fields: dict[str, m.Field] = {"camera": camera}
         if state == "up" and it is not None:
             fields |= {"width": it.width, "height": it.height}

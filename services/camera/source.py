@@ -21,7 +21,7 @@ from services.camera.config import Camera
 
 OPEN_S, READ_S = 5.0, 2.0  # time limits of a network camera
 RETRY_S = 1.0
-ENDED = "the stream has ended"
+ENDED, SILENT = "the stream has ended", "no picture arrives"
 EARLY = 0.25  # of a period: a picture that is due so soon is taken
 # Options of FFmpeg by the beginning of the source: without its own buffers.
 OPTIONS = {
@@ -131,5 +131,7 @@ def address(settings: Camera) -> str:
 
 def reason(error: Exception, source: str) -> str:
     """Return why a source cannot be read; the text of an error may contain its password."""
+    if isinstance(error, av.error.ExitError):  # the time limit
+        return SILENT
     text = getattr(error, "strerror", None) or type(error).__name__
     return f"{source}: {text}"

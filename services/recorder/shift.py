@@ -54,7 +54,7 @@ ROUNDS = (
 )  # fmt: skip
 OPERATED = ("dashboard", "teleop", "estop")  # services whose events name an operator
 OF_SERVICE: dict[str, tuple[str, ...]] = {
-    "bridge": ("link_lost", "board_restarted", "relay_lost"),
+    "bridge": ("link_lost", "link_up", "board_restarted", "relay_lost"),
     "safety": (*LATCHES, "stop", "reset", "reset_refused"),
     "patrol": ROUNDS,
     "recorder": (*NOTES, "black_box"),
@@ -190,6 +190,7 @@ class _Builder:
         self.rows: list[Row] = []
         self._latched: list[Row] = []  # stops that are not reset
         self._round: Row | None = None  # that is not over
+        self._silent: Row | None = None  # of a board that is silent
         people = [each for each in events if each.service in OPERATED]
         self._spent: list[Seen] = []  # requests that safety had carried out already
         self._asked = {name: [it for it in people if it.event.name == name] for name in ASKED}
@@ -198,10 +199,8 @@ class _Builder:
                 self._add_safety(one)
             elif one.service == "patrol":
                 self._add_round(one)
-            elif one.event.name == "black_box":
-                self._add_black_box(one)
             elif one.event.name not in ASKED:
-                self._add_person(one)
+                self._add_other(one)
         kinds: dict[str, LogKind] = {"estop": "stop", "reset_request": "reset"}
         for one in [*self._spent, *(one for asked in self._asked.values() for one in asked)]:
             row = self._add(kinds[one.event.name], one, by=by_of(one.event))
@@ -289,6 +288,16 @@ class _Builder:
             row.recording = row.recording or name
             if any(f"-latch-{cause}." in name for cause in row.causes):
                 return
+
+    def _add_other(self, one: Seen) -> None:
+        if one.event.name == "black_box":
+            self._add_black_box(one)
+        elif one.event.name == "link_lost":
+            self._silent = self._add("note", one)
+        elif one.event.name != "link_up":
+            self._add_person(one)
+        elif self._silent:
+            self._silent.end_ns, self._silent = one.at_ns, None
 
     def _add_person(self, one: Seen) -> None:
         kinds: dict[str, LogKind] = {

@@ -253,6 +253,10 @@ def test_a_password_is_not_in_the_settings(tmp_path: Path) -> None:
         ("rtsp://10.0.0.5/a?user=anna&Password=secret", "contains a user name or password"),
         ("http://10.0.0.5/a?channel=1&access_token=secret", "contains a user name or password"),
         ("anna:secret@10.0.0.5/a", "contains a user name or password"),
+        ("rtsp://anna:secret/PWd@10.0.0.5/a", "contains a user name or password"),
+        ("http://10.0.0.5/v?usr=a&pwd=secret&loginpas=secret", "contains a user name or password"),
+        ("rtsp://10.0.0.5/user=admin_password=secret_channel=1", "contains a user name or passwo"),
+        ("http://10.0.0.5/v?auth=secret", "contains a user name or password"),
     ],
 )
 def test_a_source_that_no_camera_has(

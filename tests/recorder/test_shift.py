@@ -125,12 +125,15 @@ def test_take_overs_of_page_and_terminal() -> None:
 def test_a_silent_board_and_the_end_of_driving_in_sight_are_notes() -> None:
     found = log(
         seen(1, "bridge", "link_lost", Phrase("event.link_lost")),
+        seen(4, "bridge", "link_up", Phrase("event.link_up")),
+        seen(5, "bridge", "link_up", Phrase("event.link_up")),
         seen(2, "dashboard", "by_picture", Phrase("event.by_picture", {"by": "Ann"}), by="Ann"),
     )
     assert texts(found) == [
         "note: The board is silent: STOP is being sent.",
         "note: Ann drives by the picture.",
     ]
+    assert [row.end_ns for row in found] == [ns(4), 0]
 
 
 def test_a_round_is_one_row_with_its_route_and_result() -> None:

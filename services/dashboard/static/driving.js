@@ -123,7 +123,7 @@ function holdText(isDriver, driver, isStopped) {
   const late = lateText(driver);
   if (late) return late;
   if (pad.state) return t(`hold.${pad.state}`);
-  if (driver.hold === "held" && isStopped) return t("hold.stopped");
+  if (driver.hold === "held" && isStopped && !releasing) return t("hold.stopped");
   return t(driver.hold === "free" && isHeld ? "hold.waiting" : `hold.${driver.hold}`);
 }
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -19,9 +19,10 @@ from t2.errors import LinkError
 from tests.factories import health
 
 PHRASE = "wheels off the ground"
-SESSION: Any = None
+SESSION: Any = SimpleNamespace(so_far=None)
 NOT_CONFIRMED = failed("Not confirmed: no motion was requested.")
 DRIVEN = Verdict("passed", "The wheels turned.")
+AFTER = Verdict("passed", f"The wheels turned. Before that: {NOT_CONFIRMED.text}")
 
 
 def drive(_: object) -> Verdict:
@@ -36,8 +37,8 @@ def drive(_: object) -> Verdict:
         (["reset", PHRASE], DRIVEN),
         (["复位", "车轮离地"], DRIVEN),
         (["", "车轮离地"], DRIVEN),
-        (["", "wheel", "", PHRASE], DRIVEN),
-        (["", "", PHRASE, PHRASE], DRIVEN),  # too late: it tries again
+        (["", "wheel", "", PHRASE], AFTER),
+        (["", "", PHRASE, PHRASE], AFTER),  # too late: it tries again
         (["", "", "no key"], failed(f"{NOT_CONFIRMED.text} Remark: no key")),
     ],
 )
@@ -160,6 +161,21 @@ def test_an_interrupted_step_stays_in_the_report(
         command.run_steps(it, SESSION, [])
     assert [found.finding for _, found in it.steps] == findings
     assert it.missing == ["Link"]
+
+
+def test_what_an_interrupted_step_has_found_is_in_the_report(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def run(session: Any) -> Verdict:
+        session.so_far = failed("left: the hand was detected by right.")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(steps, "prompt", lambda _: "")
+    noted: list[Verdict] = []
+    step, session = Step("sonar", ("Sonars", ""), ("", ""), run), cast(Any, SimpleNamespace())
+    with pytest.raises(KeyboardInterrupt):
+        command.verdict(step, session, noted.append)
+    assert noted[-1].text == "left: the hand was detected by right."
 
 
 def test_only_the_services_of_every_robot_count_as_its_version() -> None:

@@ -18,6 +18,7 @@ from t2.words import PLACEHOLDER
 from tests import factories
 from tests.factories import health
 
+RUNNING = (*keys.ON_BOARD, "recorder", *d.OPTIONAL)  # on a healthy robot
 RATES = {topic.path: topic.rate_hz for topic in d.STREAMS}
 Check = Callable[[Observation], Iterator[Finding]]
 
@@ -48,9 +49,9 @@ def state(*names: Any, latched: tuple[Any, ...] = (), **given: Any) -> m.SafetyS
 def seen(**given: Any) -> Observation:
     """Return the observation of a healthy robot, with the given differences."""
     healthy: dict[str, Any] = {
-        "t2": "0.1.0", "instances": dict.fromkeys((*keys.ON_BOARD, "recorder"), 1),
+        "t2": "0.1.0", "instances": dict.fromkeys(RUNNING, 1),
         "sources": ["teleop", "web"], "calls": ["safety/reset"],
-        "healths": {name: health(name) for name in (*keys.ON_BOARD, "recorder")}, "links": [link()],
+        "healths": {name: health(name) for name in RUNNING}, "links": [link()],
         "state": state("no_request"), "delays_s": [0.01, 0.02], "rates": RATES,
         "pose": factories.map_pose(),
     }  # fmt: skip
@@ -92,8 +93,8 @@ def test_services_that_are_missing_duplicate_hanging_or_late() -> None:
 @pytest.mark.parametrize(
     ("running", "named"),
     [
-        ((), ["nothing is recorded, and the shift log has a gap", "localization, patrol, camera"]),
-        (("recorder", "camera"), ["localization, patrol"]),
+        ((), ["nothing is recorded, and the shift log has a gap", "patrol, camera"]),
+        (("recorder", "camera"), ["patrol"]),
         (("recorder", *d.OPTIONAL), []),
     ],
 )
@@ -230,7 +231,7 @@ def test_a_localization_without_a_pose_is_no_second_problem() -> None:
 
 def without(*services: str) -> dict[str, Any]:
     """Return instances and healths without these services."""
-    names = [name for name in (*keys.ON_BOARD, "recorder") if name not in services]
+    names = [name for name in RUNNING if name not in services]
     return {"instances": dict.fromkeys(names, 1), "healths": {n: health(n) for n in names}}
 
 
