@@ -90,7 +90,7 @@ class GuidedDrive:
         """Publish an emergency stop, and report whether safety has latched it."""
         say = self.session.say
         is_latched = self.session.emergency_stop()
-        text = say("drive.interrupted", causes=self.session.latched() or say("nothing"))
+        text = say("drive.interrupted", causes=say.causes(self.session.latched()))
         hint = say("drive.reset_hint")
         if not is_latched:
             text += f"{say('drive.and')}{say('drive.not_latched')}"

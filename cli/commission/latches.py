@@ -24,7 +24,7 @@ class Reset(NamedTuple):
         """Return why the robot is not reset; empty if it is."""
         if not self.granted:
             return say("latch.reset", text=self.text)
-        return say("latch.after", causes=self.latched) if self.latched else ""
+        return say("latch.after", causes=say.causes(self.latched)) if self.latched else ""
 
 
 class LatchTest(NamedTuple):
@@ -43,7 +43,7 @@ def judge_latch(test: LatchTest, problem: str = "", say: Say = ENGLISH) -> Verdi
     # The bridge may have braked earlier.
     brakes = [m.received_ns for m in test.motions if m.value.command is Command.BRAKE]
     problems, data = [problem], []
-    latch = say("latch.latch", cause=test.cause)
+    latch = say("latch.latch", cause=say.causes([test.cause]))
     for action, times_ns in ((latch, latches), (say("latch.brake"), brakes)):
         # A state may overtake the sample that caused it on the bus: that counts as zero.
         took_s = max(0, times_ns[0] - test.at_ns) / NS_PER_S if times_ns else None

@@ -233,7 +233,7 @@ class CheckoutSession(SafetyClient):
         if self._seen < self._ordered:
             return self.say("end.not_received")
         if not own or [cause.id for cause in seen.causes if cause.name in seen.latched] != own:
-            return self.say("end.latched", causes=seen.latched or self.say("nothing"))
+            return self.say("end.latched", causes=self.say.causes(seen.latched))
         return ""
 
     def emergency_stop(self) -> bool:

@@ -212,7 +212,7 @@ def unlatch(session: CheckoutSession) -> str:
     if not latched:
         return ""
     say = session.say
-    if not confirm(say("latch.before", causes=latched), "reset", say):
+    if not confirm(say("latch.before", causes=say.causes(latched)), "reset", say):
         return say("latch.not_reset")
     return session.reset().problem(say)
 

@@ -5,6 +5,7 @@ The operator types the phrases that confirm an action in either language.
 
 from collections.abc import Iterable
 
+from t2.catalogue import WORDS
 from t2.messages import Field, Phrase
 from t2.patrol_texts import Words
 from t2.words import COMMA, GAP, Language, in_language, render
@@ -734,6 +735,12 @@ class Say:
         what, comma, unit = name.partition(", ")
         words = TEXTS.get(f"figure.{what}")
         return f"{self.of(words)}{comma}{unit}" if words else name
+
+    def causes(self, names: Iterable[str]) -> tuple[str, ...] | str:
+        """Return the names of latched causes, in English as in settings and events; or none."""
+        is_english = self.language == "en"
+        found = (name if is_english else self.of(WORDS.get(name, (name, name))) for name in names)
+        return tuple(found) or self("nothing")
 
     def of(self, words: Words) -> str:
         """Return a pair of texts in the language."""

@@ -11,6 +11,7 @@ from cli.commission.manoeuvres import homing, missing_stops, plan
 from cli.commission.report import COLUMNS
 from cli.commission.texts import TEXTS, Say
 from services.safety.config import SafetyConfig
+from services.safety.core.causes import LATCHING
 from t2.words import PLACEHOLDER
 from tests.factories import link
 
@@ -64,3 +65,9 @@ def test_figures_have_names_in_both_languages() -> None:
     assert Say().figure("counted, m/s") == "counted, m/s"
     missing = [name for name in COLUMNS if not CHINESE.search(Say("zh").figure(name))]
     assert missing == []
+
+
+def test_latched_causes_have_names_in_both_languages() -> None:
+    assert Say().causes(LATCHING) == tuple(LATCHING)
+    assert all(CHINESE.search(name) for name in Say("zh").causes(LATCHING))
+    assert (Say().causes(()), Say("zh").causes(["of_2030"])) == ("nothing", ("of_2030",))
