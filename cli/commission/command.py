@@ -255,7 +255,7 @@ def verdict(
     while True:
         try:
             found = step.run(session)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, T2Error):
             note(session.so_far or Verdict("failed", say("incomplete")))
             raise
         session.so_far = None

@@ -53,6 +53,7 @@ FAST = ClassOfService("fast", "DATA_HIGH", "safety and odometry decide on it")
 SLOW = ClassOfService("slow", "DATA", "for people and recordings")
 BULK = ClassOfService("bulk", "BACKGROUND", "large: waits for everything else")
 EVENT = ClassOfService("event", "DATA", "rare, and useful even when late", history=100)
+EVENTS_DEPTH = EVENT.history * (len(SERVICES) + 2)  # a queue for the history of all, at once
 
 
 class Topic(Struct, Generic[MessageT], frozen=True):

@@ -18,7 +18,7 @@ from services.dashboard.driver_lock import DriverLock, HoldState, PageKeepalive,
 from services.dashboard.i18n import Texts, label, phrase, rendered
 from services.dashboard.patrol import Routes
 from services.dashboard.snapshot import DriverState
-from services.dashboard.telemetry_cache import EVENTS_DEPTH, TelemetryCache, path_of
+from services.dashboard.telemetry_cache import TelemetryCache, path_of
 from t2 import keys
 from t2 import messages as m
 from t2.client import (
@@ -79,7 +79,7 @@ class Robot:
             bus.subscribe(keys.DRIVER, self._on_message, side=side)
         bus.subscribe(keys.DRIVE, self._on_message, depth=WILDCARD_DEPTH, source="*")
         bus.subscribe(keys.HEALTH, self._on_message, depth=WILDCARD_DEPTH, service="*")
-        bus.subscribe(keys.EVENTS, self._on_event, depth=EVENTS_DEPTH, service="*")
+        bus.subscribe(keys.EVENTS, self._on_event, depth=keys.EVENTS_DEPTH, service="*")
         bus.watch_live(keys.live_key(bus.robot, "*", "*"), self.telemetry.update_liveliness)
 
     # --- the loop -----------------------------------------------------------------------------

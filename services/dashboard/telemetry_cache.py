@@ -19,7 +19,6 @@ from t2.messages import Event, Message, SafetyState
 M = TypeVar("M", bound=Message)
 
 EVENTS_MAX = 200  # that the page lists
-EVENTS_DEPTH = keys.EVENT.history * (len(keys.SERVICES) + 2)  # the history of all, at once
 HISTORY_TURNS = 4  # of ``take_new``, from the first event: the histories arrive by service
 STATES_MAX = 64  # of safety: 3 s, more than any limit on an answer to one
 MISSED = 4.0  # samples that may be missing before the last one is too old to show
@@ -58,7 +57,7 @@ class TelemetryCache:
     """The newest message of each stream, the events and the live services."""
 
     alive: dict[str, set[str]] = field(default_factory=dict)  # instances by service
-    _events: deque[Received] = field(default_factory=lambda: deque(maxlen=EVENTS_DEPTH))
+    _events: deque[Received] = field(default_factory=lambda: deque(maxlen=keys.EVENTS_DEPTH))
     _hits: Hits = field(default_factory=Hits)
     _new: int = 0  # events that ``take_new`` has not returned
     _history_turns: int = HISTORY_TURNS  # left
@@ -130,7 +129,7 @@ class TelemetryCache:
         if count and self._history_turns:
             self._history_turns -= 1
             before = list(self._events)
-            self._events = deque(merged(before), EVENTS_DEPTH)
+            self._events = deque(merged(before), keys.EVENTS_DEPTH)
             if list(self._events) != before:
                 return self.events, True
         return self.events[-count:] if count else [], False

@@ -27,7 +27,6 @@ EVERYTHING = ("**", "@cmd/**")
 # unit's MemoryMax alone.
 DEPTH = 10_000
 SLICE_S, FLUSH_S, CHECK_S = 0.05, 0.5, 1.0
-EVENTS_DEPTH = keys.EVENT.history * (len(keys.SERVICES) + 2)  # the history of all, at once
 LOG_S, LOG_RETRY_S = 1.0, 10  # of the shift log: between two writes, and after an error
 
 
@@ -61,7 +60,7 @@ class Recorder:
         node.loop.every(CHECK_S, self._check_storage)
         if keeps_log:
             # With their history: a name may be in an event of somebody who was cut off.
-            node.bus.subscribe(keys.EVENTS, self._on_event, depth=EVENTS_DEPTH, service="*")
+            node.bus.subscribe(keys.EVENTS, self._on_event, depth=keys.EVENTS_DEPTH, service="*")
             node.bus.serve(keys.LOG, self._on_log)
             node.loop.every(LOG_S, self._write_log)
             node.loop.every(60.0, self._report_dropped)

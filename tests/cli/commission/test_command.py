@@ -15,7 +15,7 @@ from common.cli_args import EXIT_CONFIG
 from common.errors import ConfigError
 from common.freshness import Latest
 from t2 import keys
-from t2.errors import LinkError
+from t2.errors import LinkError, T2Error
 from tests.factories import health
 
 PHRASE = "wheels off the ground"
@@ -163,17 +163,18 @@ def test_an_interrupted_step_stays_in_the_report(
     assert it.missing == ["Link"]
 
 
+@pytest.mark.parametrize("end", [KeyboardInterrupt(), T2Error("standard input has ended")])
 def test_what_an_interrupted_step_has_found_is_in_the_report(
-    monkeypatch: pytest.MonkeyPatch,
+    end: BaseException, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def run(session: Any) -> Verdict:
         session.so_far = failed("left: the hand was detected by right.")
-        raise KeyboardInterrupt
+        raise end
 
     monkeypatch.setattr(steps, "prompt", lambda _: "")
     noted: list[Verdict] = []
     step, session = Step("sonar", ("Sonars", ""), ("", ""), run), cast(Any, SimpleNamespace())
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(type(end)):
         command.verdict(step, session, noted.append)
     assert noted[-1].text == "left: the hand was detected by right."
 
