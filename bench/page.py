@@ -106,8 +106,8 @@ class Page:
     def _answer(self, safety: Message, driver: Message, now_s: float) -> None:
         if driver["id"] != self._id:
             self._send("take", force=True, name=NAME)
-        elif self._stops or driver["hold"] == "lapsed":
-            self._send("free")
+        elif self._stops or driver["hold"] == "lapsed" or safety["verdict"] == "inhibited":
+            self._send("free")  # safety may require that the controls are let go first
         elif safety["latched"]:
             self._send("free")
             if now_s - self._asked_s > 1.0:
