@@ -23,7 +23,8 @@ import msgpack
 import zenoh
 
 from bench.child_process import ChildProcess, serve
-from bench.figures import CPU, MS, ONE, Column, Figures, Limits, Unit
+from bench.figures import CPU, HOST, MS, ONE, Column, Figures, Limits, Unit
+from bench.host import watched
 from bench.load import MARGIN
 from bench.processes import cpu_shares
 from common import clock
@@ -77,7 +78,7 @@ def window(
 ) -> Figures:
     """Measure with this subscription at the site, while the real robot is driven."""
     endpoint = stack.endpoint if name[1] == OWN_ROUTER else site
-    frames = TraceFollower(stack.trace_file)
+    frames, late_ns = TraceFollower(stack.trace_file), list[int]()
     with (
         ChildProcess(
             "bench.zenoh_programs", "consume", site, *CONSUMED.get(name[1], ())
@@ -88,7 +89,8 @@ def window(
         frames.follow().forget()
         consumer.send("begin")
         source.send("begin")
-        shares = cpu_shares({"site": pid}, seconds)
+        with watched(late_ns):
+            shares = cpu_shares({"site": pid}, seconds)
         came, asked = consumer.end(), source.end()
         time.sleep(ANSWER_S)
     took: Sequence[int | None] = answers_ns(asked, frames.follow().commands)
@@ -97,6 +99,7 @@ def window(
         "memory": [stat(pid).rss], "arrived": [came["hz"]],
         "bytes": [came["bytes_per_s"] / int(name[0])], "age": came["ages_ns"],
         "request": [ns for ns in took if ns is not None], "unanswered": [took.count(None)],
+        HOST: late_ns,
     }.items()}  # fmt: skip
 
 

@@ -21,7 +21,8 @@ from pathlib import Path
 import msgspec
 
 from bench.child_process import ChildProcess
-from bench.figures import MS, ONE, Column, Figures, Limits, Unit
+from bench.figures import HOST, MS, ONE, Column, Figures, Limits, Unit
+from bench.host import watched
 from bench.processes import MissingError
 from common import clock
 from common.freshness import NS_PER_S
@@ -194,40 +195,46 @@ def under(hosts: Hosts, faults: Wire) -> dict[str, Sequence[float]]:
     hosts.ready()
     hosts.disturb(faults)
     time.sleep(SETTLE_S)
-    since_ns = clock.now_ns()
-    hosts.laptop.send("begin")
-    time.sleep(SECONDS)
-    commands, pressed_ns = hosts.commands(since_ns), clock.now_ns()
-    hosts.laptop.send("estop")
+    late_ns: list[int] = []
+    with watched(late_ns):
+        since_ns = clock.now_ns()
+        hosts.laptop.send("begin")
+        time.sleep(SECONDS)
+        commands, pressed_ns = hosts.commands(since_ns), clock.now_ns()
+        hosts.laptop.send("estop")
 
-    def braked() -> list[int]:
-        return [c.mono_ns - pressed_ns for c in hosts.commands(pressed_ns) if c.kind == "brake"]
+        def braked() -> list[int]:
+            return [c.mono_ns - pressed_ns for c in hosts.commands(pressed_ns) if c.kind == "brake"]
 
-    becomes_true(braked, ESTOP_S)
+        becomes_true(braked, ESTOP_S)
     driven_ns = sum(b.mono_ns - a.mono_ns for a, b in pairwise(commands) if moves(a))
     return {
         "driven": [driven_ns / (pressed_ns - since_ns)],
         "stops": [sum(moves(a) and not moves(b) for a, b in pairwise(commands))],
         "brake": braked()[:1],
         "gap": [hosts.gap_ns(since_ns)],
+        HOST: late_ns,
     }
 
 
 def outage(hosts: Hosts, seconds: float) -> dict[str, Sequence[float]]:
     """Cut the link for some time, or change the laptop's address; wait until it drives again."""
     hosts.ready()
-    cut_ns = clock.now_ns()
-    hosts.disturb(Wire(drop=1.0) if seconds else Address(ANOTHER))
-    time.sleep(seconds)
-    hosts.disturb(Wire())
-    back_ns = clock.now_ns()
-    time.sleep(SETTLE_S)
-    again = wait_until(lambda: hosts.drives(cut_ns), "a drive after an outage", PATIENCE_S)
+    late_ns: list[int] = []
+    with watched(late_ns):
+        cut_ns = clock.now_ns()
+        hosts.disturb(Wire(drop=1.0) if seconds else Address(ANOTHER))
+        time.sleep(seconds)
+        hosts.disturb(Wire())
+        back_ns = clock.now_ns()
+        time.sleep(SETTLE_S)
+        again = wait_until(lambda: hosts.drives(cut_ns), "a drive after an outage", PATIENCE_S)
     stopped = [c.mono_ns - cut_ns for c in hosts.commands(cut_ns) if not moves(c)][:1]
     return {
         "gap": [hosts.gap_ns(cut_ns)],
         "stop": stopped,
         "again": [max(0, again[0] - back_ns)] if stopped else [],
+        HOST: late_ns,
     }
 
 
@@ -242,8 +249,8 @@ WITH_PICTURES: Mapping[str, tuple[Program, Sequence[str]]] = {
 }  # fmt: skip
 COLUMNS = (
     Column("time in motion", "driven", Unit("%", 0.01)), Column("stops", "stops", ONE),
-    Column("E-STOP to BRAKE", "brake", MS), Column("STOP after", "stop", MS),
-    Column("drives again after", "again", MS),
+    Column("E-STOP to BRAKE", "brake", MS, "max"), Column("STOP after", "stop", MS, "max"),
+    Column("drives again after", "again", MS, "max"),
     Column("bumper's longest gap on board", "gap", MS, "max"),
     Column("pictures", "pictures", Unit("/s", 1, 1)), Column("each", "size", Unit("kB", 1e3, 1)),
     Column("their age", "age", Unit("ms", 1e-3)),

@@ -17,7 +17,8 @@ from typing import Any
 import msgspec
 
 from bench.child_process import ChildProcess
-from bench.figures import CPU, ONE, US, Column, Figures, Limits, Unit
+from bench.figures import CPU, HOST, ONE, US, Column, Figures, Limits, Unit
+from bench.host import watched
 from bench.processes import Share, cpu_shares, module, one_pool, running
 from bench.reaction import SEED
 from bench.timed import TIMED, Timing
@@ -89,12 +90,18 @@ def cpu(turns: int = TURNS, seconds: float = TURN_S) -> Figures:
     samples, shuffler = defaultdict[tuple[str, ...], list[float]](list), random.Random(SEED)
     for _ in range(turns):
         for name, run in shuffler.sample([(T2, chain_of_t2), (PAIR, bare_pair)], 2):
-            with tempfile.TemporaryDirectory() as folder, run(Path(folder)) as pids:
+            late_ns: list[int] = []
+            with (
+                tempfile.TemporaryDirectory() as folder,
+                run(Path(folder)) as pids,
+                watched(late_ns),
+            ):
                 shares = cpu_shares(pids, seconds)
             together = Share(*map(sum, zip(*shares.values(), strict=True)))
             for process, share in {**shares, TOGETHER: together}.items():
                 samples[name, process, "cpu"].append(share.total)
                 samples[name, process, "main"].append(share.main)
+                samples[name, process, HOST] += late_ns
     return samples
 
 
@@ -125,7 +132,12 @@ def timed_chain(folder: Path) -> Iterator[dict[str, Timing]]:
 
 def functions(seconds: float = DECISIONS * DECISION_PERIOD_S) -> Figures:
     """Return the durations of functions in ns, their calls, and their share of a core in ns/s."""
-    with tempfile.TemporaryDirectory() as folder, timed_chain(Path(folder)) as found:
+    late_ns: list[int] = []
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        timed_chain(Path(folder)) as found,
+        watched(late_ns),
+    ):
         time.sleep(STEADY_S + seconds)
     made: dict[tuple[str, ...], Sequence[float]] = {}
     for service, timing in found.items():
@@ -133,6 +145,7 @@ def functions(seconds: float = DECISIONS * DECISION_PERIOD_S) -> Figures:
             made[service, name, "time"] = all_ns
             made[service, name, "calls"] = [len(all_ns) / timing.span_s]
             made[service, name, "cpu"] = [sum(all_ns) / timing.span_s]
+            made[service, name, HOST] = late_ns
     return {**made, (*ALLOWED, "time"): [ALLOWED_NS]}
 
 
@@ -151,14 +164,16 @@ def consumers(counts: Sequence[int] = CONSUMERS, seconds: float = WATCHED_S) -> 
             new = pool.map(lambda _, words=words: ChildProcess(*words), range(count - len(some)))
             some += [held.enter_context(each) for each in new]
             time.sleep(SETTLE_S)
+            late_ns: list[int] = []
             for each in some:
                 each.send("begin")
-            shares = cpu_shares(pids_of(it), seconds)
+            with watched(late_ns):
+                shares = cpu_shares(pids_of(it), seconds)
             results: list[Any] = [each.end() for each in some]
             figures: dict[str, Sequence[float]] = {
                 "router": [shares["router"].total], "bridge": [shares["bridge"].total],
                 "delay": list(chain.from_iterable(each["ages_ns"] for each in results)),
-                "lost": [max(each["lost"] for each in results)],
+                "lost": [max(each["lost"] for each in results)], HOST: late_ns,
             }  # fmt: skip
             made |= {(str(count), what): samples for what, samples in figures.items()}
     return made

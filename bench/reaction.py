@@ -11,7 +11,8 @@ from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 
-from bench.figures import ONE, US, Column, Figures, Limits
+from bench.figures import HOST, ONE, US, Column, Figures, Limits
+from bench.host import watched
 from bench.processes import Command, compiled, module, one_pool, running
 from common.wire import commands, framing, reports
 from verification.harness.bus import set_options
@@ -33,7 +34,7 @@ STANDS = framing.pack(reports.VelocityReport(0, 0)).hex()
 Start = Callable[[int, int], AbstractContextManager[object]]  # its port, the board's port
 LOOP, REFLEX = "Python, one process", "T2, reflex"
 JUDGED, DDS, ZENOH = "T2, judged stop", "CycloneDDS", "Zenoh, a router"
-PACKAGE = "cyclonedds"
+PACKAGE, TIME = "cyclonedds", "time"
 
 
 def stack(port: int, board: int, bridge: str = "services.bridge") -> AbstractContextManager[object]:
@@ -68,35 +69,37 @@ STOP_ROWS: dict[str, Start] = {
 }
 if find_spec(PACKAGE):  # in an unused domain
     STOP_ROWS[DDS] = lambda port, _: running(*pair("bench.dds_pair", port, 1 + free_port() % 200))
-P50S, P99S = ([Column(f"{load}, {f}", load, US, f) for load in LOADS] for f in ("p50", "p99"))
+P50, P99 = Column("p50", TIME, US), Column("p99", TIME, US, "p99")
 # At most these multiples of the other row.
 LIMITS: Limits = [
-    *(((REFLEX,), (LOOP,), column, 1.3) for column in P50S),
-    *(((REFLEX,), (LOOP,), column, 1.5) for column in P99S),
-    *(((JUDGED,), other, column, 1.0) for other in ((DDS,), (ZENOH,)) for column in P50S),
-    *(((JUDGED,), (DDS,), column, 1.5) for column in P99S),
-]
+    ((ours, load), (theirs, load), column, limit)
+    for ours, theirs, column, limit in [
+        (REFLEX, LOOP, P50, 1.3), (REFLEX, LOOP, P99, 1.5), (JUDGED, DDS, P50, 1.2),
+        (JUDGED, ZENOH, P50, 1.0), (JUDGED, DDS, P99, 1.5),
+    ]
+    for load in LOADS
+]  # fmt: skip
 
 
 def columns(of: str) -> list[Column]:
-    """Return the columns, with each median as a multiple of a row's."""
-    return [
-        one
-        for p50, p99 in zip(P50S, P99S, strict=True)
-        for one in (p50, p99, Column(f"{p50.figure}, of {of}", p50.figure, ONE, of=(of,)))
-    ]
+    """Return the columns, with each median as a multiple of a row's beside the same load."""
+    return [P50, P99, Column(f"of {of}", TIME, ONE, of=(of,))]
 
 
 def measured(rows: Mapping[str, Start], blocks: int = BLOCKS, hits: int = HITS) -> Figures:
     """Return the samples of all rows, in ns."""
-    samples: dict[tuple[str, ...], list[int]] = {turn: [] for turn in product(rows, LOADS)}
+    turns = list(product(rows, LOADS))
+    samples: dict[tuple[str, ...], list[int]] = {
+        (*turn, figure): [] for turn in turns for figure in (TIME, HOST)
+    }
     shuffler = random.Random(SEED)
     with tempfile.TemporaryDirectory() as folder:
         program = compiled("board", Path(folder))
         for _ in range(blocks):
-            for name, load in shuffler.sample(list(samples), len(samples)):
-                with running(*[SPIN] * (BUSY_PROCESSES if load == BUSY else 0)):
-                    samples[name, load] += block(program, rows[name], hits)
+            for name, load in shuffler.sample(turns, len(turns)):
+                busy = BUSY_PROCESSES if load == BUSY else 0
+                with running(*[SPIN] * busy), watched(samples[name, load, HOST]):
+                    samples[name, load, TIME] += block(program, rows[name], hits)
     return samples
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from bench import __main__ as bench
 from bench import load, loop, reaction
-from bench.figures import Figures, compared
+from bench.figures import HOST, Figures, compared
 from bench.fleet import answers_ns
 from bench.processes import MissingError
-from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, ZENOH
+from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, TIME, ZENOH
 from bench.timed import TIMED
 from common.freshness import NS_PER_S
 from sim.trace import Command
@@ -20,8 +20,10 @@ CC = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 MS = 1_000_000
 
 
-def made_up(rows: Mapping[str, int]) -> Figures:
-    return {(row, "quiet"): [us * 1000] * 10 for row, us in rows.items()}
+def made_up(rows: Mapping[str, int], host_us: int = 20) -> Figures:
+    samples = {(row, "quiet", TIME): us for row, us in rows.items()}
+    samples |= {(row, "quiet", HOST): host_us for row in rows}
+    return {name: [us * 1000] * 10 for name, us in samples.items()}
 
 
 FIGURES = {
@@ -36,12 +38,13 @@ def test_the_document_has_each_table_and_the_limits() -> None:
         for name in bench.BENCHMARKS
     }
     text = bench.page(results)
-    assert f"| {REFLEX} | 140 | 140 | × 1.40 |  |  |  |" in text
+    assert f"| {REFLEX} | quiet | 140 | 140 | × 1.40 | 20 | 0.0 |" in text
     question = bench.BENCHMARKS["stop"].question
-    row = f"| {JUDGED}, quiet, p50: 700 us | {ZENOH}: 1,000 us | × 0.70 | at most × 1 | reached |"
-    assert f"| {question} {row}" in text
+    row = f"| {JUDGED}, quiet, p50: 700 us | {ZENOH}, quiet: 1,000 us | × 0.70 |"
+    assert f"| {question} {row} at most × 1 | reached |" in text
     assert (
-        f"| {REFLEX}, quiet, p50: 140 us | {LOOP}: 100 us | × 1.40 | at most × 1.3 | not r" in text
+        f"| {REFLEX}, quiet, p50: 140 us | {LOOP}, quiet: 100 us | × 1.40 | at most × 1.3 | not r"
+        in text
     )
     assert all(f"Measured on a machine for {name}." in text for name in bench.BENCHMARKS)
 
@@ -63,6 +66,27 @@ def test_a_limit_of_a_row_that_was_not_measured_is_left_out() -> None:
     rows = compared("How soon?", reaction.LIMITS, FIGURES["reflex"])
     assert [row[0] for row in rows] == ["How soon?", ""]
     assert [row[-1] for row in rows] == ["not reached", "reached"]
+
+
+def test_a_host_that_stalls_longer_than_a_figure_leaves_no_verdict() -> None:
+    rows = compared("How soon?", reaction.LIMITS, made_up({LOOP: 100, REFLEX: 140}, host_us=101))
+    assert [row[-1] for row in rows] == ["not comparable: host 101 us"] * 2
+    late_ns = [0] * 9 + [MS]
+    busy_host = {**made_up({LOOP: 100, REFLEX: 140}), (LOOP, "quiet", HOST): late_ns}
+    rows = compared("How soon?", reaction.LIMITS, busy_host)
+    assert [row[-1] for row in rows] == ["not reached", "not comparable: host 1,000 us"]
+
+
+def test_of_cpu_the_share_of_time_that_the_host_took_is_compared() -> None:
+    ours, theirs = (load.T2, load.TOGETHER), (load.PAIR, load.TOGETHER)
+    figures: Figures = {
+        (*ours, "cpu"): [160 * MS], (*theirs, "cpu"): [80 * MS],
+        (*ours, HOST): [MS // 5], (*theirs, HOST): [MS // 5],
+    }  # fmt: skip
+    rows = compared("What?", load.CPU_LIMITS, figures)
+    assert [row[-1] for row in rows] == ["not comparable: host 9.1 CPU %"]
+    rows = compared("What?", load.CPU_LIMITS, {**figures, (*theirs, HOST): [0], (*ours, HOST): [0]})
+    assert [row[-1] for row in rows] == ["reached"]
 
 
 def test_the_one_process_has_the_frames_of_the_bridge() -> None:
@@ -90,9 +114,12 @@ def test_each_row_answers_every_hit(
     rows: Mapping[str, reaction.Start], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reaction, "LOADS", ("quiet",))
-    for name, samples in reaction.measured(rows, blocks=1, hits=3).items():
+    figures = reaction.measured(rows, blocks=1, hits=3)
+    for name in rows:
+        samples = figures[name, "quiet", TIME]
         assert len(samples) == 3, name
         assert all(0 < ns < NS_PER_S for ns in samples), name
+        assert figures[name, "quiet", HOST], name
 
 
 @pytest.mark.campaign
