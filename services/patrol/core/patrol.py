@@ -113,8 +113,8 @@ class Patrol:
     def _act(
         self, course: Course, action: m.RoundAction, now_ns: int, wall_ns: int
     ) -> Phrase | None:
-        stands = course.state in {"paused", "stopped"}
-        if action in {"resume", "return"} and stands and (reason := course.refusal(now_ns)):
+        goes_on = course.state in {"paused", "stopped"} and action in {"resume", "return"}
+        if goes_on and (reason := course.refusal(now_ns)):
             return reason
         if action == "depart":
             course.depart(now_ns)
@@ -122,11 +122,11 @@ class Patrol:
             course.pause(wall_ns)
         elif action == "abort":
             course.abort(wall_ns)
-        if stands and action in {"resume", "return"}:
+        if goes_on:
             course.rejoin()
         if action == "return":
             course.turn_home(now_ns, wall_ns)
-        if stands and action in {"resume", "return"}:
+        if goes_on:
             course.announce(self._announce_s, now_ns, wall_ns, is_resumed=True)
         return None
 

@@ -7,6 +7,7 @@ import pytest
 from common.freshness import NS_PER_S
 from common.pose import Pose
 from services.patrol.core.course import FRESH_S, Note
+from services.patrol.core.patrol import SPEED
 from services.patrol.core.routes import length, stations
 from services.patrol.core.teaching import OpenTeaching, Refused
 from t2 import messages as m
@@ -77,6 +78,13 @@ def test_what_is_not_possible_is_refused() -> None:
     assert vehicle.patrol.change_refusal("other") is None
     vehicle.act("abort")
     assert vehicle.patrol.change_refusal("yard") is None
+    vehicle.map_state = "lost"
+    vehicle.step()
+    with pytest.raises(Refused, match="lost"):
+        vehicle.patrol.begin("other", "home", 0.0, vehicle.now_ns)
+    vehicle.map_state = "placed"
+    vehicle.step()
+    assert vehicle.patrol.begin("other", "home", 0.0, vehicle.now_ns)  # the round is over
 
 
 def test_a_station_is_not_marked_by_an_old_pose() -> None:
@@ -102,7 +110,7 @@ def test_what_was_taught_before_a_restart_can_be_ended() -> None:
     vehicle.patrol.restore_teaching(OpenTeaching("yard", route(LINE).points))
     vehicle.run(0.5)
     assert vehicle.events == ["teaching"]
-    assert vehicle.patrol.taught().points == route(LINE).points
+    assert vehicle.patrol.taught() == route(LINE, speed=SPEED)
 
 
 def reason_of(call: Callable[[], object]) -> Phrase:
