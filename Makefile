@@ -47,6 +47,13 @@ demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO)) ## a simulated T2 drives a lap
 up: $(STAMP) ## router, simulated vehicle, bridge, safety, odometry and recorder, until Ctrl-C
 	$(BIN)/t2 up
 
+# pytest rewrites the asserts of a file once and keeps the result: otherwise each worker of a fresh
+# clone does it for all files. An error shows up in the tests themselves.
+REWRITTEN := tests/__pycache__
+
+$(REWRITTEN): | $(STAMP)
+	-@$(BIN)/pytest --collect-only -qq tests > /dev/null
+
 # Most tests wait for other processes most of the time. Of the tests that measure times two run at once.
 MANY = -n 4 --dist worksteal
 FEW = -n 2 --dist worksteal
@@ -58,7 +65,7 @@ SEARCH = tests/search
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
 # The other tests mostly wait. Meanwhile those of the cores take the rest of the CPU.
-test: $(STAMP) ## all tests except search and campaigns, with the coverage of the cores
+test: $(STAMP) $(REWRITTEN) ## all tests except search and campaigns, with the coverage of the cores
 	$(BIN)/pytest $(TIMED) -m "timed and not campaign"
 	@$(MAKE) --no-print-directory -j2 --output-sync=line others cover
 
@@ -97,7 +104,7 @@ ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz (with cargo), rclpy 
 	$(BIN)/python -m verification.ros2
 
 check: $(STAMP) ## what CI runs: lint, types, test, search, mutants of changed cores
-	@$(MAKE) --no-print-directory -j2 --output-sync lint types
+	@$(MAKE) --no-print-directory -j3 --output-sync lint types $(REWRITTEN)
 	@$(MAKE) --no-print-directory test
 	@$(MAKE) --no-print-directory search mutants CHANGED=1
 

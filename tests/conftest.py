@@ -19,6 +19,17 @@ settings.load_profile("t2")
 os.environ["T2_LANG"] = "en"  # whatever the locale of this host
 
 
+@pytest.hookimpl(trylast=True)  # the plugin of hypothesis has marked its tests
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave tests of chance out of the coverage.
+
+    A branch that only chance reaches is not tested, and tracing takes three times as long.
+    """
+    for item in items:
+        if item.get_closest_marker("hypothesis"):
+            item.add_marker("no_cover")
+
+
 @pytest.fixture(autouse=True)
 def _own_logs() -> Iterator[None]:
     """Undo what a service or command that ran in this process has set for its logs."""

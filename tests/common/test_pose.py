@@ -77,6 +77,20 @@ def test_the_ellipse_of_a_covariance(longer: float, shorter: float, direction: f
     assert math.sin(half_axes[2] - direction) == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("xx", "xy", "yy", "half_axes"),
+    [
+        (9.0, 0.0, 4.0, (3.0, 2.0, 0.0)),
+        (4.0, 0.0, 9.0, (3.0, 2.0, QUARTER)),
+        (5.0, 4.0, 5.0, (3.0, 1.0, QUARTER / 2)),
+    ],
+)
+def test_known_ellipses(
+    xx: float, xy: float, yy: float, half_axes: tuple[float, float, float]
+) -> None:
+    assert Covariance(xx, xy, yy, 0.0, 0.0, 0.0).ellipse == pytest.approx(half_axes)
+
+
 def test_covariances_add_and_subtract() -> None:
     one = Covariance(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     assert one.combined(one) == Covariance(2.0, 4.0, 6.0, 8.0, 10.0, 12.0)

@@ -51,7 +51,7 @@ def camera(stack: RunningStack) -> Iterator[ScriptedCamera]:
 def page(
     browser: Browser, server: Server, camera: ScriptedCamera, stack: RunningStack
 ) -> Iterator[Page]:
-    page = browser.new_page(viewport={"width": 1366, "height": 850}, locale="en-GB")
+    page = browser.new_page(viewport={"width": 1024, "height": 700}, locale="en-GB")
     problems: list[str] = []
     page.on("pageerror", lambda error: problems.append(str(error)))
     open_page(page, server)

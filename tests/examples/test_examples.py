@@ -19,7 +19,6 @@ from typing import Any
 
 import nbformat
 import pytest
-from mcp import Client, StdioServerParameters
 from nbclient import NotebookClient
 
 import t2
@@ -112,6 +111,8 @@ def test_the_notebook_plots_while_it_drives(
 
 
 def test_the_agent_drives_and_stops_and_never_resets(robot: t2.Robot, stack: RunningStack) -> None:
+    from mcp import Client, StdioServerParameters  # 2 s, in each worker that collects this file
+
     server = StdioServerParameters(
         command=sys.executable,
         args=[str(EXAMPLES / "mcp_server.py"), robot.endpoint],

@@ -87,6 +87,13 @@ def test_a_sequence_without_end_is_refused(items: int) -> None:
     assert cdr.decode("uint8[]", cdr.encode("uint8[]", longest)) == longest
 
 
+def test_a_covariance_has_no_length_before_it() -> None:
+    numbers = tuple(float(number) for number in range(43))
+    value = ((numbers[:3], numbers[3:7]), numbers[7:])
+    payload = cdr.HEADER + struct.pack("<43d", *numbers)
+    assert cdr.encode("geometry_msgs/msg/PoseWithCovariance", value) == payload
+
+
 def test_a_covariance_of_another_size_is_refused() -> None:
     pose = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
     with pytest.raises(CdrError, match="3 values instead of 36"):

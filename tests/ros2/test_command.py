@@ -291,6 +291,7 @@ def test_a_queue_that_drains_slowly_is_refused() -> None:
     assert set(decided) == {"begins", "settling", "not_paused"}
 
 
+@pytest.mark.no_cover
 def test_a_clock_that_drifts_is_no_delay() -> None:
     sender = Sender(started()).drive()
     drift = 100e-6

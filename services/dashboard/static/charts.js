@@ -3,9 +3,7 @@ import { t } from "./i18n.js";
 
 const SPAN_MS = 30000;
 const LINES = ["requested", "allowed", "measured"];
-const EVERY = 2; // snapshots per drawing
 const samples = [];
-let count = 0;
 
 export function add(snapshot, at) {
   const { requested, allowed, measured } = snapshot;
@@ -25,8 +23,6 @@ export function fitted(canvas) {
 }
 
 export function draw() {
-  count += 1;
-  if (count % EVERY) return;
   const css = getComputedStyle(document.documentElement);
   chart("chart-speed", 0, 0.5, t("chart.speed"), css);
   chart("chart-turn", 1, 0.5, t("chart.turn"), css);

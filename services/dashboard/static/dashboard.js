@@ -23,6 +23,7 @@ const RETRY_MS = 700;
 const ALARM_MS = 200;
 const EXPECTED = ["odom", "recorder"]; // services whose absence nothing else shows
 const CONGESTED = 2048; // bytes that wait in the browser
+const PLOTTED = 2; // snapshots per drawing of trajectory and charts
 const $ = (id) => document.getElementById(id);
 const estop = window.T2Estop;
 
@@ -35,6 +36,7 @@ let events = [];
 let hello = null;
 let showChange = () => {}; // that this page shows another robot than before
 let drawn; // the drawn snapshot; null without a connection
+let drawings = 0;
 
 const lost = () => performance.now() - fastAt > LOST_MS;
 const isDriver = () => !!fast && !!hello && fast.driver.id === hello.id && fast.driver.may && !lost();
@@ -153,6 +155,8 @@ function draw() {
   if (lost()) return;
   sonarView.draw(fast);
   panels.showCauses(fast);
+  drawings += 1;
+  if (drawings % PLOTTED) return;
   trail.draw(fast.pose);
   charts.draw();
 }

@@ -83,6 +83,7 @@ def test_a_curve_is_followed_to_three_centimetres() -> None:
         assert abs(math.dist(middle, (0.0, 2.0)) - 2.0) < 0.05
 
 
+@pytest.mark.no_cover
 def test_four_kilometres_straight_on_are_a_few_hundred_points() -> None:
     lesson = Lesson().forward(4000.0, step=0.2)
     assert lesson.reason is None

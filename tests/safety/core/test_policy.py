@@ -270,6 +270,7 @@ def test_a_router_that_passes_nothing_on_stops_the_vehicle_until_a_neutral_reque
     assert fixture.drive(0.3).command == "run"
 
 
+@pytest.mark.no_cover
 def test_nothing_drives_before_the_emergency_stop_s_path_was_proven() -> None:
     fixture = PolicyFixture()
     fixture.muted = {"estop_path"}

@@ -48,6 +48,7 @@ def test_a_vehicle_that_rolled_on_is_held_by_brake_until_it_drives_again() -> No
     until(fixture, "stop")  # as before it rolled
 
 
+@pytest.mark.no_cover
 def test_a_slope_does_not_exhaust_the_fault_budget() -> None:
     fixture = PolicyFixture().ready()
     for _ in range(10):

@@ -50,6 +50,12 @@ def operator() -> Operator:
     return Operator()
 
 
+def test_keystrokes_are_muted_after_another_source_took_over(operator: Operator) -> None:
+    assert not operator.controls.is_muted(operator.now_ns)
+    operator.controls.enforce("overruled", operator.now_ns)
+    assert operator.controls.is_muted(operator.now_ns)
+
+
 # --- keys -----------------------------------------------------------------------------------
 
 

@@ -13,6 +13,7 @@ from services.teleop.core.hold import (
     GAMEPAD_SILENCE_S,
     HOLD_S,
     RULES,
+    Again,
     Deadman,
     HeldKeystrokes,
     Press,
@@ -43,6 +44,16 @@ def test_deadlines_of_keystrokes(
     for at_s, names in held.items():
         assert held_ones.held(at(at_s)) == list(names)
     assert held_ones.held(at(released)) == []
+
+
+def test_keystrokes_that_are_muted_count_after_a_pause_without_presses() -> None:
+    held_ones = HeldKeystrokes(first_s=0.6)
+    held_ones.let_go(Again.AFTER_PAUSE, at(10.0))
+    held_ones.press("w", at(10.3))  # the pause begins again
+    assert held_ones.is_muted(at(10.3 + HOLD_S))
+    assert held_ones.held(at(10.4)) == []
+    held_ones.press("w", at(12.0))
+    assert held_ones.held(at(12.1)) == ["w"]
 
 
 def test_a_deadman_counts_after_it_was_up() -> None:
