@@ -4,8 +4,8 @@ import random
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from importlib.util import find_spec
 from itertools import product
@@ -14,6 +14,7 @@ from pathlib import Path
 from bench.figures import HOST, ONE, US, Column, Figures, Limits
 from bench.host import watched
 from bench.processes import Command, compiled, module, one_pool, running
+from bench.zenoh_programs import DIRECT
 from common.wire import commands, framing, reports
 from verification.harness.bus import set_options
 from verification.harness.ports import free_port, udp_ports
@@ -34,6 +35,7 @@ STANDS = framing.pack(reports.VelocityReport(0, 0)).hex()
 Start = Callable[[int, int], AbstractContextManager[object]]  # its port, the board's port
 LOOP, REFLEX = "Python, one process", "T2, reflex"
 JUDGED, DDS, ZENOH = "T2, judged stop", "CycloneDDS", "Zenoh, a router"
+LINK = "Zenoh, a direct link"
 PACKAGE, TIME = "cyclonedds", "time"
 
 
@@ -54,6 +56,15 @@ def zenoh(port: int, _: int) -> AbstractContextManager[object]:
     return running(router, *map(one_pool, pair("bench.zenoh_programs", port, endpoint)))
 
 
+@contextmanager
+def direct(port: int, _: int) -> Iterator[None]:
+    """Run two processes on Zenoh without a router, linked as bridge and safety are."""
+    with tempfile.TemporaryDirectory() as folder:
+        where = f"{DIRECT}{folder}/link.sock"
+        with running(*map(one_pool, pair("bench.zenoh_programs", port, where))):
+            yield
+
+
 def pair(name: str, port: int, where: object) -> list[Command]:
     """Return the commands of the process that decides and of the one at the board."""
     return [module(name, "decide", where), module(name, "board", port, where)]
@@ -66,6 +77,7 @@ REFLEX_ROWS: Mapping[str, Start] = {
 STOP_ROWS: dict[str, Start] = {
     JUDGED: partial(stack, bridge="bench.no_reflex"),
     ZENOH: zenoh,
+    LINK: direct,
 }
 if find_spec(PACKAGE):  # in an unused domain
     STOP_ROWS[DDS] = lambda port, _: running(*pair("bench.dds_pair", port, 1 + free_port() % 200))

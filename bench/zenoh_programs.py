@@ -26,6 +26,7 @@ from common.bus.publisher import qos
 from t2.keys import COMMAND, ESTOP_CLASS, FAST
 
 WAIT_FOREVER = -1  # a client waits until the router listens
+DIRECT = "unixsock-stream/"
 HIT = b"\1"  # payload of a hit and of its answer
 MOTION_S, SPEED_MMPS = 0.02, 300
 AGES_MAX = 1000  # reported by a consumer, evenly spread
@@ -47,11 +48,12 @@ QUERIES_HZ = {
 }
 
 
-def connected(endpoint: str) -> zenoh.Session:
-    """Return a client session at an endpoint, without scouting."""
+def connected(endpoint: str, *, listens: bool | None = None) -> zenoh.Session:
+    """Return a client of a router, without scouting; with ``listens`` an end of a direct link."""
     settings: dict[str, Any] = {
-        "mode": "client",
-        "connect": {"endpoints": [endpoint], "timeout_ms": WAIT_FOREVER},
+        "mode": "client" if listens is None else "peer",
+        "listen": {"endpoints": [endpoint] if listens else []},
+        "connect": {"endpoints": [] if listens else [endpoint], "timeout_ms": WAIT_FOREVER},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
     }
     return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
@@ -63,8 +65,8 @@ def declare(session: zenoh.Session, key: str, take: Callable[[zenoh.Sample], obj
 
 
 def join(where: str, writes: str, reads: str, take: Call | None) -> Call:
-    """Join by a router."""
-    session = connected(where)
+    """Join by a router, or directly by a Unix socket: the process at the board listens."""
+    session = connected(where, listens=bool(take) if where.startswith(DIRECT) else None)
     out = session.declare_publisher(writes, **qos(ESTOP_CLASS))
 
     def send(_: zenoh.Session = session) -> None:  # it lives as long as this function
