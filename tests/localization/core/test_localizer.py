@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from common.freshness import NS_PER_S
 from common.pose import Covariance, Pose
 from services.localization.core.estimate import Located
 from services.localization.core.fixes import AGREEING
-from services.localization.core.localizer import USED
+from services.localization.core.localizer import GAP_S, USED
 from t2.messages import Fix, MapPose
-from tests.localization.core.vehicle_fixture import Drive, diagonal
+from tests.localization.core.vehicle_fixture import SIGMA, STEP_NS, STEP_S, Drive, diagonal
 
 PLACES = {"sigma": 0.02, "places": True}
 TAGS = {"sigma": 0.02}
@@ -66,8 +67,8 @@ def test_odometry_alone_keeps_the_pose_and_grows_less_certain_until_it_is_lost()
     assert start
     assert pose.pose_covariance
     assert pose.pose_covariance[0] > start[0]
-    while pose.state == "placed" and drive.seq < 50_000:
-        pose = drive.go(linear=0.5, angular=0.3, steps=500)
+    while pose.state == "placed" and drive.seq < 10_000:
+        pose = drive.go(linear=4.0, angular=2.4, steps=100)
     assert pose.state == "lost"
     assert "known only to" in pose.text
     assert pose.x is not None  # still the best that is known
@@ -157,6 +158,18 @@ def test_single_outliers_are_refused_and_lose_nothing() -> None:
     assert drive.pose().state == "placed"
     assert state.refused >= 10
     assert drive.error()[0] < 0.1
+
+
+def test_an_outlier_says_how_far_it_is_from_the_pose() -> None:
+    drive = placed()
+    drive.place(sigma=0.1)
+    drive.go()
+    true = drive.true
+    text = drive.fix(drive.measured(x=true.x + 2.0, y=true.y, heading=true.heading))
+    sigmas = 2.0 / math.sqrt(0.1**2 + SIGMA**2 + TAGS["sigma"] ** 2)
+    assert text == f"It is {sigmas:.1f} standard deviations from the pose."
+    (state,) = drive.localizer.pose(drive.now_ns + NS_PER_S).sources  # type: ignore[union-attr]
+    assert state.age == 1.0
 
 
 def test_outliers_that_do_not_agree_lose_nothing() -> None:
@@ -350,6 +363,35 @@ def test_a_pose_that_is_set_in_odometry_keeps_the_pose_in_the_map() -> None:
     assert after.pose_covariance[0] > before.pose_covariance[0]
 
 
+def test_the_motion_of_the_gap_in_which_a_pose_is_set_is_uncertain() -> None:
+    drive = placed()
+    before = drive.go(linear=0.4, angular=0.2, steps=50)
+    drive.estimator.place(Pose(100.0, 50.0, 3.0), drive.now_ns)
+    after = drive.go(linear=0.4, angular=0.2)
+    distance, turn = 0.4 * STEP_S, 0.2 * STEP_S
+    assert before.x is not None
+    assert before.y is not None
+    assert before.heading is not None
+    pose = Pose(before.x, before.y, before.heading).moved(distance, turn)
+    assert (after.x, after.y, after.heading) == pytest.approx((pose.x, pose.y, pose.heading))
+    carried = np.eye(3)
+    carried[:2, 2] = before.y - pose.y, pose.x - before.x
+    covariance = carried @ np.array(before.pose_covariance).reshape(3, 3) @ carried.T
+    covariance += np.diag([distance**2, distance**2, turn**2])
+    assert after.pose_covariance == pytest.approx(covariance.ravel())
+
+
+@pytest.mark.parametrize(
+    ("gap_s", "state"),
+    [(-0.001, "unplaced"), (0.0, "placed"), (GAP_S, "placed"), (GAP_S + 0.001, "unplaced")],
+)
+def test_after_which_gap_a_pose_that_is_set_keeps_its_place(gap_s: float, state: str) -> None:
+    drive = placed()
+    drive.estimator.place(Pose(100.0, 50.0, 3.0), drive.now_ns)
+    drive.now_ns += round(gap_s * NS_PER_S) - STEP_NS
+    assert drive.go().state == state
+
+
 @pytest.mark.parametrize("steps", [20, 2000])
 def test_a_pose_that_is_set_unseen_must_be_placed_again(steps: int) -> None:
     drive = placed()
@@ -365,6 +407,7 @@ def test_a_pose_that_is_set_unseen_must_be_placed_again(steps: int) -> None:
 def test_a_restart_of_odometry_must_be_placed_again() -> None:
     drive = placed()
     drive.go(linear=0.3, steps=10)
+    assert drive.fix() == ""
     drive.restart()
     drive.fix()
     drive.restart()
