@@ -970,6 +970,10 @@ EVENTS: tuple[EventRow, ...] = (
         ("{by:operator} takes control.", "{by:operator} 取得控制权。"), NOTHING,
     ),
     EventRow(
+        "dashboard", "leave", "info",
+        ("{by:operator} gives up control.", "{by:operator} 交出控制权。"), NOTHING,
+    ),
+    EventRow(
         "teleop", "overruled", "warning",
         (
             "{other:source} has taken over: the controls count as let go.",

@@ -70,7 +70,7 @@ if TYPE_CHECKING:
         "disk_full", "disk_room", "drive_link_lost", "drive_link_up", "driver_fault", "estop",
         "estop_denied", "estop_keepalive", "estop_reader", "estop_unconfirmed", "fixes_back",
         "fixes_refused", "flapping", "gamepad", "gamepad_silent", "guard_gone", "in_sight",
-        "link_lost", "link_up", "log_dropped", "lost", "overruled",
+        "leave", "link_lost", "link_up", "log_dropped", "lost", "overruled",
         "placed", "port_changed", "pose_set", "predecessor", "reanchored", "recordings_removed",
         "relay_braking", "relay_lost", "relay_up", "release", "release_end", "release_free",
         "release_refused", "reset", "reset_refused", "reset_request", "reset_unconfirmed",

@@ -71,7 +71,7 @@ class RobotPage:
     def leave(self, viewer: str) -> None:
         """Remove a browser and free its driver lock."""
         self.viewers.discard(viewer)
-        self.robot.driver_lock.leave(viewer)
+        self._give_up(viewer)
         self.robot.keepalive.left(viewer)
         self.pictures.leave(viewer)
 
@@ -138,6 +138,13 @@ class RobotPage:
             self._notify(str(before), "warning", phrase("driver.taken", who=who))
             self.robot.event("take_over", "info", by=who, other=other)
 
+    def _give_up(self, viewer: str) -> None:
+        """Free the driver lock if this viewer has it."""
+        lock = self.robot.driver_lock
+        if lock.driver == viewer:
+            lock.leave(viewer)
+            self.robot.event("leave", "info", by=lock.name or f"viewer {viewer}")
+
     def _drive(self, viewer: str, message: client.AnyMessage) -> None:
         robot, lock, notify = self.robot, self.robot.driver_lock, partial(self._notify, viewer)
         match message:
@@ -151,7 +158,7 @@ class RobotPage:
             case client.Free():
                 lock.let_go()
             case client.Leave():
-                lock.leave(viewer)
+                self._give_up(viewer)
             case client.Gear(gear):
                 lock.gear = gear
             case client.Reset(echo, name=name):

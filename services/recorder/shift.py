@@ -52,13 +52,14 @@ ROUNDS = (
     "round_start", "round_end", "round_stopped", "round_blocked", "round_skipped", "round_return",
     "round_paused", "round_resumed",
 )  # fmt: skip
+CONTROL = ("take", "take_over", "leave")
 OPERATED = ("dashboard", "teleop", "estop")  # services whose events name an operator
 OF_SERVICE: dict[str, tuple[str, ...]] = {
     "bridge": ("link_lost", "link_up", "board_restarted", "relay_lost"),
     "safety": (*LATCHES, "stop", "reset", "reset_refused"),
     "patrol": ROUNDS,
     "recorder": (*NOTES, "black_box"),
-    **dict.fromkeys(OPERATED, (*ASKED, *NOTES, "take", "take_over", "round_request")),
+    **dict.fromkeys(OPERATED, (*ASKED, *NOTES, *CONTROL, "round_request")),
 }
 
 
@@ -301,7 +302,7 @@ class _Builder:
 
     def _add_person(self, one: Seen) -> None:
         kinds: dict[str, LogKind] = {
-            "take": "takeover", "take_over": "takeover", "round_request": "round",
+            **dict.fromkeys(CONTROL, "takeover"), "round_request": "round"
         }  # fmt: skip
         action = str(one.event.about.get("action", ""))
         if not action.startswith("teach_"):

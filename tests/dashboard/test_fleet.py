@@ -196,6 +196,21 @@ def test_one_viewer_drives_and_a_takeover_asks(
     assert lock.driver is None
 
 
+def test_giving_up_control_is_an_event_once(fleet: Fleet, buses: dict[str, Mock]) -> None:
+    fleet.join("001", "1")
+    for closes in (False, True):
+        fleet.handle("001", "1", client.Take(name="Anna"))
+        fleet.handle("001", "2", client.Leave())
+        for _ in range(2):
+            if closes:
+                fleet.leave("001", "1")
+            else:
+                fleet.handle("001", "1", client.Leave())
+    put = [call.args[0] for call in buses["001"].publisher.return_value.put.call_args_list]
+    events = [(it.name, it.about) for it in put if isinstance(it, Event)]
+    assert events == [("take", {"by": "Anna"}), ("leave", {"by": "Anna"})] * 2
+
+
 def test_a_reset_of_an_unknown_state_is_refused(
     fleet: Fleet, buses: dict[str, Mock], sent: list[Sent]
 ) -> None:

@@ -115,11 +115,13 @@ def test_take_overs_of_page_and_terminal() -> None:
         seen(1, "dashboard", "take_over", phrase, by="Ann", other="Bob"),
         seen(2, "teleop", "take_over", Phrase("control.asked", {"by": "Cy", "other": "web"})),
         seen(3, "dashboard", "take", Phrase("event.take", {"by": "Dee"}), by="Dee"),
+        seen(4, "dashboard", "leave", Phrase("event.leave", {"by": "Dee"}), by="Dee"),
     )
     assert [(row.kind, row.by) for row in found] == [
-        ("takeover", "Ann"), ("takeover", "Cy"), ("takeover", "Dee")
+        ("takeover", "Ann"), ("takeover", "Cy"), ("takeover", "Dee"), ("takeover", "Dee")
     ]  # fmt: skip
     assert found[0].text == "Ann takes control from Bob."
+    assert found[3].text == "Dee gives up control."
 
 
 def test_a_silent_board_and_the_end_of_driving_in_sight_are_notes() -> None:
