@@ -55,8 +55,8 @@ $(REWRITTEN): | $(STAMP)
 	-@$(BIN)/pytest --collect-only -qq tests > /dev/null
 
 # Most tests wait for other processes most of the time. Of the tests that measure times two run at once.
-MANY = -n 4 --dist worksteal
-FEW = -n 2 --dist worksteal
+MANY = -n 4 --dist worksteal --durations=20
+FEW = -n 2 --dist worksteal --durations=20
 
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/search

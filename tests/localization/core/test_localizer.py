@@ -5,12 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from common.freshness import NS_PER_S
 from common.pose import Covariance, Pose
 from services.localization.core.estimate import Located
 from services.localization.core.fixes import AGREEING
-from services.localization.core.localizer import GAP_S, USED
+from services.localization.core.localizer import GAP_S, SILENT_NS, USED
 from t2.messages import Fix, MapPose
 from tests.localization.core.vehicle_fixture import SIGMA, STEP_NS, STEP_S, Drive, diagonal
 
@@ -40,6 +41,7 @@ def test_nothing_is_known_before_odometry_and_a_placement() -> None:
     assert refused.name == "place.no_odometry"
     pose = drive.go()
     assert (pose.state, pose.x, pose.odom) == ("unplaced", None, None)
+    assert [phrase.name for phrase in pose.phrases] == ["map.unplaced"]
     assert "settings do not let these fixes place it" in drive.fix()
     assert "place the vehicle" in pose.text
 
@@ -51,11 +53,17 @@ def test_a_vehicle_is_placed_while_it_stands_and_odometry_arrives() -> None:
     refused = drive.localizer.place(known, drive.now_ns)
     assert refused is not None
     assert refused.name == "place.moving"
+    drive.go(angular=0.3)
+    refused = drive.localizer.place(known, drive.now_ns)
+    assert refused is not None
+    assert refused.name == "place.moving"
     drive.go()
-    refused = drive.localizer.place(known, drive.now_ns + 600_000_000)
+    refused = drive.localizer.place(known, drive.now_ns + SILENT_NS + 1)
     assert refused is not None
     assert refused.name == "place.no_odometry"
-    assert drive.place().placement == 1
+    assert drive.localizer.place(known, drive.now_ns + SILENT_NS) is None
+    assert drive.pose().placement == 1
+    assert drive.place().placement == 2
 
 
 @pytest.mark.no_cover
@@ -129,6 +137,23 @@ def nees(drive: Drive) -> float:
     error = np.array([pose.x - drive.true.x, pose.y - drive.true.y, turned])
     matrix = np.array(pose.pose_covariance).reshape(3, 3)
     return float(error @ np.linalg.solve(matrix, error))
+
+
+@pytest.mark.parametrize(("steps", "text"), [(50, ""), (51, "older than 2 s")])
+def test_a_fix_is_used_for_2_s(steps: int, text: str) -> None:
+    drive = placed()
+    drive.go()
+    late = drive.measured()
+    drive.go(steps=steps)
+    assert text in drive.fix(late)
+    assert bool(text) is bool(drive.pose().sources[0].refused)
+
+
+def test_a_fix_of_the_sample_of_a_placement_is_used_once() -> None:
+    drive = placed()
+    assert drive.fix() == ""
+    drive.place()
+    assert "no newer odometry message" in drive.fix()
 
 
 def test_an_older_fix_is_used_before_the_newer_ones() -> None:
@@ -286,9 +311,16 @@ def test_counters_that_are_missing_for_a_while_leave_the_pose_honest(
 
 def test_a_heading_that_is_too_uncertain_is_lost() -> None:
     drive = placed()
-    certain = Covariance.of(diagonal(0.1, 0.6))
-    assert drive.localizer.place(Located(drive.true, certain), drive.now_ns) is None
-    assert drive.pose().state == "lost"
+    assert drive.pose().text == (
+        "The position is known to 0.01 m and 1 degrees (standard deviations)."
+    )
+    for sigma, heading, state in (
+        (1.0, 0.5, "placed"), (1.01, 0.5, "lost"), (1.0, 0.51, "lost"), (0.1, 0.6, "lost"),
+    ):  # fmt: skip
+        known = Covariance.of(diagonal(sigma, heading))
+        assert drive.localizer.place(Located(drive.true, known), drive.now_ns) is None
+        assert drive.pose().state == state
+    assert "known only to 0.10 m and 34 degrees" in drive.pose().text
     for _ in range(AGREEING - 1):
         drive.go(linear=0.3)
         assert "5 fixes in a row agree" in drive.fix()
@@ -423,6 +455,8 @@ def test_odometry_that_is_repeated_or_reordered_changes_nothing() -> None:
     pose = drive.go(linear=0.4, steps=3)
     assert old is not None
     drive.localizer.on_odometry(old, drive.now_ns)
+    assert drive.odometry is not None
+    drive.localizer.on_odometry(replace(drive.odometry, x=99.0), drive.now_ns)
     assert drive.pose() == pose
 
 
