@@ -8,11 +8,14 @@ import msgspec
 import pytest
 
 from common.pose import Pose
-from services.patrol.core.routes import length, problem
-from services.patrol.core.teaching import Refused, Teaching
+from services.patrol.core.routes import LEAST, length, problem
+from services.patrol.core.teaching import Refused, Teaching, _close
 from t2 import messages as m
+from t2.messages import Phrase
 from tests.factories import map_pose
+from tests.patrol.core.vehicle_fixture import route
 
+HOME = (0.0, 0.0)
 STEP = 0.02  # m of one pose
 WEST = tuple((-0.2 * step, math.pi) for step in range(1, 5))  # x, heading
 
@@ -74,6 +77,27 @@ def test_a_loop_ends_exactly_at_home() -> None:
     assert length(lesson.teaching.route(0.5)) == pytest.approx(12.0, abs=0.1)
 
 
+@pytest.mark.parametrize(
+    ("driven", "end"),
+    [
+        ([(0.0, 5.0), (0.0, 0.51)], [(0.0, 5.0), (0.0, 0.51)]),  # it does not end at home
+        ([(0.0, 5.0), (0.0, 0.5)], [(0.0, 5.0), (0.0, 0.5), HOME]),
+        ([(0.0, 5.0), (0.0, 0.31)], [(0.0, 5.0), (0.0, 0.31), HOME]),
+        ([(0.0, 5.0), (0.0, 0.3)], [(0.0, 5.0), HOME]),  # too near: home itself ends it
+        ([(5.0, 0.0), (0.2, 0.0)], [(5.0, 0.0), HOME]),
+        ([(5.0, 5.0), (0.2, 0.2), (0.1, -0.1)], [(5.0, 5.0), HOME]),
+        ([(0.0, 5.0, "gate"), (0.0, 0.2)], [(0.0, 5.0), HOME]),
+        ([(0.0, 5.0), (0.0, 0.2, "gate")], [(0.0, 5.0), (0.0, 0.2), HOME]),  # a station stays
+    ],
+)
+@pytest.mark.parametrize("first", ["", "door"])  # a station of the points before
+def test_where_a_loop_ends(driven: list[Any], end: list[tuple[float, float]], first: str) -> None:
+    begin = [(*HOME, "home"), (5.0, 0.0, first)]
+    points = list(route([*begin, *driven]).points)
+    _close(points)
+    assert [(each.x, each.y) for each in points[2:]] == end
+
+
 def test_a_curve_is_followed_to_three_centimetres() -> None:
     lesson = Lesson().forward(2 * math.pi, radius=2.0)
     points = lesson.corners
@@ -114,8 +138,9 @@ def test_stations_are_exact_points_in_their_order() -> None:
 
 def test_a_station_has_one_place() -> None:
     lesson = Lesson().forward(1.0)
-    with pytest.raises(Refused, match="station_twice"):
+    with pytest.raises(Refused) as refused:
         lesson.teaching.station("home", 0.0)
+    assert refused.value.reason == Phrase("teach.station_twice", {"station": "home"})
 
 
 def test_small_motions_backward_are_no_part_of_the_route() -> None:
@@ -175,8 +200,10 @@ def test_coming_back_to_the_same_point_is_a_corner() -> None:
 
 @pytest.mark.parametrize("distance", [0.0, 0.3])
 def test_a_route_has_a_least_length(distance: float) -> None:
-    with pytest.raises(Refused, match="short"):
+    with pytest.raises(Refused) as refused:
         Lesson().forward(distance).teaching.route(0.5)
+    about: Any = {"length": pytest.approx(distance), "least": LEAST}
+    assert refused.value.reason == Phrase("teach.short", about)
 
 
 def test_what_was_taught_survives_a_restart() -> None:
