@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from common.freshness import NS_PER_S, Latest, fresh
 from services.patrol.core.course import FRESH_S, Course, Note, OpenRound
-from services.patrol.core.inputs import Inputs, is_known
+from services.patrol.core.inputs import Inputs
 from services.patrol.core.routes import length, stations
 from services.patrol.core.teaching import CORRIDOR, OpenTeaching, Refused, Teaching
 from services.patrol.core.way import CLOSED
@@ -191,7 +191,7 @@ class Patrol:
 
     def _fresh_pose(self, now_ns: int) -> m.MapPose:
         pose = self._inputs.pose
-        if not fresh(pose, now_ns, FRESH_S) or pose is None or not is_known(pose.value):
+        if pose is None or not fresh(pose, now_ns, FRESH_S):
             raise Refused(Phrase("teach.lost"))
         return pose.value
 

@@ -152,6 +152,16 @@ def test_a_station_may_be_marked_a_bit_backward() -> None:
     lesson = Lesson().forward(2.0).forward(-0.15)
     lesson.teaching.station("gate", 0.0)
     assert lesson.forward(1.0).corners == near([(0.0, 0.0), (1.85, 0.0), (2.85, 0.0)])
+    assert lesson.teaching.summary == (pytest.approx(2.85, abs=0.06), 3)
+
+
+@pytest.mark.parametrize("radius", [math.inf, 1.0])
+def test_the_end_of_a_route_may_be_a_bit_backward(radius: float) -> None:
+    lesson = Lesson().forward(2.0, radius)
+    lesson.forward(-0.1, radius)
+    assert lesson.corners[-1] == pytest.approx((lesson.at.x, lesson.at.y), abs=1e-3)
+    assert lesson.teaching.summary[0] == pytest.approx(1.9, abs=0.02)
+    assert len(set(lesson.corners)) == len(lesson.corners)
 
 
 def test_driving_backward_ends_the_recording_and_keeps_the_part_before() -> None:
@@ -185,6 +195,15 @@ def test_an_unknown_position_ends_the_recording(pose: m.MapPose, reason: str) ->
 def test_teaching_needs_a_known_position() -> None:
     with pytest.raises(Refused, match="lost"):
         Teaching("yard", "001", "home", 0.0, map_pose("lost"))
+
+
+def test_a_small_loop_ends_at_home() -> None:
+    lesson = Lesson()
+    for _ in range(3):
+        lesson.forward(0.4).turn(math.tau / 3)
+    assert lesson.teaching.summary[0] == pytest.approx(1.2, abs=0.05)
+    assert lesson.corners[0] == lesson.corners[-1] == HOME
+    assert lesson.teaching.route(0.7).speed == 0.7
 
 
 def test_a_short_route_is_no_loop() -> None:
