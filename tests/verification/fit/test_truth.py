@@ -11,6 +11,8 @@ from sim.model import Cable, Line, Model
 from verification.fit.run import measure, vehicles
 from verification.fit.truth import late_s, stopped_within, truths, unsafe
 
+pytestmark = pytest.mark.timeout(300)  # simulated time: a busy host only takes longer
+
 PROPOSED = {REACT: 0.11, DECELERATION: 0.79, "vehicle.angular_deceleration": 1.9}
 
 
