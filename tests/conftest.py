@@ -3,7 +3,8 @@
 import logging
 import os
 import signal
-from collections.abc import Iterator
+import sys
+from collections.abc import Generator, Iterator
 
 import pytest
 from hypothesis import settings
@@ -19,15 +20,21 @@ settings.load_profile("t2")
 os.environ["T2_LANG"] = "en"  # whatever the locale of this host
 
 
-@pytest.hookimpl(trylast=True)  # the plugin of hypothesis has marked its tests
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave tests of chance out of the coverage.
+@pytest.hookimpl(wrapper=True, trylast=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
+    """Leave property tests and long runs out of the coverage.
 
-    A branch that only chance reaches is not tested, and tracing takes three times as long.
+    A branch that only chance reaches is not tested, and tracing takes three times as long. The
+    pause of pytest-cov is not enough: in a worker it leaves a second tracer running.
     """
-    for item in items:
-        if item.get_closest_marker("hypothesis"):
-            item.add_marker("no_cover")
+    if not any(map(item.get_closest_marker, ("hypothesis", "no_cover"))):
+        return (yield)
+    tracer = sys.gettrace()
+    sys.settrace(None)
+    try:
+        return (yield)
+    finally:
+        sys.settrace(tracer)
 
 
 @pytest.fixture(autouse=True)
