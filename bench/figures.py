@@ -40,7 +40,7 @@ US, MS, CPU, ONE = Unit("us", 1e3), Unit("ms", 1e6, 1), Unit("CPU %", 1e7, 1), U
 class Column:
     """A column of a table: a figure of each row, or its median as a multiple of a row's.
 
-    ``of`` is the begin of that row's name; the rest is that of the row itself.
+    ``of`` is the beginning of that row's name; the rest is as in the row itself.
     """
 
     head: str

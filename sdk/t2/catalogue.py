@@ -440,13 +440,13 @@ PHRASES: dict[str, Words] = {
     "relay.never": ("Nothing received from the relay yet.", "尚未收到中继器的数据。"),
     "relay.lost": ("The relay is silent.", "收不到中继器的数据。"),
     "relay.brakes": ("The relay brakes ({reason:word}).", "中继器正在制动（{reason:word}）。"),
-    # the first part of the path that is missing
     "camera.silent": (
         "Camera {camera}: no picture arrives from {source}.", "摄像头 {camera}：收不到 {source} 的图像。",
     ),
     "camera.ended": (
         "Camera {camera}: no picture. The stream has ended.", "摄像头 {camera}：没有图像。视频流已结束。",
     ),
+    # the first part of the path that is missing
     "root.router": ("No connection to the robot.", "未连接到机器人。"),
     "root.safety": (
         "Safety does not run, or its state does not arrive.", "安全服务未运行，或收不到其状态。",
@@ -971,7 +971,7 @@ EVENTS: tuple[EventRow, ...] = (
     ),
     EventRow(
         "dashboard", "leave", "info",
-        ("{by:operator} gives up control.", "{by:operator} 交出控制权。"), NOTHING,
+        ("{by:operator} no longer has control.", "{by:operator} 不再拥有控制权。"), NOTHING,
     ),
     EventRow(
         "teleop", "overruled", "warning",

@@ -121,7 +121,7 @@ def test_take_overs_of_page_and_terminal() -> None:
         ("takeover", "Ann"), ("takeover", "Cy"), ("takeover", "Dee"), ("takeover", "Dee")
     ]  # fmt: skip
     assert found[0].text == "Ann takes control from Bob."
-    assert found[3].text == "Dee gives up control."
+    assert found[3].text == "Dee no longer has control."
 
 
 def test_a_silent_board_and_the_end_of_driving_in_sight_are_notes() -> None:
