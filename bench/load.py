@@ -7,9 +7,10 @@ import subprocess
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,15 @@ import msgspec
 from bench.child_process import ChildProcess
 from bench.figures import CPU, HOST, ONE, US, Column, Figures, Limits, Unit
 from bench.host import watched
-from bench.processes import Share, cpu_shares, module, one_pool, running
+from bench.processes import (
+    Command,
+    Share,
+    cpu_shares,
+    module,
+    on_one_cpu,
+    one_pool,
+    running,
+)
 from bench.reaction import SEED
 from bench.timed import TIMED, Timing
 from services.safety.config import DECISION_PERIOD_S
@@ -40,6 +49,7 @@ EVERYTHING = f"{keys.ROOT}/001/tel/**"
 STEADY_S, PATIENCE_S = 1.0, 60.0
 DECISION, ALLOWED = ("safety", "Policy.decide"), ("allowed", "Policy.decide")
 T2, PAIR, TOGETHER = "T2", "two processes, Zenoh, a router", "together"
+PINNED = "the same, on one CPU"
 # Growth of the cost beyond the number that still counts as proportional: CPU time has a resolution
 # of 10 ms, and other processes use the host.
 MARGIN = 1.25
@@ -64,18 +74,25 @@ def chain_of_t2(folder: Path) -> Iterator[Pids]:
 
 
 @contextlib.contextmanager
-def bare_pair(folder: Path) -> Iterator[Pids]:
+def bare_pair(folder: Path, wrapped: Callable[[Command], Command] = one_pool) -> Iterator[Pids]:
     """Run the two processes with a router and the same simulated vehicle."""
     endpoint, (board, port, standby) = f"tcp/127.0.0.1:{free_port()}", udp_ports(3)
     sets = set_options(f"board.port={board}", f"board.listen_ports=[{port}, {standby}]")
     sim = module("sim", "--world", "empty", "--trace", folder / "trace.jsonl", *sets)
     pair = [
-        one_pool(module("bench.zenoh_programs", "drive-board", port, endpoint, board)),
-        one_pool(module("bench.zenoh_programs", "drive-decide", endpoint)),
+        wrapped(module("bench.zenoh_programs", "drive-board", port, endpoint, board)),
+        wrapped(module("bench.zenoh_programs", "drive-decide", endpoint)),
     ]
     with router_process(endpoint) as router, running(sim, *pair) as (_, at_board, decides):
         wait_until_it_drives(folder / "trace.jsonl")
         yield {"router": router.pid, "at the board": at_board.pid, "decides": decides.pid}
+
+
+CHAINS: Mapping[str, Callable[[Path], AbstractContextManager[Pids]]] = {
+    T2: chain_of_t2,
+    PAIR: bare_pair,
+    PINNED: partial(bare_pair, wrapped=lambda command: on_one_cpu(one_pool(command))),
+}
 
 
 def wait_until_it_drives(trace: Path) -> None:
@@ -89,7 +106,7 @@ def cpu(turns: int = TURNS, seconds: float = TURN_S) -> Figures:
     """Return the CPU of each process, in ns/s; the candidates take turns in random order."""
     samples, shuffler = defaultdict[tuple[str, ...], list[float]](list), random.Random(SEED)
     for _ in range(turns):
-        for name, run in shuffler.sample([(T2, chain_of_t2), (PAIR, bare_pair)], 2):
+        for name, run in shuffler.sample([*CHAINS.items()], len(CHAINS)):
             late_ns: list[int] = []
             with (
                 tempfile.TemporaryDirectory() as folder,

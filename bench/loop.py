@@ -74,6 +74,7 @@ class BoardSocket:
 def run_pair(join: Join) -> None:
     """Run one of two processes on a bus: ``board PORT WHERE`` or ``decide WHERE``."""
     realtime.request(realtime.BRIDGE)
+    realtime.share_cpu()
     role, *given = sys.argv[1:]
     if role == "decide":
         _send = join(given[0], "verdicts", "hits", None)

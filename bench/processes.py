@@ -1,6 +1,7 @@
 """Processes that last as long as their context, what they need, and the CPU that they take."""
 
 import contextlib
+import os
 import shutil
 import subprocess
 import sys
@@ -42,6 +43,11 @@ def module(name: str, *words: object) -> Command:
 def one_pool(command: Command) -> Command:
     """Return the command with Zenoh's runtimes on one pool of threads, as T2's services set it."""
     return ["env", f"{RUNTIME_ENV}={ONE_POOL.format(links=1)}", *command]
+
+
+def on_one_cpu(command: Command) -> Command:
+    """Return the command that runs on the CPU of ``realtime.share_cpu``."""
+    return ["taskset", "--cpu-list", str(max(os.sched_getaffinity(0))), *command]
 
 
 def compiled(name: str, folder: Path) -> str:

@@ -20,7 +20,10 @@ A thread that computes for ``CPU_LIMIT_US`` without waiting is a runaway, and Li
 process. The router is exempt: a busy forwarding thread does not wait. So is the simulated board,
 which can flood its bridge for tests.
 
-Without the permission, and on other systems, processes run with normal priority.
+Bridge and safety run on one CPU together (``share_cpu``). The guard may run on any CPU, so it
+brakes also when that one hangs.
+
+Without the permission, and on other systems, processes run with normal priority, on any CPU.
 """
 
 import os
@@ -52,6 +55,23 @@ def limit() -> None:
         _, most = resource.getrlimit(resource.RLIMIT_RTTIME)
         longest = CPU_LIMIT_US if most == resource.RLIM_INFINITY else min(most, CPU_LIMIT_US)
         resource.setrlimit(resource.RLIMIT_RTTIME, (longest, most))
+
+
+def share_cpu() -> None:
+    """Run on one CPU, the last that this process may use; call it before threads start.
+
+    A message that wakes up a thread on another CPU costs more than what that thread then does, and
+    finds caches without its code. Ordinary processes may use any CPU: one may be busy.
+    """
+    if priority():
+        with suppress(OSError):
+            os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+
+
+def give_way() -> None:
+    """Let the other threads of this priority run first, such as Zenoh's, which send."""
+    if priority():  # ordinary threads take turns anyway
+        os.sched_yield()
 
 
 def priority(pid: int = 0) -> int:

@@ -195,6 +195,7 @@ def run_with(
         if priority and loaded.config.host.realtime:
             realtime.request(priority)  # before threads start: they inherit it
             realtime.limit()
+            realtime.share_cpu()
         log.configure(loaded.config.log, name)
         node = Node(name, loaded)
     except ConfigError as error:

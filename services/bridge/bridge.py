@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from bisect import bisect_left
+from collections import deque
 from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
@@ -94,6 +95,7 @@ class Bridge:
         self._unheard_s = 0  # without a first frame of the board
         self._braking = False  # as the guard knows
         self._unsent = False  # whether the system did not send the last order, a BRAKE
+        self._events = deque[Event]()
         self._publishers: dict[str, Publisher[Any]] = {
             "velocity": drive.publisher(keys.VELOCITY),
             "mileage": drive.publisher(keys.MILEAGE),
@@ -165,6 +167,7 @@ class Bridge:
             self._send(self._core.motions.order(BRAKE))
         self._do(self._core.tick(now_ns))
         self._beat()
+        self._report()
 
     def _on_second(self, _: int) -> None:
         sockets, counters, rejected = self._sockets, self._node.counters, self._core.rejected
@@ -193,14 +196,20 @@ class Bridge:
                     self._send(output)
                 case Publish(stream, message, raw):
                     self._publishers[stream].put(message, raw)
-                case Event(name, level, about, phrases):
-                    self._node.event(name, level, *phrases, **about)
+                case Event():
+                    self._events.append(output)
                 case Reply(caller, reply):
                     caller.reply(reply)
                 case Refuse(caller, reasons):
                     caller.refuse(*reasons)
                 case Reacted(name, since_ns):
                     self._reactions[name].add(clock.now_ns() - since_ns)
+
+    def _report(self) -> None:
+        """Publish and log the events; they wait for a tick, and delay no command and no sample."""
+        while self._events:
+            event = self._events.popleft()
+            self._node.event(event.name, event.level, *event.phrases, **event.about)
 
     def _send(self, send: Send) -> None:
         """Send; a BRAKE that the system refuses is sent again, at once and at each tick."""
@@ -234,6 +243,7 @@ class Bridge:
         self._send(self._core.motions.on_exit(clock.now_ns()))
         if self._pulse is not None:
             self._pulse.end()
+        self._report()
 
 
 if __name__ == "__main__":

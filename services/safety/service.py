@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from msgspec.structs import replace
 
-from common import clock
+from common import clock, realtime
 from common.bus.bus import Arrival, Bus, Caller
 from common.freshness import NS_PER_S, Latest, fresh
 from common.heartbeat import Heartbeat
@@ -234,6 +234,7 @@ class SafetyService:
             self._has_turn = is_tick
             self._sent, self._hit_due = motion.command, False
             self._motion_publisher.put(motion)
+            realtime.give_way()
 
     def _report(self, before: State, answer: Callable[[Reply], None] | None, now_ns: int) -> None:
         verdict = self._state.verdict

@@ -53,6 +53,9 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
 
     wait_until(brakes, "BRAKE")
     assert sum(bridge._node.reactions()["reflex"].counts) == 1
+    assert events_of(bridge) == [], "they wait for the tick"
+    ticks(bridge)
+    assert "contact" in events_of(bridge)
     boot = bridge._node.bus.boot
     for seq in (1, 2):
         motion = Motion(command=Command.BRAKE, seq=seq, boot=1, judged=99, judged_boot=boot)
@@ -60,6 +63,23 @@ def test_a_hit_is_braked_for_and_timed(bridge: Bridge, made: Board) -> None:
     judged_stop = bridge._node.reactions()["judged_stop"]
     assert sum(judged_stop.counts) == 1
     assert 0 < judged_stop.worst < 10.0
+
+
+def test_an_event_is_not_lost_at_the_end(bridge: Bridge, made: Board) -> None:
+    made.say_bytes(HIT)
+
+    def is_hit() -> bool:
+        bridge._read(0, 1)
+        return bool(bridge._events)
+
+    wait_until(is_hit, "the hit")
+    bridge._on_exit()
+    assert "contact" in events_of(bridge)
+
+
+def events_of(bridge: Bridge) -> list[str]:
+    """Return the names of the published events, which wait for a session."""
+    return [event.name for event, _ in bridge._node._events._waiting]
 
 
 class Refusing:
