@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check others cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
+.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check waiting timed others computing cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -61,13 +61,20 @@ FEW = -n 2 --dist worksteal --durations=20
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/search
 
+# These tests only compute: they take the CPU that the waiting ones leave.
+IDLE := $(shell command -v chrt > /dev/null && echo chrt --idle 0 || echo nice -n 19)
+
 # Each worker imports each file that it is given: the timed tests get theirs only.
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
-# The other tests mostly wait. Meanwhile those of the cores take the rest of the CPU.
 test: $(STAMP) $(REWRITTEN) ## all tests except search and campaigns, with the coverage of the cores
+	@$(MAKE) --no-print-directory -j2 --output-sync=line waiting cover
+
+waiting: timed
+	@$(MAKE) --no-print-directory others
+
+timed: $(STAMP)
 	$(BIN)/pytest $(TIMED) -m "timed and not campaign"
-	@$(MAKE) --no-print-directory -j2 --output-sync=line others cover
 
 others: $(STAMP)
 	$(BIN)/pytest --ignore=$(SEARCH) $$($(CORE_TESTS) | sed 's/[^ ]*/--ignore=&/g') $(MANY) \
@@ -105,8 +112,8 @@ ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz (with cargo), rclpy 
 
 check: $(STAMP) ## what CI runs: lint, types, test, search, mutants of changed cores
 	@$(MAKE) --no-print-directory -j3 --output-sync lint types $(REWRITTEN)
-	@$(MAKE) --no-print-directory test
-	@$(MAKE) --no-print-directory search mutants CHANGED=1
+	@$(MAKE) --no-print-directory -j2 --output-sync=line waiting computing
+	@$(MAKE) --no-print-directory mutants CHANGED=1
 
 lint: $(STAMP)
 	$(BIN)/ruff format --check .
@@ -115,16 +122,19 @@ lint: $(STAMP)
 	$(BIN)/codespell
 	$(BIN)/python -m tools.docs --check
 
+computing: cover
+	@$(MAKE) --no-print-directory search
+
 # Random events, 200 random vehicles, and mutations of the protections.
 search: $(STAMP)
-	$(BIN)/pytest -n 2 --dist worksteal $(SEARCH)
+	$(IDLE) $(BIN)/pytest -n 2 --dist worksteal $(SEARCH)
 
 CORE_TESTS = $(BIN)/python -m verification.mutation --tests
 
-# Not a branch of a core is untested. These tests yield to the others: they measure no times.
+# Not a branch of a core is untested.
 cover: $(STAMP)
 	$(BIN)/coverage erase
-	nice -n 5 $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
+	$(IDLE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
 	$(BIN)/coverage report
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
