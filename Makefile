@@ -61,9 +61,6 @@ FEW = -n 2 --dist worksteal --durations=20
 # Millions of steps of the cores: tracing them would take three times as long and show nothing new.
 SEARCH = tests/search
 
-# These tests only compute: they take the CPU that the waiting ones leave.
-IDLE := $(shell command -v chrt > /dev/null && echo chrt --idle 0 || echo nice -n 19)
-
 # Each worker imports each file that it is given: the timed tests get theirs only.
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
@@ -127,14 +124,15 @@ computing: cover
 
 # Random events, 200 random vehicles, and mutations of the protections.
 search: $(STAMP)
-	$(IDLE) $(BIN)/pytest -n 2 --dist worksteal $(SEARCH)
+	nice -n 19 $(BIN)/pytest -n 2 --dist worksteal $(SEARCH)
 
 CORE_TESTS = $(BIN)/python -m verification.mutation --tests
 
-# Not a branch of a core is untested.
+# Not a branch of a core is untested. These tests and the search only compute: they take the CPU that
+# the others leave.
 cover: $(STAMP)
 	$(BIN)/coverage erase
-	$(IDLE) $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
+	nice -n 19 $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
 	$(BIN)/coverage report
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only
