@@ -158,6 +158,9 @@ BOARD = [
 
 GREEDY = [
     Fault("a stranger's 20 000 datagrams/s", injectors.flood, ON, hold_s=1.0),
+    # The guard may run on another CPU. It kills the bridge, and brakes until the next one drives.
+    Fault("the CPU of bridge and safety taken for 0.9 s", injectors.take_cpu, (*NEUTRAL, *RESET),
+          HEARTBEAT, hold_s=1.5, stops=("brake",)),
     # More than the bridge can publish: answers to its queries are lost, the bumper's first.
     Fault("board's 20 000 datagrams/s of velocities", do(Flood(seconds=0.9)),
           (*ON, *ITSELF, *NEUTRAL), hold_s=1.0, harmless=True),

@@ -82,6 +82,17 @@ with contextlib.ExitStack() as held:
         except Exception:  # the table is full
             time.sleep(0.1)
 """
+# Ahead of all of T2, on the CPU of bridge and safety.
+TAKEN_S = 0.9
+TAKE_CPU = """
+import os, sys, time
+os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(99))
+print(time.clock_gettime_ns(time.CLOCK_BOOTTIME), flush=True)
+end_s = time.monotonic() + float(sys.argv[1])
+while time.monotonic() < end_s:
+    pass
+"""
 # Control characters are escaped before they are shown, which makes them longer still.
 EVENTS = """
 import sys, time, msgpack
@@ -169,6 +180,15 @@ def restart(fixture: StackFixture) -> None:
 def flood(fixture: StackFixture) -> None:
     """Send 20 000 datagrams a second to the bridge's first port, from a foreign address."""
     _start(fixture, FLOOD, str(fixture.running.config.board.listen_ports[0]))
+
+
+def take_cpu(fixture: StackFixture) -> int:
+    """Take the CPU of bridge and safety for ``TAKEN_S``."""
+    command = [sys.executable, "-c", TAKE_CPU, str(TAKEN_S)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE)
+    fixture.running.others.append(process)
+    assert process.stdout is not None
+    return int(process.stdout.readline())
 
 
 def query_flood(fixture: StackFixture) -> None:
