@@ -38,6 +38,13 @@ def test_a_correction_is_not_driven() -> None:
     assert [each.x for each in made.track] == [0.0, 0.5, 5.25]
 
 
+def test_the_margin_is_the_least_of_the_round() -> None:
+    made = diary()
+    for deviation in (0.2, 0.3, 0.1):
+        made.on_pose(0.0, 0.0, Fit(Nearest(0.0, deviation, 0.0), 0.05, 0.5))
+    assert made.record.margin == pytest.approx(0.1)
+
+
 def test_lists_of_a_round_that_never_ends_are_bounded() -> None:
     made = diary()
     for number in range(MOST + 50):

@@ -3,7 +3,7 @@
 import pytest
 
 from common.pose import Pose
-from services.patrol.core.inputs import has_changed, is_known, lost
+from services.patrol.core.inputs import Inputs, has_changed, is_known, lost
 from t2 import messages as m
 from t2.messages import Phrase
 from tests.factories import map_pose
@@ -49,3 +49,13 @@ def test_a_lost_position_has_the_first_reason_of_localization(
     phrases: m.Phrases, reason: str
 ) -> None:
     assert lost(map_pose("lost", phrases=phrases)) == Phrase(reason)
+
+
+@pytest.mark.parametrize(
+    ("other_ns", "reason"),
+    [(None, None), (0, Phrase("patrol.twice")), (-1, None)],
+)
+def test_another_patrol_runs_for_two_seconds_after_its_state(
+    other_ns: int | None, reason: Phrase | None
+) -> None:
+    assert Inputs(other_ns=other_ns).twice(2_000_000_000) == reason
