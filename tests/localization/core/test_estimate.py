@@ -11,6 +11,7 @@ from common.pose import Covariance, Pose
 from services.localization.core.estimate import (
     POSE,
     POSITION,
+    ROUNDING,
     Located,
     Measured,
     Sample,
@@ -89,3 +90,33 @@ def test_matrices_of_two_and_three_rows_are_inverted() -> None:
     )
     three = [[4.0, 1.0, 0.5], [1.0, 3.0, 0.2], [0.5, 0.2, 2.0]]
     assert np.array(inverse(three)) == pytest.approx(np.linalg.inv(three))
+
+
+@pytest.mark.parametrize(
+    ("xx", "yy", "hh", "is_step"),
+    [
+        (0.0, 0.0, 0.0, True),
+        (-ROUNDING, 0.0, 0.0, True),
+        (-0.5, 0.25, 0.125, False),
+        (0.5, -0.25, 0.125, False),
+        (0.5, 0.25, -0.125, False),
+    ],
+)
+def test_odometry_that_becomes_more_certain_adds_no_certainty(
+    xx: float, yy: float, hh: float, is_step: bool
+) -> None:
+    here, certain = Pose(0.0, 0.0, 0.0), Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    before = Sample(1, here, certain, 0)
+    after = Sample(2, here, Covariance(xx, 0.1, yy, 0.0, 0.0, hh), 0).after(before, certain)
+    expected = Covariance(xx, 0.1, yy, 0.0, 0.0, hh)
+    if not is_step:
+        expected = Covariance(abs(xx), 0.0, abs(yy), 0.0, 0.0, abs(hh))
+    assert after.covariance == expected
+
+
+def test_halfway_is_on_the_arc() -> None:
+    certain = Covariance(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    pose = Sample(1, Pose(0.0, 0.0, 0.0), certain, 0, step=(1.0, 0.6)).halfway().pose
+    radius = 1.0 / 0.6
+    expected = radius * math.sin(0.3), radius * (1 - math.cos(0.3)), 0.3
+    assert (pose.x, pose.y, pose.heading) == pytest.approx(expected)
