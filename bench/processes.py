@@ -1,7 +1,6 @@
 """Processes that last as long as their context, what they need, and the CPU that they take."""
 
 import contextlib
-import os
 import shutil
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from common import realtime
 from common.bus.session import ONE_POOL, RUNTIME_ENV
 from common.freshness import NS_PER_S
 from verification.harness.process_stats import GONE, main_thread_s, stat
@@ -47,7 +47,7 @@ def one_pool(command: Command) -> Command:
 
 def on_one_cpu(command: Command) -> Command:
     """Return the command that runs on the CPU of ``realtime.share_cpu``."""
-    return ["taskset", "--cpu-list", str(max(os.sched_getaffinity(0))), *command]
+    return ["taskset", "--cpu-list", str(realtime.shared_cpu()), *command]
 
 
 def compiled(name: str, folder: Path) -> str:

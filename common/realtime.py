@@ -65,7 +65,12 @@ def share_cpu() -> None:
     """
     if priority():
         with suppress(OSError):
-            os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+            os.sched_setaffinity(0, {shared_cpu()})
+
+
+def shared_cpu() -> int:
+    """Return the CPU of ``share_cpu``."""
+    return max(os.sched_getaffinity(0))
 
 
 def give_way() -> None:
