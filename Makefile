@@ -4,9 +4,9 @@ BIN := .venv/bin
 STAMP := .venv/.installed
 DEMO := .venv/.demo
 # uv installs in seconds what takes pip most of a minute. It does not read pip's settings: where it
-# finds nothing, pip is used instead.
-UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --compile-bytecode --python $(BIN)/python
-PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check
+# finds nothing, pip is used instead. Python compiles what is imported: most modules never are.
+UV_INSTALL = $(BIN)/uv pip install --quiet --system-certs --python $(BIN)/python
+PIP_INSTALL = $(BIN)/pip install --quiet --disable-pip-version-check --no-compile
 CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
   "T2 needs Python 3.11 or newer: make PYTHON=/path/to/python3.11")
 
