@@ -334,6 +334,8 @@ class Simulation:
                 self.to_pc.put(datagram, now_ns)
 
     def _record_bumper(self, datagram: Datagram, now_ns: int) -> None:
+        if r.BumperReport.OPENING not in datagram.payload:
+            return
         for part in framing.read(datagram.payload, r.FROM_BOARD):
             if not isinstance(part, Received) or not isinstance(part.frame, r.BumperReport):
                 continue

@@ -38,6 +38,8 @@ class Sonars:
         self._echoes = Echoes(parameters, seed)
         self._injected: dict[str, Sonar] = {}
         self._last = dict.fromkeys(SONAR_NAMES, self._in_mm(self._farthest))
+        self._seen_from: tuple[World, Pose] | None = None
+        self._distances: list[float] = []  # m, from there, without faults
 
     def inject(self, sonar: Sonar) -> None:
         """Set or clear the fault of one sonar."""
@@ -45,8 +47,10 @@ class Sonars:
 
     def measure(self, world: World, pose: Pose) -> Ranges:
         """Return the reported ranges from this pose."""
-        distances = [self._distance(mount, world, pose) for mount in self._mounts]
-        taken = self._echoes.taken(distances)
+        if self._seen_from != (world, pose):  # it stands most of the time
+            self._seen_from = world, pose
+            self._distances = [self._distance(mount, world, pose) for mount in self._mounts]
+        taken = self._echoes.taken(self._distances)
         return tuple(map(self._report, self._mounts, taken))
 
     def _report(self, mount: Mount, distance: float) -> int:

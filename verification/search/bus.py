@@ -269,7 +269,7 @@ class Process:
         self.boot = boot
         self.robot = ROBOT
         self.alive = True
-        self.stalled_until_ns = 0
+        self.stalled_until_ns = 0  # 0: it has taken what queued up in its last stall
         self.cut = False  # whether the router has ended its session for a long stall
         self._reconnections = 0
         self.taking: Envelope | None = None  # the envelope being handled
@@ -370,7 +370,9 @@ class Process:
         if not self.alive or self.stalled:
             return
         self.loop.read()
-        self.net.wake(self)
+        if self.stalled_until_ns:
+            self.stalled_until_ns = 0
+            self.net.wake(self)
         self.loop.call_due()
 
 

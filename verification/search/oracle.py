@@ -8,10 +8,12 @@ is dropped with its last holder: the safety case accepts that for two processes 
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from common.freshness import NS_PER_S
 from common.wire import framing
 from common.wire.commands import TO_BOARD, MotionCommand, MotionKind
+from common.wire.frame import Frame
 from common.wire.framing import Received
 from common.wire.reports import FROM_BOARD, BumperReport
 from sim import requests as q
@@ -45,6 +47,13 @@ class Record:
     complaints: tuple[str, ...]
     known: frozenset[Trip]
     creeps: bool  # whether it is a release
+
+
+@lru_cache
+def reported(datagram: bytes) -> list[Frame]:
+    """Return the valid frames of a datagram of the board; most of them come again and again."""
+    parts = framing.read(datagram, FROM_BOARD)
+    return [part.frame for part in parts if isinstance(part, Received)]
 
 
 @dataclass(repr=False)
@@ -139,12 +148,10 @@ class Oracle:
     def on_report(self, process: Process, datagram: bytes, port: int) -> None:
         """Record a datagram of the board, on this port, before the bridge handles it."""
         bridge_book = self.bridge_books[process.boot]
-        for part in framing.read(datagram, FROM_BOARD):
-            if not isinstance(part, Received):
-                continue
-            if part.frame == BumperReport(True):
+        for frame in reported(datagram):
+            if frame == BumperReport(True):
                 self.press.noticed = True
-            if bridge_book.on_report(part.frame, port, self.now_ns):
+            if bridge_book.on_report(frame, port, self.now_ns):
                 self.trip("contact", process.boot, (process.boot, bridge_book.published + 1))
 
     def on_router(self, up: bool) -> None:
