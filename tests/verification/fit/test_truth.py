@@ -8,7 +8,7 @@ from cli.settings import Everything
 from common.motion import Twist
 from sim.config import load_model
 from sim.model import Cable, Line, Model
-from verification.fit.run import measure, vehicles
+from verification.fit.run import Vehicle, measure, measured, vehicles
 from verification.fit.truth import late_s, stopped_within, truths, unsafe
 
 pytestmark = pytest.mark.timeout(300)  # simulated time: a busy host only takes longer
@@ -23,9 +23,19 @@ def fitted(**changes: float) -> Fit:
 
 
 def test_a_vehicle_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A random one, with dead time and noise."""
+    """A random one, with dead time and noise, that slows down less on RUN than on STOP."""
+    fits: list[Fit] = []
+
+    def fitted(vehicle: Vehicle) -> Fit:
+        fits.append(measured(vehicle))
+        return fits[-1]
+
+    monkeypatch.setattr("verification.fit.run.measured", fitted)
     monkeypatch.setattr("verification.fit.trial.SHARES", (1.0,))
-    result = measure(vehicles(5)[-1])
+    name, model, turn_braking = vehicles(5)[-1]
+    weak = replace(model, drive=replace(model.drive, coast=0.8, acceleration=0.3))
+    result = measure((name, weak, turn_braking))
+    assert 0.27 < float(fits[0].proposals[DECELERATION]) <= 0.3
     assert result.missing == ()
     assert result.proposes
     assert result.unsafe == ()
