@@ -3,7 +3,6 @@
 import logging
 import os
 import signal
-import sys
 from collections.abc import Generator, Iterator
 
 import pytest
@@ -11,6 +10,7 @@ from hypothesis import settings
 
 from common import log
 from common.bus.session import RUNTIME_ENV
+from tests.untraced import untraced
 from verification.harness.bus import router_process
 from verification.harness.ports import free_port
 
@@ -24,17 +24,12 @@ os.environ["T2_LANG"] = "en"  # whatever the locale of this host
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """Leave property tests and long runs out of the coverage.
 
-    A branch that only chance reaches is not tested, and tracing takes three times as long. The
-    pause of pytest-cov is not enough: in a worker it leaves a second tracer running.
+    A branch that only chance reaches is not tested.
     """
     if not any(map(item.get_closest_marker, ("hypothesis", "no_cover"))):
         return (yield)
-    tracer = sys.gettrace()
-    sys.settrace(None)
-    try:
+    with untraced():
         return (yield)
-    finally:
-        sys.settrace(tracer)
 
 
 @pytest.fixture(autouse=True)

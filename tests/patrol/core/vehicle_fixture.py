@@ -10,6 +10,7 @@ from services.patrol.core.course import TICK_S, Note
 from services.patrol.core.patrol import Patrol
 from t2 import messages as m
 from tests.factories import map_pose, safety_state
+from tests.untraced import untraced
 
 ANNOUNCE_S, PATIENCE_S = 1.0, 20.0
 TICK_NS = round(TICK_S * NS_PER_S)
@@ -143,6 +144,7 @@ class Vehicle:
         reason = self.patrol.act(action, self.now_ns, self.wall_ns)
         return reason.name if reason else None
 
+    @untraced()
     def driving(self, of: m.Route | None = None, *, until_x: float = 1.0) -> "Vehicle":
         """Start a round, and drive until this place."""
         assert self.start(of) is None
@@ -161,6 +163,7 @@ class Vehicle:
         self.at = Pose(self.at.x + x, self.at.y + y, heading)
 
 
+@untraced()
 def vehicle_in(state: m.RoundState) -> Vehicle:
     """Return a vehicle whose round is in a state, on the way to the gate at x = 4 m."""
     vehicle = Vehicle()

@@ -41,6 +41,7 @@ from t2.messages import (
 )
 from t2.words import render
 from tests.factories import link, safety_state
+from tests.untraced import untraced
 
 TICK_S = 0.02
 FREE: tuple[float | None, ...] = (None,) * 8
@@ -202,6 +203,7 @@ class PolicyFixture:
             self.request(linear, angular, source)
         return self.verdict
 
+    @untraced()
     def ready(self) -> "PolicyFixture":
         """Start, and send neutral requests."""
         self.tick(40)
@@ -209,6 +211,7 @@ class PolicyFixture:
         assert self.verdict.command == "run", self.state.latches
         return self
 
+    @untraced()
     def running(self, linear: float = 0.5, angular: float = 0.0) -> "PolicyFixture":
         """Start and drive."""
         self.ready().drive(linear, angular, 2.0)
@@ -284,6 +287,7 @@ class PolicyFixture:
         self.ranges, self.status = tuple(ranges), tuple(status)
 
 
+@untraced()
 def hit() -> PolicyFixture:
     """Drive forward into something, let go, and stand there, pressed."""
     fixture = PolicyFixture().running()
