@@ -9,7 +9,7 @@ import pytest
 
 from common.pose import Pose
 from services.patrol.core.routes import LEAST, length, problem
-from services.patrol.core.teaching import Refused, Teaching, _close
+from services.patrol.core.teaching import Refused, Teaching, _close, _is_straight
 from t2 import messages as m
 from t2.messages import Phrase
 from tests.factories import map_pose
@@ -57,6 +57,15 @@ class Lesson:
     def corners(self) -> list[tuple[float, float]]:
         """The points of the route."""
         return [(each.x, each.y) for each in self.teaching.route(0.5).points]
+
+
+def taught(*places: float | tuple[float, float, float], of: Teaching | None = None) -> Teaching:
+    """Teach exactly these places, x or x, y and heading."""
+    teaching = of or Lesson().teaching
+    for each in places:
+        x, y, heading = each if isinstance(each, tuple) else (each, 0.0, 0.0)
+        teaching.on_pose(pose_at(Pose(x, y, heading)))
+    return teaching
 
 
 def near(points: list[tuple[float, float]], within: float = 0.06) -> Any:
@@ -118,8 +127,8 @@ def test_four_kilometres_straight_on_are_a_few_hundred_points() -> None:
 def test_a_route_is_full_at_the_limit_of_its_type(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("services.patrol.core.teaching.MAX_POINTS", 20)
     lesson = Lesson().forward(100.0, radius=1.0)
-    assert lesson.reason == "teach.full"
-    assert len(lesson.teaching.route(0.5).points) <= 20
+    assert lesson.teaching.reason == Phrase("teach.full", {"points": 20})
+    assert len(lesson.teaching.route(0.5).points) == 19  # a station or home would fit
 
 
 def test_stations_are_exact_points_in_their_order() -> None:
@@ -191,6 +200,87 @@ def test_an_unknown_position_ends_the_recording(pose: m.MapPose, reason: str) ->
     lesson.forward(3.0)
     assert lesson.reason == reason
     assert lesson.corners == near([(0.0, 0.0), (2.0, 0.0)])
+
+
+def test_the_reason_has_its_numbers() -> None:
+    jump: Any = {"distance": pytest.approx(0.5)}
+    jumped = taught(0.25, (0.55, 0.4, 0.0))
+    assert jumped.phrases == (
+        Phrase("teach.jump", jump),
+        Phrase("teach.ends_here", {"length": 0.25}),
+    )
+    uncertain: Any = {"sigma": pytest.approx(0.26), "corridor": 0.5}
+    with pytest.raises(Refused) as refused:
+        Teaching("yard", "001", "home", 0.0, pose_at(Pose(0.0, 0.0, 0.0), sigma=0.26))
+    assert refused.value.reason == Phrase("teach.uncertain", uncertain)
+
+
+def test_a_pose_may_be_as_far_and_as_uncertain_as_the_limits() -> None:
+    teaching = taught(0.3)
+    teaching.on_pose(pose_at(Pose(0.3, 0.0, 0.0), sigma=0.25))
+    assert teaching.reason is None
+
+
+@pytest.mark.parametrize(
+    ("place", "length"),
+    [
+        ((0.1, 0.0, 0.0), 0.1),
+        ((0.099, 0.0, 0.0), 0.0),
+        ((0.05, 0.0, 0.31), 0.05),
+        ((0.05, 0.0, -0.31), 0.05),
+        ((0.05, 0.0, 0.3), 0.0),  # it has hardly turned
+        ((0.011, 0.0, 1.0), 0.011),
+        ((0.01, 0.0, 1.0), 0.0),  # it turns on the spot
+    ],
+)
+def test_when_a_pose_is_recorded(place: tuple[float, float, float], length: float) -> None:
+    assert taught(place).summary == (length, 2 if length else 1)
+
+
+def test_a_straight_line_has_a_point_at_ten_metres() -> None:
+    teaching = taught(*(0.25 * step for step in range(1, 49)))
+    assert [each.x for each in teaching.route(0.5).points] == [0.0, 10.0, 12.0]
+
+
+@pytest.mark.parametrize(
+    ("line", "is_straight"),
+    [
+        ([HOME, (0.5, 0.03), (1.0, 0.0)], True),
+        ([HOME, (0.03, 0.5), (0.0, 1.0)], True),
+        ([HOME, (0.5, -0.031), (1.0, 0.0)], False),
+        ([HOME, (0.5, 0.0), (0.6, 0.04), (1.0, 0.0)], False),
+        ([(2.0, 1.0), (2.5, 1.52), (3.0, 2.0)], True),
+        ([(2.0, 1.0), (2.5, 1.55), (3.0, 2.0)], False),
+        ([HOME, (0.25, 0.0), (0.25, 0.0), (1.0, 0.0), (1.0, 0.0)], True),
+        ([HOME, (0.5, 0.0), (0.25, 0.0), (1.0, 0.0)], False),  # it turned back
+        ([(2.0, 1.0), (1.75, 1.0), (3.0, 1.0)], False),
+        ([(2.0, 1.0), (3.25, 1.0), (3.0, 1.0)], False),
+    ],
+)
+def test_a_straight_line(line: list[tuple[float, float]], is_straight: bool) -> None:
+    assert _is_straight(line[0], line[1:-1], line[-1]) is is_straight
+
+
+def test_points_are_rounded_to_millimetres() -> None:
+    teaching = taught(0.2504, (0.5006, 0.1234, 0.0))
+    teaching.station("gate", 3.0)
+    assert teaching.route(0.5).points[-1] == m.RoutePoint(x=0.501, y=0.123, station="gate", stay=3)
+    assert teaching.route(0.5).corridor == 0.5
+
+
+def test_as_far_backward_as_allowed_is_no_part_of_the_route() -> None:
+    teaching = taught(0.2, 0.4, 0.2)
+    assert teaching.reason is None
+    teaching.station("gate", 0.0)
+    taught(0.4, 0.6, 0.8, of=teaching)
+    assert [each.x for each in teaching.route(0.5).points] == [0.0, 0.2, 0.8]
+    assert teaching.summary[0] == pytest.approx(0.8)
+
+
+def test_too_far_backward_is_by_the_heading() -> None:
+    ended = taught(0.25, 0.5, 0.75, 0.5)
+    assert ended.reason == Phrase("teach.backward")
+    assert ended.route(0.5).points[-1].x == 0.75
 
 
 def test_teaching_needs_a_known_position() -> None:
