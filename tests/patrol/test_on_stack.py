@@ -1,5 +1,6 @@
 """Rounds on real processes: what a killed or suspended service leaves."""
 
+import contextlib
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -64,6 +65,13 @@ def finish(robot: t2.Robot) -> None:
 
 def until(robot: t2.Robot, *states: m.RoundState, within: float = 20.0) -> None:
     wait_until(lambda: robot.patrol.latest(10.0).state in states, str(states), within)
+
+
+def is_reset(robot: t2.Robot) -> bool:
+    """Reset; return whether safety has granted it: shortly after a stop it is still present."""
+    with contextlib.suppress(t2.Refused):
+        robot.reset()
+    return not robot.safety.latest().latched
 
 
 def announcing(robot: t2.Robot, _: RunningStack) -> None:
@@ -186,7 +194,7 @@ def test_an_emergency_stop_wants_a_reset_and_a_call(stack: RunningStack, robot: 
     until(robot, "stopped")
     with pytest.raises(t2.Refused, match="A reset is needed"):
         robot.patrol.resume()
-    robot.reset()
+    wait_until(lambda: is_reset(robot), "a reset")
     stands(stack)
     assert robot.patrol.latest().state == "stopped"
     robot.patrol.resume()
@@ -200,6 +208,6 @@ def test_a_restart_of_the_router_stops_a_round(stack: RunningStack, robot: t2.Ro
     stack.start("router")
     until(robot, "stopped", within=30.0)
     wait_until(lambda: "estop_reader" in robot.safety.latest(10.0).latched, "the latch", 20.0)
-    robot.reset()
+    wait_until(lambda: is_reset(robot), "a reset")
     stands(stack)
     assert robot.patrol.latest(10.0).state == "stopped"
