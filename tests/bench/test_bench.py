@@ -11,7 +11,7 @@ from bench.figures import HOST, Figures, compared
 from bench.fleet import answers_ns
 from bench.processes import MissingError
 from bench.reaction import BREAK, CLEAR, HIT, JUDGED, LOOP, REFLEX, STANDS, STOP, TIME, ZENOH
-from bench.timed import TIMED
+from bench.timed import REPEATED, TIMED
 from common.freshness import NS_PER_S
 from sim.trace import Command
 from t2 import messages
@@ -138,3 +138,4 @@ def test_each_function_of_the_chain_is_timed() -> None:
     for service, functions in TIMED.items():
         for owner, name in functions:
             assert figures[service, f"{owner.__name__}.{name}", "time"], name
+    assert figures["safety", f"{REPEATED}, once more", "time"]
