@@ -142,7 +142,9 @@ def test_stations_are_exact_points_in_their_order() -> None:
         ("gate", pytest.approx(1.04), 0.0),
     ]
     assert problem(route) is None
-    msgspec.json.decode(msgspec.json.encode(route), type=m.Route)  # with its limits
+    written = msgspec.json.encode(route)
+    msgspec.json.decode(written, type=m.Route)  # with its limits
+    assert written.count(b'"stay"') == len(lesson.teaching.stations)  # no default is written
 
 
 def test_a_station_has_one_place() -> None:
@@ -261,23 +263,27 @@ def test_a_straight_line(line: list[tuple[float, float]], is_straight: bool) -> 
     assert _is_straight(line[0], line[1:-1], line[-1]) is is_straight
 
 
-def test_points_are_rounded_to_millimetres() -> None:
+def test_points_are_rounded_to_millimetres(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.patrol.core.teaching.CORRIDOR", 0.4)
     teaching = taught(0.2504, (0.5006, 0.1234, 0.0))
     teaching.station("gate", 3.0)
     assert teaching.route(0.5).points[-1] == m.RoutePoint(x=0.501, y=0.123, station="gate", stay=3)
-    assert teaching.route(0.5).corridor == 0.5
+    assert teaching.route(0.5).corridor == 0.4
 
 
 def test_as_far_backward_as_allowed_is_no_part_of_the_route() -> None:
     teaching = taught(0.2, 0.4, 0.2)
     assert teaching.reason is None
     teaching.station("gate", 0.0)
+    assert teaching.summary[0] == pytest.approx(0.2)
     taught(0.4, 0.6, 0.8, of=teaching)
     assert [each.x for each in teaching.route(0.5).points] == [0.0, 0.2, 0.8]
     assert teaching.summary[0] == pytest.approx(0.8)
 
 
-def test_too_far_backward_is_by_the_heading() -> None:
+def test_how_far_backward_is_by_the_heading() -> None:
+    places = (Pose(0.0, 0.0, 1.0).moved(step, 0.0) for step in (0.25, 0.5, 0.35))
+    assert taught(*((each.x, each.y, 1.0) for each in places)).reason is None
     ended = taught(0.25, 0.5, 0.75, 0.5)
     assert ended.reason == Phrase("teach.backward")
     assert ended.route(0.5).points[-1].x == 0.75
@@ -295,6 +301,15 @@ def test_a_small_loop_ends_at_home() -> None:
     assert lesson.teaching.summary[0] == pytest.approx(1.2, abs=0.05)
     assert lesson.corners[0] == lesson.corners[-1] == HOME
     assert lesson.teaching.route(0.7).speed == 0.7
+
+
+def test_which_loop_is_too_short_to_end_at_home() -> None:
+    west = math.pi
+    teaching = taught(0.25, 0.5, (0.5, 0.25, math.pi / 2), (0.25, 0.25, west))
+    end = teaching.route(0.5).points[-1]
+    assert (end.x, end.y) == (0.25, 0.25)  # after 1 m
+    end = taught((0.0, 0.25, west), of=teaching).route(0.5).points[-1]
+    assert (end.x, end.y) == HOME
 
 
 def test_a_short_route_is_no_loop() -> None:
