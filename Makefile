@@ -14,7 +14,7 @@ CHECK_PYTHON = import sys; sys.exit(sys.version_info < (3, 11) and \
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check waiting timed others computing cover search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
+.PHONY: demo up test fuzz soak faults vehicles ros2-peer bench rust-example check waiting timed others computing computing-and-search cover simulated search mutants lint format types docs lock audit sbom wheelhouse system-test clean help
 
 docs: $(STAMP) ## renew the generated tables of the documents, and the JSON schemas
 	$(BIN)/python -m tools.docs
@@ -65,7 +65,7 @@ SEARCH = tests/search
 TIMED = $(FEW) $$(grep -rlE --include="test_*.py" "mark.timed|BROWSER_MARKS" tests)
 
 test: $(STAMP) $(REWRITTEN) ## all tests except search and campaigns, with the coverage of the cores
-	@$(MAKE) --no-print-directory -j2 --output-sync=line waiting cover
+	@$(MAKE) --no-print-directory -j2 --output-sync=line waiting computing
 
 waiting: timed
 	@$(MAKE) --no-print-directory others
@@ -75,7 +75,7 @@ timed: $(STAMP)
 
 others: $(STAMP)
 	$(BIN)/pytest --ignore=$(SEARCH) $$($(CORE_TESTS) | sed 's/[^ ]*/--ignore=&/g') $(MANY) \
-	  -m "not timed and not campaign"
+	  -m "not timed and not simulated and not campaign"
 
 campaigns: $(STAMP) ## short runs of all campaigns and benchmarks, the tour, the programs of docs/integrate.md
 	$(BIN)/pytest tests -m campaign
@@ -109,7 +109,7 @@ ros2-peer: $(STAMP) ## test the gateway to ROS 2 with hiroz (with cargo), rclpy 
 
 check: $(STAMP) ## what CI runs: lint, types, test, search, mutants of changed cores
 	@$(MAKE) --no-print-directory -j3 --output-sync lint types $(REWRITTEN)
-	@$(MAKE) --no-print-directory -j2 --output-sync=line waiting computing
+	@$(MAKE) --no-print-directory -j2 --output-sync=line waiting computing-and-search
 	@$(MAKE) --no-print-directory mutants CHANGED=1
 
 lint: $(STAMP)
@@ -119,20 +119,28 @@ lint: $(STAMP)
 	$(BIN)/codespell
 	$(BIN)/python -m tools.docs --check
 
+# What only computes takes the CPU that the other tests leave. A busy host only makes it last longer.
+COMPUTE = nice -n 19 $(BIN)/pytest -n 2 --dist worksteal --durations=20 --timeout 300
+
 computing: cover
+	@$(MAKE) --no-print-directory simulated
+
+computing-and-search: computing
 	@$(MAKE) --no-print-directory search
+
+simulated: $(STAMP)
+	$(COMPUTE) $$(grep -rl --include="test_*.py" "mark.simulated" tests) -m "simulated and not campaign"
 
 # Random events, 200 random vehicles, and mutations of the protections.
 search: $(STAMP)
-	nice -n 19 $(BIN)/pytest -n 2 --dist worksteal $(SEARCH)
+	$(COMPUTE) $(SEARCH)
 
 CORE_TESTS = $(BIN)/python -m verification.mutation --tests
 
-# Not a branch of a core is untested. These tests and the search only compute: they take the CPU that
-# the others leave.
+# Not a branch of a core is untested.
 cover: $(STAMP)
 	$(BIN)/coverage erase
-	nice -n 19 $(BIN)/pytest -n 2 --dist worksteal --cov --cov-report= $$($(CORE_TESTS))
+	$(COMPUTE) --cov --cov-report= $$($(CORE_TESTS))
 	$(BIN)/coverage report
 
 mutants: $(STAMP) ## mutation tests of the cores; CHANGED=1: changed files only

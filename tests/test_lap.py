@@ -3,10 +3,14 @@
 from dataclasses import replace
 from functools import cache
 
+import pytest
+
 from cli.demo.lap import Lap
 from cli.demo.score import Trace, good, results, stops
 from sim import trace as t
 from tests.simulated_robot import SimulatedStack, simulated_robot
+
+pytestmark = pytest.mark.simulated
 
 
 @cache

@@ -20,6 +20,8 @@ from tests.simulated_robot import SimulatedStack
 from verification.harness.waiting import wait_until
 from verification.search.condition_books import IGNORED
 
+pytestmark = pytest.mark.simulated
+
 HoldUp = Callable[[Callable[[], object]], None]
 
 

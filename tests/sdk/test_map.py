@@ -10,6 +10,8 @@ from tests.simulated_robot import SimulatedStack
 from verification.harness.waiting import wait_until
 from verification.search.condition_books import IGNORED
 
+pytestmark = pytest.mark.simulated
+
 COVARIANCE = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.0025)
 SHIFT = (10.0, -4.0)  # of the map against the simulated world, m
 

@@ -9,6 +9,8 @@ import t2
 from tests.simulated_robot import SimulatedStack
 from verification.harness.waiting import wait_until
 
+pytestmark = pytest.mark.simulated
+
 
 @pytest.fixture
 def robot(simulated: t2.Robot) -> t2.Robot:

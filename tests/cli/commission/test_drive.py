@@ -26,7 +26,7 @@ from t2 import messages as m
 from t2.errors import T2Error
 from tests.cli.commission.simulated_session import STEP_MS, SimulatedInspector, simulated_session
 
-pytestmark = pytest.mark.timeout(300)  # simulated time: a busy host only takes longer
+pytestmark = pytest.mark.simulated
 
 SKIPPED = "no room there"
 

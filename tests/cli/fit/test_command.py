@@ -27,6 +27,8 @@ from tests.cli.fit.stops_fixture import streams
 from tests.cli.recordings.settings_fixture import settings_of
 from tests.recorder.samples import bare
 
+pytestmark = pytest.mark.simulated
+
 PATHS = {"motions": "@cmd/motion", "velocities": "tel/bridge/velocity",
          "mileages": "tel/bridge/mileage", "odometries": "tel/odom/odometry"}  # fmt: skip
 CAREFUL = (

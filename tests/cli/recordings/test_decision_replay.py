@@ -18,6 +18,8 @@ from verification.search.bus import MS
 from verification.search.condition_books import NEEDED
 from verification.search.stack import Stack
 
+pytestmark = pytest.mark.simulated
+
 STEP_MS = 5
 
 

@@ -18,6 +18,8 @@ from tests.cli.recordings.settings_fixture import as_sample, boots, settings_of
 from verification.search.bus import MS
 from verification.search.stack import Stack
 
+pytestmark = pytest.mark.simulated
+
 
 @cache
 def driven() -> tuple[Sample, ...]:

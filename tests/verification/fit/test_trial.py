@@ -16,6 +16,8 @@ from verification.fit.run import Result
 from verification.fit.trial import Runs, Trial, approaches
 from verification.search.stack import Stack
 
+pytestmark = pytest.mark.simulated
+
 TOO_BOLD = {
     "safety.react": 0.1,
     "safety.margin": 0.05,

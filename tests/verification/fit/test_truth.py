@@ -11,7 +11,7 @@ from sim.model import Cable, Line, Model
 from verification.fit.run import Vehicle, measure, measured, vehicles
 from verification.fit.truth import late_s, stopped_within, truths, unsafe
 
-pytestmark = pytest.mark.timeout(300)  # simulated time: a busy host only takes longer
+pytestmark = pytest.mark.simulated
 
 PROPOSED = {REACT: 0.11, DECELERATION: 0.79, "vehicle.angular_deceleration": 1.9}
 

@@ -2,7 +2,11 @@
 
 from statistics import fmean
 
+import pytest
+
 from verification.localization.run import measure
+
+pytestmark = pytest.mark.simulated
 
 
 def test_a_pose_is_as_good_as_it_says() -> None:

@@ -11,6 +11,8 @@ from sim import requests as q
 from verification.patrol.run import Trial, measure
 from verification.search.draw import Draw
 
+pytestmark = pytest.mark.simulated
+
 SEED = 2  # its route is short
 
 
