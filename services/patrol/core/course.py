@@ -101,29 +101,31 @@ class OpenRound(Struct, frozen=True, kw_only=True):
 class Course:
     """One round of a route."""
 
+    # Set before they are read: a round is announced or restored at once, and then goes.
+    state: m.RoundState
+    phrases: Phrases
+    until_ns: int | None  # the end of an announcement, a stay, or the patience
+    _boots: tuple[int, ...]  # of safety and localization, and the placement
+    _ticked_ns: int
+    _other_ns: int | None  # since when another source drives
+    _path: Path | None  # to the next stop
+    _heard_ns: int  # when safety obeyed, or nothing was requested
+    _hindered_ns: int | None  # since when the way is not free
+    _free_ns: int  # when it was not
+    _progress: tuple[float, int]  # m, and when
+
     def __init__(self, route: m.Route, record: m.Round, inputs: Inputs, patience_s: float) -> None:
         self.route = route
         self.diary = Diary(record)
-        self.state: m.RoundState = "stopped"
-        self.phrases: Phrases = ()
         self.notes: list[Note] = []  # events since they were taken
         self.way = Way(route)
         self.along = 0.0  # m on the way
         self.fit: Fit | None = None  # of the newest pose
-        self.until_ns: int | None = None  # the end of an announcement, a stay, or the patience
         self._inputs = inputs
         self._patience_s = patience_s
         self._stop = 0  # the next one of the way
         self._turned = False  # whether it returns before the end of its route
-        self._path: Path | None = None  # to the next stop
         self._requests = DriveRequests()
-        self._boots: tuple[int, ...] = ()  # of safety and localization, and the placement
-        self._ticked_ns: int | None = None
-        self._other_ns: int | None = None  # since when another source drives
-        self._heard_ns = 0  # when safety obeyed, or nothing was requested
-        self._hindered_ns: int | None = None  # since when the way is not free
-        self._free_ns = 0  # when it was not
-        self._progress = 0.0, 0  # m, and when
         self._still: Pose | None = None  # the pose since when nothing has changed
         self._due = 0.0, 0.0  # m, rad: what the vehicle was to move since then
         self._told_blocked = False
@@ -241,8 +243,7 @@ class Course:
         if not STATES[self.state].is_active:
             return self._requests.tick(None)
         self._observe()
-        if self._stopping(now_ns, wall_ns):
-            return self._requests.tick(None)
+        self._check_rules(now_ns, wall_ns)
         self._ticked_ns = now_ns
         if self.state in {"announcing", "staying"} and self._is_over(now_ns):
             self._go(now_ns)
@@ -269,8 +270,8 @@ class Course:
         if STATES[self.state].moves:
             self.diary.on_pose(located.x, located.y, self.fit)
 
-    def _stopping(self, now_ns: int, wall_ns: int) -> bool:
-        """Stop or pause the round by the first rule that holds; return whether one does."""
+    def _check_rules(self, now_ns: int, wall_ns: int) -> None:
+        """Stop or pause the round by the first rule that holds."""
         for rule in RULES:
             if rule.moving and not STATES[self.state].moves:
                 continue
@@ -279,8 +280,7 @@ class Course:
                     self._halt("paused", wall_ns, "round_paused", "info", phrase)
                 else:
                     self._stopped(phrase, wall_ns)
-                return True
-        return False
+                return
 
     def _is_over(self, now_ns: int) -> bool:
         return self.until_ns is not None and now_ns >= self.until_ns
@@ -412,8 +412,6 @@ class Course:
 
     def _enter(self, state: m.RoundState, *phrases: Phrase) -> None:
         self.state, self.phrases = state, phrases
-        if not STATES[state].moves:
-            self._path = None
 
     def _moving(self) -> tuple[m.RoundState, Phrase]:
         fields: dict[str, m.Field] = {"route": self.route.name, "station": self.station}
@@ -488,7 +486,7 @@ class Course:
         return None if is_known(pose.value) else lost(pose.value)
 
     def _held_up(self, now_ns: int) -> Phrase | None:
-        gap_s = (now_ns - (self._ticked_ns or now_ns)) / NS_PER_S
+        gap_s = (now_ns - self._ticked_ns) / NS_PER_S
         return Phrase("patrol.held_up", {"seconds": gap_s}) if gap_s > SILENT_S else None
 
     def _twice(self, now_ns: int) -> Phrase | None:

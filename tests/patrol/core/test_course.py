@@ -3,10 +3,11 @@
 import math
 from collections.abc import Callable
 
+import msgspec
 import pytest
 
 from common.pose import Pose
-from services.patrol.core.course import RULES, STATES, TICK_S
+from services.patrol.core.course import RULES, STATES, TICK_S, OpenRound
 from services.patrol.core.patrol import Patrol
 from services.patrol.core.teaching import Refused
 from t2 import messages as m
@@ -92,6 +93,14 @@ def test_a_round_begins_only_at_home(at: Pose, sigma: float, reason: str | None)
     vehicle = Vehicle(at)
     vehicle.sigma = sigma
     assert vehicle.start() == reason
+
+
+def test_a_round_begins_at_home_and_not_where_its_route_comes_back_to() -> None:
+    back = ((0.0, 0.0, "home"), (2.6, 0.0), (2.6, 0.3), (0.0, 0.3, "gate"))  # after 5.5 m
+    vehicle = Vehicle(Pose(0.0, 0.2, 0.0))
+    assert vehicle.start(route(back)) is None
+    assert vehicle.patrol.course
+    assert vehicle.patrol.course.along == 0.0
 
 
 def test_a_route_of_another_robot_is_refused() -> None:
@@ -473,7 +482,8 @@ def test_a_restarted_service_waits_for_a_person(state: m.RoundState) -> None:
     assert course
     after = Vehicle(vehicle.at)
     after.placement = vehicle.placement
-    after.patrol.restore(course.open, course.route, after.wall_ns)
+    opened = msgspec.json.decode(msgspec.json.encode(course.open), type=OpenRound)
+    after.patrol.restore(opened, course.route, after.wall_ns)
     after.run(5.0)
     assert (after.state, after.moves) == ("stopped", False)
     assert after.reasons == ("patrol.restarted", "patrol.resume")
