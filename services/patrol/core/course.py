@@ -113,6 +113,11 @@ class Course:
     _hindered_ns: int | None  # since when the way is not free
     _free_ns: int  # when it was not
     _progress: tuple[float, int]  # m, and when
+    _still: Pose | None  # the pose since when nothing has changed
+    _due: tuple[float, float]  # m, rad: what the vehicle was to move since then
+    _told_blocked: bool
+    _cause: Phrases  # of the last stop by safety
+    _stays_at: str  # the station
 
     def __init__(self, route: m.Route, record: m.Round, inputs: Inputs, patience_s: float) -> None:
         self.route = route
@@ -126,12 +131,7 @@ class Course:
         self._stop = 0  # the next one of the way
         self._turned = False  # whether it returns before the end of its route
         self._requests = DriveRequests()
-        self._still: Pose | None = None  # the pose since when nothing has changed
-        self._due = 0.0, 0.0  # m, rad: what the vehicle was to move since then
-        self._told_blocked = False
-        self._cause: Phrases = ()  # of the last stop by safety
         self._place = self.way.track.points[0]  # the newest known one, m
-        self._stays_at = ""  # the station
         self._seen: Phrase | None = None  # a latch or a lost position since the announcement
 
     # --- inputs -----------------------------------------------------------------------------

@@ -103,6 +103,17 @@ def test_a_round_begins_at_home_and_not_where_its_route_comes_back_to() -> None:
     assert vehicle.patrol.course.along == 0.0
 
 
+def test_a_round_that_is_paused_before_its_first_tick_halts_at_home() -> None:
+    vehicle = Vehicle()
+    assert vehicle.start() is None
+    assert vehicle.patrol.act("pause", vehicle.now_ns, vehicle.wall_ns) is None
+    vehicle.run(1.0)
+    assert vehicle.act("abort") is None
+    assert vehicle.patrol.course
+    (halt,) = vehicle.patrol.course.diary.record.halts
+    assert (halt.state, halt.x, halt.y) == ("paused", 0.0, 0.0)
+
+
 def test_a_route_of_another_robot_is_refused() -> None:
     assert Vehicle().start(route(robot="002")) == "patrol.other_robot"
 
