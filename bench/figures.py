@@ -13,6 +13,7 @@ Figures = Mapping[tuple[str, ...], Sequence[float]]
 # The figure that each measured row has: how late the host woke a sleeping process meanwhile, in ns.
 HOST = "host"
 PERIOD_NS = NS_PER_S // 500  # that it sleeps
+UNLIKE, LITTLE_NS = 4, 100_000  # times the 99th percentile in the other row; less is alike
 
 
 def value(samples: Sequence[float], share: Share = "p50") -> float:
@@ -84,6 +85,12 @@ def stalled(late_ns: Sequence[float], column: Column) -> float:
     return value(late_ns, column.share)
 
 
+def is_unlike(*rows: Sequence[float]) -> bool:
+    """Return whether the host behaved differently in two rows, by its delays in each."""
+    low, high = sorted(value(late_ns, "p99") for late_ns in rows)
+    return high > UNLIKE * max(low, LITTLE_NS)
+
+
 # Our row, the compared row, the figure, and the highest multiple.
 Limits = Sequence[tuple[tuple[str, ...], tuple[str, ...], Column, float]]
 
@@ -91,7 +98,8 @@ Limits = Sequence[tuple[tuple[str, ...], tuple[str, ...], Column, float]]
 def compared(question: str, limits: Limits, figures: Figures) -> list[list[str]]:
     """Return a row for each limit whose figures were measured; the first has the question.
 
-    Where the host's delays exceed a figure, its row has no verdict.
+    Where the host's delays exceed a figure, or differ between two measured rows, there is no
+    verdict.
     """
     rows: list[list[str]] = []
     for ours, theirs, column, limit in limits:
@@ -99,10 +107,13 @@ def compared(question: str, limits: Limits, figures: Figures) -> list[list[str]]
         mine, other = (value(some, column.share) if some else 0.0 for some in both)
         if all(both) and other:
             texts = [f"{column.unit.text(each)} {column.unit.name}" for each in (mine, other)]
-            late = [stalled(figures.get((*row, HOST), ()), column) for row in (ours, theirs)]
+            hosts = [figures.get((*row, HOST), ()) for row in (ours, theirs)]
+            late = [stalled(late_ns, column) for late_ns in hosts]
             verdict = "reached" if mine <= limit * other else "not reached"
             if late[0] > mine or late[1] > other:
                 verdict = f"not comparable: host {column.unit.text(max(late))} {column.unit.name}"
+            elif all(hosts) and is_unlike(*hosts):
+                verdict = "not comparable: the host had changed"
             rows.append([
                 "" if rows else question, f"{', '.join([*ours, column.head])}: {texts[0]}",
                 f"{', '.join(theirs)}: {texts[1]}", f"× {mine / other:.2f}",

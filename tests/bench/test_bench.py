@@ -74,7 +74,24 @@ def test_a_host_that_stalls_longer_than_a_figure_leaves_no_verdict() -> None:
     late_ns = [0] * 9 + [MS]
     busy_host = {**made_up({LOOP: 100, REFLEX: 140}), (LOOP, "quiet", HOST): late_ns}
     rows = compared("How soon?", reaction.LIMITS, busy_host)
-    assert [row[-1] for row in rows] == ["not reached", "not comparable: host 1,000 us"]
+    assert [row[-1] for row in rows] == [
+        "not comparable: the host had changed", "not comparable: host 1,000 us"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("late_us", "is_alike"), [((50, 400), True), ((50, 401), False), ((200, 800), True),
+                              ((200, 801), False)],
+)  # fmt: skip
+def test_rows_of_a_host_that_has_changed_have_no_verdict(
+    late_us: tuple[int, int], is_alike: bool
+) -> None:
+    figures: Figures = dict(made_up({LOOP: 1000, REFLEX: 1200}))
+    for row, each_us in zip((LOOP, REFLEX), late_us, strict=True):
+        figures = {**figures, (row, "quiet", HOST): [each_us * 1000]}
+    rows = compared("How soon?", reaction.LIMITS, figures)
+    changed = "not comparable: the host had changed"
+    assert [row[-1] for row in rows] == ["reached" if is_alike else changed] * 2
 
 
 def test_of_cpu_the_share_of_time_that_the_host_took_is_compared() -> None:
